@@ -1,0 +1,295 @@
+"""A calibrated camera: pinhole with Brown-Conrady distortion.
+
+A projection is three maps, each with its Jacobian: the perspective division
+``(u, v, w) -> (u, v) / w``, the distortion of normalised points, and the affine map
+to pixels. The distortion is OpenCV's model with 5 or 8 coefficients
+``k1 k2 p1 p2 k3 [k4 k5 k6]``:
+
+    r2 = x^2 + y^2
+    g  = (1 + k1 r2 + k2 r2^2 + k3 r2^3) / (1 + k4 r2 + k5 r2^2 + k6 r2^3)
+    x' = x g + 2 p1 x y + p2 (r2 + 2 x^2)
+    y' = y g + p1 (r2 + 2 y^2) + 2 p2 x y
+
+References
+----------
+.. [1] D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37
+   (1971) 855-866.
+.. [2] OpenCV, "Camera calibration and 3D reconstruction", section "Detailed
+   description".
+"""
+
+from dataclasses import dataclass, field
+from datetime import date
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+
+UNDISTORT_STEPS = 20
+UNDISTORT_TOLERANCE = 1e-12  # normalised units: 1e-8 px at any sensible focal length
+
+
+class PointMap(NamedTuple):
+    """Image of points under a map, with the Jacobian at each.
+
+    Attributes
+    ----------
+    points : (..., 2) array
+    jacobian : (..., 2, k) array
+        Derivative of ``points`` by the k coordinates of the input.
+    """
+
+    points: FloatArray
+    jacobian: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Intrinsics of a camera.
+
+    Attributes
+    ----------
+    width, height : int
+        Image size, px.
+    fx, fy : float
+        Focal length, px.
+    cx, cy : float
+        Principal point, px; (0, 0) is the centre of the top-left pixel.
+    distortion : (5,) or (8,) array
+        ``k1 k2 p1 p2 k3 [k4 k5 k6]``.
+    covariance : (4 + n, 4 + n) array or None
+        Covariance of ``fx fy cx cy`` and the n distortion coefficients, as the
+        calibration of the camera states it.
+    calibrated_on : date or None
+        Day of the camera's calibration.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion: FloatArray = field(default_factory=lambda: np.zeros(5))
+    covariance: FloatArray | None = None
+    calibrated_on: date | None = None
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Camera matrix, (3, 3), px."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+    @property
+    def intrinsics(self) -> FloatArray:
+        """``fx fy cx cy`` followed by the distortion coefficients."""
+        return np.concatenate([[self.fx, self.fy, self.cx, self.cy], self.distortion])
+
+    def project(self, points_cam: FloatArray) -> FloatArray:
+        """Return the pixels of points in the camera frame.
+
+        Parameters
+        ----------
+        points_cam : (..., 3) array
+            Points in front of the camera, mm.
+
+        Returns
+        -------
+        (..., 2) array
+            px.
+        """
+        return self.pixels(points_cam[..., :2] / points_cam[..., 2:])
+
+    def project_with_jacobian(self, points_cam: FloatArray) -> PointMap:
+        """Return the pixels of points in the camera frame and d px / d mm.
+
+        Parameters
+        ----------
+        points_cam : (..., 3) array
+            Points in front of the camera, mm.
+
+        Returns
+        -------
+        PointMap
+            ``points`` in px, ``jacobian`` (..., 2, 3) in px/mm.
+        """
+        inverse_depth = 1 / points_cam[..., 2]
+        normalised = points_cam[..., :2] * inverse_depth[..., None]
+        pixels = self.pixels_with_jacobian(normalised)
+        J = np.empty((*points_cam.shape[:-1], 2, 3))
+        J[..., :2] = pixels.jacobian * inverse_depth[..., None, None]
+        J[..., 2] = -(J[..., 0] * normalised[..., :1] + J[..., 1] * normalised[..., 1:])
+        return PointMap(pixels.points, J)
+
+    def pixels(self, normalised: FloatArray) -> FloatArray:
+        """Return the pixels of undistorted normalised points, both (..., 2)."""
+        x, y = normalised[..., 0], normalised[..., 1]
+        r2 = x * x + y * y
+        p1, p2 = self.distortion[2:4]
+        gain = _radial_gain(self.distortion, r2)
+        pixels = np.empty_like(normalised)
+        pixels[..., 0] = (
+            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
+        )
+        pixels[..., 1] = (
+            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
+        )
+        return pixels
+
+    def pixels_with_jacobian(self, normalised: FloatArray) -> PointMap:
+        """Return the pixels of undistorted normalised points, and the derivative.
+
+        Parameters
+        ----------
+        normalised : (..., 2) array
+            ``(u / w, v / w)``.
+
+        Returns
+        -------
+        PointMap
+            ``points`` in px, ``jacobian`` (..., 2, 2) in px.
+        """
+        x, y = normalised[..., 0], normalised[..., 1]
+        r2 = x * x + y * y
+        p1, p2 = self.distortion[2:4]
+        gain = _radial_gain(self.distortion, r2)
+        slope = 2 * _radial_slope(self.distortion, r2, gain)
+        pixels = np.empty_like(normalised)
+        pixels[..., 0] = (
+            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
+        )
+        pixels[..., 1] = (
+            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
+        )
+        J = np.empty((*normalised.shape, 2))
+        cross = x * y * slope + 2 * (p1 * x + p2 * y)
+        J[..., 0, 0] = self.fx * (gain + x * x * slope + 2 * p1 * y + 6 * p2 * x)
+        J[..., 0, 1] = self.fx * cross
+        J[..., 1, 0] = self.fy * cross
+        J[..., 1, 1] = self.fy * (gain + y * y * slope + 6 * p1 * y + 2 * p2 * x)
+        return PointMap(pixels, J)
+
+    def intrinsics_jacobian(self, normalised: FloatArray) -> FloatArray:
+        """Return the derivative of the pixels by the intrinsics.
+
+        Parameters
+        ----------
+        normalised : (..., 2) array
+            Undistorted normalised points.
+
+        Returns
+        -------
+        (..., 2, 4 + n) array
+            Columns in the order of `intrinsics`.
+        """
+        x, y = normalised[..., 0], normalised[..., 1]
+        r2 = x * x + y * y
+        gain = _radial_gain(self.distortion, r2)
+        k4, k5, k6 = _rational(self.distortion)
+        denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        J = np.zeros((*normalised.shape, 4 + len(self.distortion)))
+        p1, p2 = self.distortion[2:4]
+        J[..., 0, 0] = x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        J[..., 1, 1] = y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        J[..., 0, 2] = J[..., 1, 3] = 1
+        focal_points = normalised * np.array([self.fx, self.fy])
+        for power, column in ((1, 4), (2, 5), (3, 8)):
+            J[..., column] = focal_points * (r2**power / denominator)[..., None]
+        J[..., 0, 6], J[..., 1, 6] = 2 * self.fx * x * y, self.fy * (r2 + 2 * y * y)
+        J[..., 0, 7], J[..., 1, 7] = self.fx * (r2 + 2 * x * x), 2 * self.fy * x * y
+        if len(self.distortion) == 8:
+            for power in (1, 2, 3):
+                factor = -gain * r2**power / denominator
+                J[..., 8 + power] = focal_points * factor[..., None]
+        return J
+
+    def unproject(self, pixels: FloatArray) -> FloatArray:
+        """Return the undistorted normalised points ``(u / w, v / w)`` of pixels.
+
+        Parameters
+        ----------
+        pixels : (..., 2) array
+            px.
+
+        Returns
+        -------
+        (..., 2) array
+
+        Raises
+        ------
+        CalibrationError
+            The distortion cannot be undone there: the coefficients fold the image.
+        """
+        return self.unproject_with_jacobian(pixels).points
+
+    def unproject_with_jacobian(self, pixels: FloatArray) -> PointMap:
+        """Return the undistorted normalised points of pixels, and the derivative.
+
+        Newton's method on `pixels_with_jacobian`.
+
+        Parameters
+        ----------
+        pixels : (..., 2) array
+            px.
+
+        Returns
+        -------
+        PointMap
+            ``points`` normalised, ``jacobian`` (..., 2, 2) in 1/px.
+
+        Raises
+        ------
+        CalibrationError
+            The distortion cannot be undone there: the coefficients fold the image.
+        """
+        focal = np.array([self.fx, self.fy])
+        normalised = (pixels - np.array([self.cx, self.cy])) / focal
+        for _ in range(UNDISTORT_STEPS):
+            there = self.pixels_with_jacobian(normalised)
+            inverse = _inverse_2x2(there.jacobian)
+            step = np.einsum("...ij,...j->...i", inverse, pixels - there.points)
+            normalised = normalised + step
+            if np.all(np.abs(step) < UNDISTORT_TOLERANCE):
+                return PointMap(normalised, inverse)
+        raise CalibrationError(
+            "The lens distortion of the camera file cannot be undone for some image "
+            "points: its coefficients fold the image. Check the distortion "
+            "coefficients, or calibrate the camera again."
+        )
+
+
+def _rational(distortion: FloatArray) -> FloatArray:
+    return distortion[5:8] if len(distortion) == 8 else np.zeros(3)
+
+
+def _radial_gain(distortion: FloatArray, r2: FloatArray) -> FloatArray:
+    k1, k2, _, _, k3 = distortion[:5]
+    gain = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    if len(distortion) == 8:
+        k4, k5, k6 = distortion[5:8]
+        gain = gain / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    return np.asarray(gain)
+
+
+def _radial_slope(
+    distortion: FloatArray, r2: FloatArray, gain: FloatArray
+) -> FloatArray:
+    """Return d gain / d r2."""
+    k1, k2, _, _, k3 = distortion[:5]
+    slope = k1 + r2 * (2 * k2 + r2 * 3 * k3)
+    if len(distortion) == 8:
+        k4, k5, k6 = distortion[5:8]
+        denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        slope = (slope - gain * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / denominator
+    return np.asarray(slope)
+
+
+def _inverse_2x2(matrices: FloatArray) -> FloatArray:
+    a, b = matrices[..., 0, 0], matrices[..., 0, 1]
+    c, d = matrices[..., 1, 0], matrices[..., 1, 1]
+    inverse = np.empty_like(matrices)
+    inverse[..., 0, 0], inverse[..., 0, 1] = d, -b
+    inverse[..., 1, 0], inverse[..., 1, 1] = -c, a
+    inverse /= (a * d - b * c)[..., None, None]
+    return inverse

@@ -1,0 +1,135 @@
+"""Rotations and rigid motions, vectorised over any number of leading axes."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+
+
+def rotation_from_vector(vectors: FloatArray) -> FloatArray:
+    """Return the rotation matrices of rotation vectors (Rodrigues' formula).
+
+    Parameters
+    ----------
+    vectors : (..., 3) array
+        Axis times angle, rad.
+
+    Returns
+    -------
+    (..., 3, 3) array
+    """
+    angle_squared = np.einsum("...i,...i->...", vectors, vectors)
+    angle = np.sqrt(angle_squared)
+    a = np.sinc(angle / np.pi)
+    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    K = skew(vectors)
+    rotations: FloatArray = (
+        np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+    )
+    return rotations
+
+
+def vector_from_rotation(rotations: FloatArray) -> FloatArray:
+    """Return the rotation vectors, of length 0 to pi, of rotation matrices.
+
+    Goes through the unit quaternion, which stays exact near angles of 0 and pi.
+
+    Parameters
+    ----------
+    rotations : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3) array
+        Axis times angle, rad.
+
+    References
+    ----------
+    .. [1] S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and
+       Control 1 (1978) 223-224.
+    """
+    R = np.asarray(rotations, dtype=np.float64)
+    diagonal = np.diagonal(R, axis1=-2, axis2=-1)
+    trace = diagonal.sum(axis=-1)
+    # Four quaternions, each scaled by a different component; the largest is safe.
+    x, y, z = np.moveaxis(diagonal, -1, 0)
+    off = R - np.swapaxes(R, -1, -2)
+    both = R + np.swapaxes(R, -1, -2)
+    w_x, w_y, w_z = off[..., 2, 1], off[..., 0, 2], off[..., 1, 0]
+    x_y, x_z, y_z = both[..., 0, 1], both[..., 0, 2], both[..., 1, 2]
+    candidates = np.stack(
+        [
+            np.stack([1 + trace, w_x, w_y, w_z], axis=-1),
+            np.stack([w_x, 1 + x - y - z, x_y, x_z], axis=-1),
+            np.stack([w_y, x_y, 1 - x + y - z, y_z], axis=-1),
+            np.stack([w_z, x_z, y_z, 1 - x - y + z], axis=-1),
+        ],
+        axis=-2,
+    )
+    largest = np.argmax(np.stack([trace, x, y, z], axis=-1), axis=-1)
+    quaternion = np.take_along_axis(candidates, largest[..., None, None], axis=-2)
+    quaternion = quaternion[..., 0, :]
+    quaternion = quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    quaternion = np.where(quaternion[..., :1] < 0, -quaternion, quaternion)
+    sine = np.linalg.norm(quaternion[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, quaternion[..., :1])
+    scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-300), 2.0)
+    vectors: FloatArray = scale * quaternion[..., 1:]
+    return vectors
+
+
+def skew(vectors: FloatArray) -> FloatArray:
+    """Return the matrices K with ``K @ p = v x p``, shape (..., 3, 3)."""
+    K = np.zeros((*vectors.shape, 3))
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
+    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
+    return K
+
+
+def nearest_rotation(matrices: FloatArray) -> FloatArray:
+    """Return the rotations nearest to matrices in the Frobenius norm.
+
+    Parameters
+    ----------
+    matrices : (..., 3, 3) array
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rotations, determinant +1.
+    """
+    U, _, Vt = np.linalg.svd(matrices)
+    sign = np.linalg.det(U @ Vt)
+    U[..., :, 2] *= sign[..., None]
+    rotations: FloatArray = U @ Vt
+    return rotations
+
+
+def fit_rigid(source: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return R, t that bring ``source`` onto ``target`` with least squares.
+
+    Parameters
+    ----------
+    source, target : (..., N, 3) array
+        Corresponding points, mm.
+
+    Returns
+    -------
+    R : (..., 3, 3) array
+    t : (..., 3) array
+        ``target ~ source @ R.T + t``.
+
+    References
+    ----------
+    .. [1] S. Umeyama, "Least-squares estimation of transformation parameters
+       between two point patterns", IEEE PAMI 13 (1991) 376-380.
+    """
+    source_mean = source.mean(axis=-2)
+    target_mean = target.mean(axis=-2)
+    scatter = np.einsum(
+        "...ni,...nj->...ij",
+        target - target_mean[..., None, :],
+        source - source_mean[..., None, :],
+    )
+    R = nearest_rotation(scatter)
+    return R, target_mean - np.einsum("...ij,...j->...i", R, source_mean)
