@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.camera import Camera
 from lightpen.ellipse import ellipse_centers
 from lightpen.pen import Pen
@@ -31,6 +31,7 @@ MIN_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
+MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
 
@@ -67,6 +68,17 @@ class Poses:
         n_seen = np.isfinite(self.residuals[..., 0]).sum(axis=1)
         rms: FloatArray = np.sqrt(squares / np.maximum(n_seen, 1))
         return rms
+
+    def of(self, chosen: IntArray) -> "Poses":
+        """Return the poses of some images."""
+        return Poses(
+            self.rotations[chosen],
+            self.translations[chosen],
+            self.covariances[chosen],
+            self.residuals[chosen],
+            self.weights[chosen],
+            self.sigma,
+        )
 
 
 def fit_poses(
@@ -267,21 +279,47 @@ def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
     Returns
     -------
     float
-        px. The median length of a 2-D normal vector is 1.1774 standard deviations.
+        px.
     """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     seen = np.isfinite(lengths)
     n_equations = 2 * seen.sum()
     n_free = max(n_equations - n_unknowns_per_image * len(residuals), 1)
-    median = float(np.median(lengths[seen])) / 1.1774
+    median = float(np.median(lengths[seen])) / MEDIAN_LENGTH
     return max(median * float(np.sqrt(n_equations / n_free)), NOISE_FLOOR)
 
 
-def cauchy_weights(residuals: FloatArray, sigma: float) -> FloatArray:
-    """Return the Cauchy weights (N, L) of residuals (N, L, 2); 0 where not seen."""
+def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArray:
+    """Return the Cauchy weights of residuals.
+
+    Parameters
+    ----------
+    residuals : (N, L, 2) array
+        px; NaN where an LED was not seen.
+    sigma : float or (N,) array
+        Standard deviation of one image coordinate, of all images or of each, px.
+
+    Returns
+    -------
+    (N, L) array
+        0 to 1; 0 where not seen.
+    """
     squares = np.einsum("...i,...i->...", residuals, residuals)
-    weights = 1 / (1 + squares / (CAUCHY_WIDTH * sigma) ** 2)
+    width = CAUCHY_WIDTH * np.reshape(sigma, (-1, 1))
+    weights = 1 / (1 + squares / width**2)
     return np.asarray(np.nan_to_num(weights, nan=0.0))
+
+
+def _image_weights(residuals: FloatArray) -> FloatArray:
+    """Return Cauchy weights in units of the common noise, or the image's own scatter.
+
+    The larger of the two lets an image whose start is spoilt by one wrong LED come in.
+    """
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    n_seen = np.isfinite(lengths).sum(axis=1)
+    middle = np.sort(lengths, axis=1)[np.arange(len(lengths)), n_seen // 2]
+    own = middle / MEDIAN_LENGTH
+    return cauchy_weights(residuals, np.maximum(own, robust_sigma(residuals, 6)))
 
 
 def _require_seen(pixels: FloatArray) -> None:
@@ -299,28 +337,24 @@ def _refine(
     max_steps: int,
 ) -> Poses:
     seen = np.isfinite(problem.pixels[..., 0])
-    n_images = len(R)
-    converged: BoolArray = np.zeros(n_images, dtype=bool)
     for _ in range(max_steps):
         residuals, J = problem.residuals_with_jacobian(R, t)
-        sigma = robust_sigma(residuals, 6)
-        weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
+        weights = _image_weights(residuals) if robust else seen.astype(float)
         H, g = normal_equations(J, residuals, weights)
-        step: FloatArray = np.linalg.solve(H, g[..., None])[..., 0]
+        step = np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
         R = rotation_from_vector(step[:, :3]) @ R
         t = t + step[:, 3:]
         distance = np.linalg.norm(t, axis=1)
         size = np.maximum(
             np.abs(step[:, :3]).max(axis=1), np.abs(step[:, 3:]).max(axis=1) / distance
         )
-        converged = size < STEP_TOLERANCE
-        if converged.all():
+        if size.max() < STEP_TOLERANCE:
             break
     residuals, J = problem.residuals_with_jacobian(R, t)
     sigma = robust_sigma(residuals, 6)
     weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
     H, _ = normal_equations(J, residuals, weights)
-    covariances: FloatArray = sigma**2 * np.linalg.inv(H)
+    covariances = np.asarray(sigma**2 * np.linalg.inv(H), dtype=np.float64)
     return Poses(R, t, covariances, residuals, weights, sigma)
 
 

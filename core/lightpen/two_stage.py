@@ -21,6 +21,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.coverage import require_spread
 from lightpen.errors import CalibrationError
+from lightpen.pivot import tip_covariances
 
 N_START = 6  # images of the linear start
 STEP_TOLERANCE = 1e-9  # mm, of |alpha dX|
@@ -88,8 +89,7 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
             "Capture more images."
         )
     require_spread(rotations)
-    minus_identity = np.broadcast_to(-np.eye(3), (n_poses, 3, 3))
-    M = np.concatenate([rotations, minus_identity], axis=2)
+    M = _contact_matrix(rotations)
     X = _linear_start(M, translations)
     iterates, step_lengths, increments = [X], [], []
     deviations = M @ X + translations
@@ -119,6 +119,37 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
         step_lengths=np.array(step_lengths),
         increments=np.array(increments),
     )
+
+
+def propagated_covariance(
+    rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
+) -> FloatArray:
+    """Return the covariance of the two-stage solution by those of the poses.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of cam_from_pen.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt), rad and mm.
+    tip_pen : (3,) array
+        mm.
+
+    Returns
+    -------
+    (6, 6) array
+        Of (tip_pen, cone_cam), mm^2.
+    """
+    M = _contact_matrix(rotations)
+    inverse = np.linalg.inv(np.einsum("nki,nkj->ij", M, M))
+    each = np.swapaxes(M, 1, 2) @ tip_covariances(rotations, covariances, tip_pen) @ M
+    return np.asarray(inverse @ each.sum(axis=0) @ inverse)
+
+
+def _contact_matrix(rotations: FloatArray) -> FloatArray:
+    """Return [R_i, -I] of eq. (2), (N, 3, 6)."""
+    minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
+    return np.concatenate([rotations, minus_identity], axis=2)
 
 
 def _linear_start(M: FloatArray, translations: FloatArray) -> FloatArray:

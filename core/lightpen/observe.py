@@ -1,0 +1,247 @@
+"""From images to observations: the LED centres of every image, and what was dropped."""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.camera import Camera
+from lightpen.ellipse import centers_from_centroids
+from lightpen.errors import FileError
+from lightpen.images import ImageSource
+from lightpen.labels import Labels, Verdict, diagnose, label_images
+from lightpen.observation_files import Centers
+from lightpen.pen import Pen
+from lightpen.pose import MIN_LEDS, start_poses
+from lightpen.spots import Flaw, Spots, detect_spots
+
+LABELLED_AT_ONCE = 32  # images; labelling is vectorised over them
+IN_FLIGHT = 4  # images per thread that may wait in memory
+
+Report = Callable[[float], None]
+
+
+class Reason(StrEnum):
+    """Why an image does not take part in the calibration."""
+
+    NONE = ""
+    UNREADABLE = "unreadable"
+    WRONG_SIZE = "wrong size"
+    EMPTY = "empty"
+    BLURRED = "blurred"
+    TOO_FEW_LEDS = "too few LEDs"
+    NOT_THE_PEN = "spots do not fit the pen"
+    AMBIGUOUS = "ambiguous"
+    MISFIT = "LEDs do not fit"
+    SLIPPED = "tip slipped"
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """What N images show of the pen.
+
+    Attributes
+    ----------
+    names : tuple of str
+        File or frame, one an image.
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
+    seen_pixels : (N, L, 2) array
+        Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Rough cam_from_pen, mm; NaN where there is none.
+    reasons : tuple of Reason
+        Why an image cannot be used; `Reason.NONE` where it can.
+    details : tuple of str
+        A sentence on that, empty where the reason says all.
+    advice : str
+        What may be wrong with the set as a whole; empty when most images are labelled.
+    """
+
+    names: tuple[str, ...]
+    pixels: FloatArray
+    seen_pixels: FloatArray
+    rotations: FloatArray
+    translations: FloatArray
+    reasons: tuple[Reason, ...]
+    details: tuple[str, ...]
+    advice: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sighting:
+    """One image after detection."""
+
+    spots: Spots | None
+    reason: Reason
+    detail: str
+
+
+def observe_images(
+    source: ImageSource,
+    camera: Camera,
+    pen: Pen,
+    report: Report = lambda fraction: None,
+    n_threads: int | None = None,
+) -> Observations:
+    """Find and label the LEDs in images.
+
+    Images are decoded and searched in threads and leave memory at once; labelling
+    follows in batches while further images are decoded.
+
+    Parameters
+    ----------
+    source : ImageSource
+    camera : Camera
+    pen : Pen
+    report : callable
+        Called with the fraction done, 0 to 1.
+    n_threads : int, optional
+        One a core if not given.
+
+    Returns
+    -------
+    Observations
+
+    Raises
+    ------
+    FileError
+        Most images are of another size than the camera file.
+    """
+    sightings: list[_Sighting] = []
+    labels: list[Labels] = []
+    n_images = len(source.names)
+    for sighting in _in_threads(source, camera, n_threads or os.cpu_count() or 1):
+        sightings.append(sighting)
+        if len(sightings) - len(labels) == LABELLED_AT_ONCE:
+            labels += _label(sightings[len(labels) :], camera, pen)
+        report(len(sightings) / n_images)
+    labels += _label(sightings[len(labels) :], camera, pen)
+    _require_size(sightings, camera)
+    return _assemble(source.names, sightings, labels, camera, pen)
+
+
+def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
+    """Take LED centres that were found and labelled elsewhere.
+
+    Parameters
+    ----------
+    centers : Centers
+    camera : Camera
+    pen : Pen
+
+    Returns
+    -------
+    Observations
+    """
+    pixels = centers.pixels
+    n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
+    enough = n_seen >= MIN_LEDS
+    rotations = np.full((len(pixels), 3, 3), np.nan)
+    translations = np.full((len(pixels), 3), np.nan)
+    rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])
+    return Observations(
+        names=tuple(f"frame {frame}" for frame in centers.frames),
+        pixels=pixels,
+        seen_pixels=pixels,
+        rotations=rotations,
+        translations=translations,
+        reasons=tuple(Reason.NONE if e else Reason.TOO_FEW_LEDS for e in enough),
+        details=("",) * len(pixels),
+    )
+
+
+def _in_threads(
+    source: ImageSource, camera: Camera, n_threads: int
+) -> Iterator[_Sighting]:
+    """Detect the spots of all images, in order, with a bounded number in memory."""
+    with ThreadPoolExecutor(n_threads) as executor:
+        waiting: deque[Future[_Sighting]] = deque()
+        for load in source.open():
+            waiting.append(executor.submit(_detect, load, camera))
+            if len(waiting) >= IN_FLIGHT * n_threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+def _detect(load: Callable[[], Image], camera: Camera) -> _Sighting:
+    try:
+        image = load()
+    except FileError as error:
+        return _Sighting(None, Reason.UNREADABLE, str(error))
+    height, width = image.shape
+    if (width, height) != (camera.width, camera.height):
+        return _Sighting(None, Reason.WRONG_SIZE, f"{width} x {height} px")
+    return _Sighting(detect_spots(image), Reason.NONE, "")
+
+
+def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]:
+    """Label images; those without spots get the labels of an empty image."""
+    return label_images([s.spots or NO_SPOTS for s in sightings], camera, pen)
+
+
+def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
+    wrong = [s.detail for s in sightings if s.reason is Reason.WRONG_SIZE]
+    n_readable = sum(s.reason is not Reason.UNREADABLE for s in sightings)
+    if 2 * len(wrong) > n_readable:
+        raise FileError(
+            f"{len(wrong)} of {n_readable} images are {wrong[0]}, the camera file was "
+            f"made for {camera.width} x {camera.height} px. Choose the file for this "
+            "camera, or switch off binning and cropping."
+        )
+
+
+def _assemble(
+    names: tuple[str, ...],
+    sightings: list[_Sighting],
+    labels: list[Labels],
+    camera: Camera,
+    pen: Pen,
+) -> Observations:
+    n_images = len(names)
+    seen = np.full((n_images, pen.n_leds, 2), np.nan)
+    shapes = np.full((n_images, pen.n_leds, 2, 2), np.nan)
+    whole = np.zeros((n_images, pen.n_leds), dtype=bool)
+    for i, (sighting, label) in enumerate(zip(sightings, labels, strict=True)):
+        labelled = label.spot >= 0
+        if sighting.spots is not None and labelled.any():
+            seen[i, labelled] = sighting.spots.centers[label.spot[labelled]]
+            shapes[i, labelled] = sighting.spots.shapes[label.spot[labelled]]
+            whole[i] = label.whole & labelled
+    seen = centers_from_centroids(camera, seen, shapes)
+    reasons = tuple(map(_reason, sightings, labels))
+    n_labelled = reasons.count(Reason.NONE)
+    spots = [s.spots for s in sightings if s.spots is not None]
+    return Observations(
+        names=names,
+        pixels=np.where(whole[..., None], seen, np.nan),
+        seen_pixels=seen,
+        rotations=np.array([label.R for label in labels]).reshape(-1, 3, 3),
+        translations=np.array([label.t for label in labels]).reshape(-1, 3),
+        reasons=reasons,
+        details=tuple(s.detail for s in sightings),
+        advice="" if 2 * n_labelled > n_images else diagnose(spots, camera, pen),
+    )
+
+
+def _reason(sighting: _Sighting, label: Labels) -> Reason:
+    if sighting.spots is None:
+        return sighting.reason
+    if label.reason is Verdict.LABELLED:
+        return Reason.NONE
+    if label.reason is Verdict.AMBIGUOUS:
+        return Reason.AMBIGUOUS
+    if len(sighting.spots) == 0:
+        return Reason.EMPTY
+    blurred = np.mean((sighting.spots.flaws & Flaw.BLURRED) > 0)
+    if blurred > 0.5:
+        return Reason.BLURRED
+    if label.reason is Verdict.TOO_FEW:
+        return Reason.TOO_FEW_LEDS
+    return Reason.NOT_THE_PEN
