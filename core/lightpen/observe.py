@@ -23,6 +23,15 @@ from lightpen.spots import Flaw, Spots, detect_spots
 LABELLED_AT_ONCE = 32  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
 
+NO_SPOTS = Spots(
+    centers=np.zeros((0, 2)),
+    shapes=np.zeros((0, 2, 2)),
+    areas=np.zeros(0),
+    contrasts=np.zeros(0),
+    edge_widths=np.zeros(0),
+    flaws=np.zeros(0, dtype=np.int64),
+)
+
 Report = Callable[[float], None]
 
 
@@ -138,8 +147,14 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     Returns
     -------
     Observations
+
+    Raises
+    ------
+    FileError
+        Most centres are outside the image of the camera file.
     """
     pixels = centers.pixels
+    _require_inside(pixels, camera)
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
     enough = n_seen >= MIN_LEDS
     rotations = np.full((len(pixels), 3, 3), np.nan)
@@ -183,7 +198,8 @@ def _detect(load: Callable[[], Image], camera: Camera) -> _Sighting:
 
 def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]:
     """Label images; those without spots get the labels of an empty image."""
-    return label_images([s.spots or NO_SPOTS for s in sightings], camera, pen)
+    spots = [NO_SPOTS if s.spots is None else s.spots for s in sightings]
+    return label_images(spots, camera, pen)
 
 
 def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
@@ -194,6 +210,18 @@ def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
             f"{len(wrong)} of {n_readable} images are {wrong[0]}, the camera file was "
             f"made for {camera.width} x {camera.height} px. Choose the file for this "
             "camera, or switch off binning and cropping."
+        )
+
+
+def _require_inside(pixels: FloatArray, camera: Camera) -> None:
+    points = pixels[np.isfinite(pixels[..., 0])]
+    far = points.max(axis=0, initial=0)
+    outside = np.any((points < -0.5) | (points > [camera.width, camera.height]), axis=1)
+    if 2 * outside.sum() > len(points):
+        raise FileError(
+            f"The LED centres reach to ({far[0]:.0f}, {far[1]:.0f}) px, the camera "
+            f"file was made for {camera.width} x {camera.height} px. Choose the file "
+            "for this camera."
         )
 
 
