@@ -17,13 +17,7 @@ from lightpen.pen import Pen
 from lightpen.pivot import fit_pivot
 from lightpen.pose import MIN_LEDS, Poses, fit_paper_poses, fit_poses
 from lightpen.two_stage import TwoStageFit, fit_two_stage, propagated_covariance
-from lightpen.uncertainty import (
-    Budget,
-    Halves,
-    combine,
-    compare_halves,
-    lag_one_autocorrelation,
-)
+from lightpen.uncertainty import Budget, Halves, combine, compare_halves
 
 MIN_IMAGES = 6  # the paper starts from six
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
@@ -58,8 +52,6 @@ class Calibration:
     halves : Halves
     leds : LedQuality
     coverage : Coverage
-    autocorrelation : float
-        Of the tip's deviations from one used image to the next.
     """
 
     observations: Observations
@@ -75,7 +67,6 @@ class Calibration:
     halves: Halves
     leds: LedQuality
     coverage: Coverage
-    autocorrelation: float
 
     @property
     def joint(self) -> JointFit:
@@ -164,7 +155,6 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         halves=compare_halves(joint),
         leds=measure_leds(camera, pen, pixels, geometry),
         coverage=measure_coverage(joint.rotations),
-        autocorrelation=lag_one_autocorrelation(tips_cam[chosen]),
     )
 
 

@@ -96,8 +96,31 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
 def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_simulate)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
-    parser.add_argument("--images", type=int, default=60, metavar="N")
-    parser.add_argument("--seed", type=int, default=0, metavar="S")
+    parser.add_argument("--images", type=_count, default=60, metavar="N")
+    parser.add_argument("--seed", type=_count, default=0, metavar="S")
+    parser.add_argument(
+        "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
+    )
+    parser.add_argument(
+        "--swing",
+        choices=("field", "cone", "operator", "one-axis", "upright"),
+        default="field",
+        help="how the pen moves",
+    )
+    parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
+    parser.add_argument(
+        "--pen",
+        choices=("paper", "six", "eight", "near-symmetric", "fanned"),
+        default="paper",
+        help="layout of the LEDs",
+    )
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 0:
+        raise argparse.ArgumentTypeError(f"{text} is negative; 0 or more is needed.")
+    return count
 
 
 def _add_pivot(parser: argparse.ArgumentParser) -> None:
@@ -216,7 +239,9 @@ def _progress(title: str) -> Iterator[Callable[[float], None]]:
         return
     from tqdm import tqdm
 
-    with tqdm(total=1.0, desc=title, bar_format="{desc} {bar} {percentage:3.0f}%") as bar:
+    with tqdm(
+        total=1.0, desc=title, bar_format="{desc} {bar} {percentage:3.0f}%"
+    ) as bar:
 
         def report(fraction: float) -> None:
             bar.update(fraction - bar.n)

@@ -19,13 +19,14 @@ from lightpen.errors import CalibrationError
 from lightpen.rigid import skew
 
 MIN_POSES = 6  # the paper starts from six images
-MIN_AGREEING = 0.5  # fraction of the poses that must share one pivot
 N_SAMPLES = 300  # of four poses: 40 % outliers leave 1e-18 of drawing no clean one
 SAMPLE_SIZE = 4
 GATE = 5.1  # square root of chi-square, 3 degrees of freedom, at 1e-5
 LOOSE_GATE = 8.0  # where covariances are not given: real trackers have heavy tails
 MEDIAN_CHI = 1.538  # square root of the median of that chi-square
 MAX_PASSES = 20
+MAX_EXCESS = 5.0  # scatter of the tip over what the covariances of the poses explain
+MAX_SCATTER = 0.2  # mm rms; less is passed whatever the covariances say
 TINY = 1e-12  # mm; exact poses have no scatter
 
 
@@ -91,8 +92,8 @@ def fit_pivot(
     Raises
     ------
     CalibrationError
-        There are too few poses, they turn too little to fix the tip, or fewer than
-        half of them share a pivot.
+        There are too few poses, they turn too little to fix the tip, or the tip moved
+        by far more than the covariances allow.
 
     References
     ----------
@@ -100,26 +101,24 @@ def fit_pivot(
     .. [2] P. J. Rousseeuw, "Least median of squares regression", J. American
        Statistical Association 79 (1984) 871-880.
     """
-    n_poses = len(rotations)
-    if n_poses < MIN_POSES:
-        raise CalibrationError(
-            f"{n_poses} poses are usable; the tip needs at least {MIN_POSES}. "
-            "Capture more images."
-        )
+    _require_number(len(rotations))
     require_spread(rotations)
     equations = _Equations(rotations, translations, covariances)
-    everything = np.ones(n_poses, dtype=bool)
+    everything = np.ones(len(rotations), dtype=bool)
     if not robust:
         return equations.fit(everything, everything)
     used = equations.gate(_best_sample(equations), everything)
     for _ in range(MAX_PASSES):
-        _require_agreement(used)
+        _require_number(int(used.sum()))
         require_spread(rotations[used])
         gated = equations.gate(equations.solve_weighted(used), used)
         if np.array_equal(gated, used):
             break
         used = gated
-    return equations.fit(used, gated)
+    fit = equations.fit(used, gated)
+    if covariances is not None:
+        _require_steadiness(fit)
+    return fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,10 +249,20 @@ def _best_sample(equations: _Equations) -> FloatArray:
     return np.asarray(solutions[np.argmin(medians)])
 
 
-def _require_agreement(used: BoolArray) -> None:
-    if used.sum() < max(MIN_AGREEING * len(used), MIN_POSES):
+def _require_number(n_poses: int) -> None:
+    if n_poses < MIN_POSES:
         raise CalibrationError(
-            f"The tip did not stay in one place: only {used.sum()} of {len(used)} "
-            "images share a pivot, half of them are needed. Press the tip into the "
+            f"{n_poses} poses are usable; the tip needs at least {MIN_POSES}. "
+            "Capture more images."
+        )
+
+
+def _require_steadiness(fit: PivotFit) -> None:
+    scatter = float(np.sqrt(np.mean(np.sum(fit.residuals[fit.used] ** 2, axis=1))))
+    excess = float(np.median(fit.distances[fit.used])) / MEDIAN_CHI
+    if excess > MAX_EXCESS and scatter > MAX_SCATTER:
+        raise CalibrationError(
+            f"The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), "
+            f"{excess:.0f} times what the images alone explain. Press the tip into the "
             "cone and repeat; check that cone and camera are clamped."
         )

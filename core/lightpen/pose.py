@@ -30,6 +30,7 @@ from lightpen.rigid import nearest_rotation, rotation_from_vector
 MIN_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
+MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
 MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
@@ -342,12 +343,13 @@ def _refine(
         weights = _image_weights(residuals) if robust else seen.astype(float)
         H, g = normal_equations(J, residuals, weights)
         step = np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
+        size = np.maximum(
+            np.linalg.norm(step[:, :3], axis=1),
+            np.linalg.norm(step[:, 3:], axis=1) / np.linalg.norm(t, axis=1),
+        )
+        step *= np.minimum(1, MAX_STEP / np.maximum(size, NOISE_FLOOR))[:, None]
         R = rotation_from_vector(step[:, :3]) @ R
         t = t + step[:, 3:]
-        distance = np.linalg.norm(t, axis=1)
-        size = np.maximum(
-            np.abs(step[:, :3]).max(axis=1), np.abs(step[:, 3:]).max(axis=1) / distance
-        )
         if size.max() < STEP_TOLERANCE:
             break
     residuals, J = problem.residuals_with_jacobian(R, t)

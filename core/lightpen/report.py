@@ -237,7 +237,7 @@ def _quality_lines(calibration: Calibration, chosen: Result) -> list[str]:
     lines.append(
         f"Repeatability between blocks of images: {np.sqrt(budget.block_ratio):.2f} "
         f"times that of independent noise, lag-1 autocorrelation "
-        f"{calibration.autocorrelation:.2f}"
+        f"{budget.autocorrelation:.2f}"
     )
     lines.append(
         f"Postures     tilt {tilt.min():.0f} to {tilt.max():.0f} degrees, turn "
@@ -317,7 +317,7 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
         "blocks_mm": std(budget.blocks),
         "block_ratio": budget.block_ratio,
         "correlation_factor": budget.correlation_factor,
-        "lag1_autocorrelation": calibration.autocorrelation,
+        "lag1_autocorrelation": budget.autocorrelation,
         "led_geometry_mm": std(budget.leds),
         "camera_mm": std(budget.camera),
         "led_sigma_mm": calibration.geometry.led_sigma,

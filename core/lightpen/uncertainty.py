@@ -1,10 +1,12 @@
 """What the tip is worth: covariance, repeatability between blocks, halves, weakness.
 
 The joint fit states the covariance that independent image noise leaves. Real residuals
-hang together from image to image, so the scatter between blocks of consecutive images
-is set beside it and, where it is significantly larger, raises it (the cluster-robust
-covariance of [1]_). LED geometry and the camera's own calibration add their parts, as
-the GUM [2]_ combines independent components.
+hang together from image to image. Two figures tell by how much that raises the
+covariance: the scatter between blocks of consecutive images (cluster-robust, [1]_), and
+the lag-1 autocorrelation rho of the images' scores, which makes the variance of a mean
+(1 + rho) / (1 - rho) times larger. The larger one counts, where it is significant. LED
+geometry and the camera's own calibration add their parts, as the GUM [2]_ combines
+independent components.
 
 References
 ----------
@@ -41,8 +43,11 @@ class Budget:
         From the scatter between blocks of consecutive images; None with too few images.
     block_ratio : float
         Variance between blocks over that of independent noise, 1 on average.
+    autocorrelation : float
+        Lag-1 autocorrelation of what the images say of tip and cone.
     correlation_factor : float
-        What ``noise`` was multiplied by: the ratio where significant, else 1.
+        What ``noise`` is multiplied by: the larger of ``block_ratio`` and
+        ``(1 + rho) / (1 - rho)``, each where significant, else 1.
     leds : (6, 6) array
         From the LED geometry.
     camera : (6, 6) array
@@ -52,6 +57,7 @@ class Budget:
     noise: FloatArray
     blocks: FloatArray | None
     block_ratio: float
+    autocorrelation: float
     correlation_factor: float
     leds: FloatArray
     camera: FloatArray
@@ -116,12 +122,18 @@ def combine(
     """
     joint = geometry.joint
     noise = joint.covariance
-    blocks, ratio, factor = _block_scatter(joint, noise)
+    blocks, ratio, blocks_count = _block_scatter(joint, noise)
+    rho, rho_counts = _autocorrelation(joint, noise)
     return Budget(
         noise=noise,
         blocks=blocks,
         block_ratio=ratio,
-        correlation_factor=factor,
+        autocorrelation=rho,
+        correlation_factor=max(
+            1.0,
+            ratio if blocks_count else 1.0,
+            (1 + rho) / (1 - rho) if rho_counts else 1.0,
+        ),
         leds=geometry.covariance - noise,
         camera=_camera_part(camera, pen, pixels, geometry),
     )
@@ -141,25 +153,14 @@ def compare_halves(joint: JointFit) -> Halves:
     )
 
 
-def lag_one_autocorrelation(deviations: FloatArray) -> float:
-    """Return the correlation of deviations (N, k) with those one image later.
-
-    Near 0 for independent images; near 1 the images repeat each other's errors.
-    """
-    centered = deviations - deviations.mean(axis=0)
-    scale = np.sqrt(np.mean(centered**2, axis=0))
-    whitened = centered / np.where(scale > 0, scale, 1)
-    return float(np.mean(np.sum(whitened[1:] * whitened[:-1], axis=0)) / len(whitened))
-
-
 def _block_scatter(
     joint: JointFit, noise: FloatArray
-) -> tuple[FloatArray | None, float, float]:
-    """Return the covariance from blocks, its ratio to the noise's, and what counts."""
+) -> tuple[FloatArray | None, float, bool]:
+    """Return the covariance from blocks, its ratio to the noise's, and significance."""
     n_images = len(joint.information)
     n_blocks = min(MAX_BLOCKS, n_images // MIN_BLOCK_SIZE)
     if n_blocks < 3:
-        return None, 1.0, 1.0
+        return None, 1.0, False
     scores = np.array(
         [part.sum(axis=0) for part in np.array_split(joint.gradients, n_blocks)]
     )
@@ -167,8 +168,21 @@ def _block_scatter(
     scatter = scores.T @ scores * n_blocks / (n_blocks - 1)
     blocks = noise @ scatter @ noise
     ratio = float(np.trace(noise @ scatter)) / 6
-    limit = _chi_square_quantile_99(6 * (n_blocks - 1)) / (6 * (n_blocks - 1))
-    return blocks, ratio, ratio if ratio > limit else 1.0
+    n_free = 6 * (n_blocks - 1)
+    return blocks, ratio, ratio > _chi_square_quantile_99(n_free) / n_free
+
+
+def _autocorrelation(joint: JointFit, noise: FloatArray) -> tuple[float, bool]:
+    """Return the lag-1 autocorrelation of what images say of the tip; significance.
+
+    Six components share one coefficient; they count as half as many, as few of them
+    carry most of the information.
+    """
+    whitened = joint.gradients @ np.linalg.cholesky(noise)
+    total = float(np.sum(whitened**2))
+    lagged = float(np.sum(whitened[1:] * whitened[:-1]))
+    rho = lagged / total if total > 0 else 0.0
+    return rho, rho > Z_99 / np.sqrt(3 * len(whitened))
 
 
 def _chi_square_quantile_99(n_free: int) -> float:
