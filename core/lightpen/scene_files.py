@@ -1,0 +1,270 @@
+"""A simulated set on disk: camera, pen, images and the truth about them."""
+
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.camera_files import write_camera
+from lightpen.ellipse import disc_images
+from lightpen.errors import FileError
+from lightpen.files import write_whole
+from lightpen.pen import pen_frame_from_raw
+from lightpen.pen_files import write_pen
+from lightpen.render import hidden_fraction, led_levels
+from lightpen.rigid import fit_rigid, vector_from_rotation
+from lightpen.rims import disc_rims, measure_insides
+from lightpen.scenes import Scene
+from lightpen.shots import ScenePlan, Shot, plan_scene, render_shot
+from lightpen.simulate import leds_in_camera, rim_gaps
+
+Json: TypeAlias = dict[str, Any]
+
+DISTORTION_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+N_THREADS = 2  # one renders while another compresses
+NOTES = (
+    "u = R x + T. proj: projected LED centre; ellipse_center: centre of the exact "
+    "conic image of the disc rim in the undistorted normalised plane, then distorted "
+    "to px; centroid: area centroid of the exact distorted disc region; all of the "
+    "whole disc at mid-exposure. visible: lit and not wholly hidden. saturated: "
+    "brighter than full scale. occluded_fraction: share of the disc's area behind "
+    "fingers or outside the image."
+)
+
+
+def write_scene(
+    scene: Scene, folder: Path, report: Callable[[float], None] | None = None
+) -> None:
+    """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
+
+    Parameters
+    ----------
+    scene : Scene
+    folder : Path
+        Created if it is missing. Images of the same names are replaced.
+    report : callable, optional
+        Called with the fraction done; what it raises stops the writing.
+
+    Raises
+    ------
+    FileError
+        The folder holds images of another set, or something cannot be written.
+    """
+    images = folder / "images"
+    names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
+    _make_folder(images, names)
+    plan = plan_scene(scene)
+    write_camera(scene.camera, folder / "camera.yaml", "opencv")
+    # A table of coordinates has no place for these.
+    anonymous = replace(plan.measured_pen, name="", nominal_tip=None)
+    write_pen(anonymous, folder / "leds.csv")
+    with ThreadPoolExecutor(N_THREADS) as pool:
+        encoded = _in_order(
+            pool, lambda shot: _png(render_shot(scene, shot)), plan.shots
+        )
+        for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
+            write_whole(images / name, data)
+            if report is not None:
+                report(done / len(names))
+    truth = {"set": folder.name, **scene_truth(plan)}
+    write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
+
+
+def scene_truth(plan: ScenePlan) -> Json:
+    """Return what a test needs to know about a set, as JSON.
+
+    Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
+    """
+    scene = plan.scene
+    camera = scene.camera
+    optics, sensor = scene.optics, scene.sensor
+    return {
+        "units": "mm, px, deg; pixel (0,0) is the centre of the top-left pixel",
+        "camera": {
+            "image_width": camera.width,
+            "image_height": camera.height,
+            "fx": camera.fx,
+            "fy": camera.fy,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            **dict(zip(DISTORTION_NAMES, camera.distortion.tolist(), strict=False)),
+        },
+        "pen": _pen_truth(plan),
+        "cone_point": scene.cone_cam.tolist(),
+        "image_model": {
+            "bits": sensor.bits,
+            "psf_gauss_sigma_px": optics.psf_sigma,
+            "pixel": "100% fill box",
+            "radiance_cos_power": optics.cos_power,
+            "peak_dn": optics.peak * optics.exposure * sensor.full_scale,
+            "full_well_e": sensor.full_well,
+            "e_per_dn": sensor.electrons_per_dn,
+            "read_noise_e": sensor.read_noise,
+            "offset_dn": sensor.offset / sensor.electrons_per_dn,
+            "background": optics.background,
+            "background_gradient": list(optics.gradient),
+            "vignetting": "none",
+        },
+        "notes": NOTES,
+        "seed": scene.seed,
+        "frames": [_shot_truth(plan, shot) for shot in plan.shots],
+    }
+
+
+def _make_folder(images: Path, names: list[str]) -> None:
+    try:
+        images.mkdir(parents=True, exist_ok=True)
+        strangers = {path.name for path in images.iterdir()} - set(names)
+    except OSError as error:
+        raise FileError(
+            f"The folder {images} cannot be made or read: {error.strerror}. Choose "
+            "another folder."
+        ) from error
+    if strangers:
+        raise FileError(
+            f"The folder {images} holds {len(strangers)} other files, such as "
+            f"{min(strangers)}, which would get mixed up with the new images. Choose "
+            "an empty folder."
+        )
+
+
+def _in_order(
+    pool: ThreadPoolExecutor, encode: Callable[[Shot], bytes], shots: tuple[Shot, ...]
+) -> Iterator[bytes]:
+    """Yield the results in order, with only a few images in memory at a time."""
+    ahead: list[Future[bytes]] = []
+    try:
+        for shot in shots:
+            ahead.append(pool.submit(encode, shot))
+            if len(ahead) > N_THREADS:
+                yield ahead.pop(0).result()
+        while ahead:
+            yield ahead.pop(0).result()
+    finally:
+        for future in ahead:
+            future.cancel()
+
+
+def _png(image: Image) -> bytes:
+    _, data = cv2.imencode(".png", image)
+    return data.tobytes()
+
+
+def _pen_truth(plan: ScenePlan) -> Json:
+    scene = plan.scene
+    measured = plan.measured_pen.leds
+    R, t = fit_rigid(scene.pen.leds, measured)
+    tip_measured = R @ scene.tip_pen + t
+    return {
+        "tip": scene.tip_pen.tolist(),
+        "leds": scene.pen.leds.tolist(),
+        "normals": scene.pen.normals.tolist(),
+        "disc_radius_mm": scene.pen.diameter / 2,
+        "radiance_gain": plan.gains.tolist(),
+        "leds_measured_csv": measured.tolist(),
+        "tip_in_leds_csv_frame_bestfit": tip_measured.tolist(),
+        **_frame_truth(scene.pen.leds, measured, tip_measured),
+    }
+
+
+def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Json:
+    """Return the tip in the frame that the paper defines by the measured LEDs."""
+    try:
+        R, t = pen_frame_from_raw(measured)
+        R_true, t_true = pen_frame_from_raw(leds)
+    except FileError:  # a pen of another layout, which has no such frame
+        return {}
+    return {
+        "tip_in_frame_redefined_from_leds_csv": (R @ tip + t).tolist(),
+        "frame_definition_check": {
+            "rotation_minus_identity_max": float(np.abs(R_true - np.eye(3)).max()),
+            "origin_abs_max": float(np.abs(t_true).max()),
+        },
+    }
+
+
+def _shot_truth(plan: ScenePlan, shot: Shot) -> Json:
+    scene, swing, index = plan.scene, plan.swing, shot.index
+    tilt, direction, roll = np.degrees(
+        [
+            swing.postures.tilts[index],
+            swing.postures.directions[index],
+            swing.postures.rolls[index],
+        ]
+    )
+    gaps = rim_gaps(
+        scene.camera, scene.pen, shot.rotation[None], shot.translation[None]
+    )
+    return {
+        "file": f"images/frame_{index + 1:04d}.png",
+        "R": shot.rotation.tolist(),
+        "T": shot.translation.tolist(),
+        "rvec": vector_from_rotation(shot.rotation).tolist(),
+        "tip_cam": swing.tips_cam[index].tolist(),
+        "posture": {
+            "tilt_deg": tilt,
+            "tilt_dir_deg": direction % 360,
+            "roll_deg": roll,
+        },
+        "min_gap_px": float(gaps[0]),
+        "flags": list(shot.flags),
+        "tip_in_cone": not swing.slipped[index],
+        "exposure": shot.optics.exposure,
+        "psf_gauss_sigma_px": shot.optics.psf_sigma,
+        "defocus_radius_px": shot.optics.defocus_radius,
+        "lamps": [
+            {
+                "center": lamp.center.tolist(),
+                "semi_axes": list(lamp.semi_axes),
+                "level": lamp.level,
+            }
+            for lamp in shot.view.lamps
+        ],
+        "leds": _led_truths(scene, shot),
+    }
+
+
+def _led_truths(scene: Scene, shot: Shot) -> list[Json]:
+    camera, pen, view = scene.camera, scene.pen, shot.view
+    leds, normals = leds_in_camera(pen, shot.rotation, shot.translation)
+    ellipses = disc_images(camera, leds, normals, pen.diameter / 2)
+    rims = disc_rims(
+        camera, leds[None], normals[None], pen.diameter / 2, scene.optics.psf_sigma
+    )
+    insides = measure_insides(rims)
+    levels = view.gains * led_levels(leds, normals, shot.optics)
+    hidden = [hidden_fraction(camera, rim, view.fingers) for rim in rims.nodes]
+    projected = camera.project(leds)
+    cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)
+    return [
+        {
+            "led": led + 1,
+            "xyz_cam": leds[led].tolist(),
+            "normal_cam": normals[led].tolist(),
+            "proj": projected[led].tolist(),
+            "ellipse_center": ellipses.centers[led].tolist(),
+            "centroid": insides.centroids[led].tolist(),
+            **_axes_truth(ellipses.shapes[led]),
+            "area_px": float(insides.areas[led]),
+            "view_angle_deg": float(np.degrees(np.arccos(cosines[led]))),
+            "visible": bool(levels[led] > 0 and hidden[led] < 1),
+            "occluded_fraction": hidden[led],
+            "saturated": bool(levels[led] >= 1),
+        }
+        for led in range(pen.n_leds)
+    ]
+
+
+def _axes_truth(shape: FloatArray) -> Json:
+    variances, directions = np.linalg.eigh(shape)
+    major = directions[:, 1]
+    return {
+        "semi_axes": (2 * np.sqrt(variances[::-1])).tolist(),
+        "angle_deg": float(np.degrees(np.arctan2(major[1], major[0])) % 180),
+    }

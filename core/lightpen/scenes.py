@@ -1,0 +1,107 @@
+"""Scenes: what a simulated set of images shows, and how much goes wrong in it."""
+
+from dataclasses import dataclass, field, fields
+
+from lightpen.arrays import FloatArray
+from lightpen.camera import Camera
+from lightpen.pen import Pen
+from lightpen.postures import SwingKind
+from lightpen.scenery import Optics
+from lightpen.sensor import Sensor
+from lightpen.simulate import PAPER_CONE, PAPER_TIP, paper_camera, paper_pen
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Fractions of the images that are disturbed, each 0 to 1.
+
+    Attributes
+    ----------
+    clutter : float
+        Foreign lamps, reflections, bright windows.
+    fingers : float
+        A finger before an LED.
+    missing : float
+        One to four LEDs off.
+    motion_blur, defocus, saturated, dim : float
+    slipped : float
+        The tip is 0.2 to 2 mm out of the cone.
+    blurred_away : float
+        Moved so fast that nothing can be measured.
+    empty : float
+        All LEDs off.
+    """
+
+    clutter: float = 0.0
+    fingers: float = 0.0
+    missing: float = 0.0
+    motion_blur: float = 0.0
+    defocus: float = 0.0
+    saturated: float = 0.0
+    dim: float = 0.0
+    slipped: float = 0.0
+    blurred_away: float = 0.0
+    empty: float = 0.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            fraction = getattr(self, item.name)
+            if not 0 <= fraction <= 1:
+                raise ValueError(
+                    f"`{item.name}` must be a fraction from 0 to 1, got {fraction}."
+                )
+        if self.slipped + self.blurred_away + self.empty > 1:
+            raise ValueError(
+                "`slipped`, `blurred_away` and `empty` must not exceed 1 together."
+            )
+
+
+CLEAN = Disturbances()
+HARD = Disturbances(
+    clutter=0.6,
+    fingers=0.2,
+    missing=0.25,
+    motion_blur=0.2,
+    defocus=0.15,
+    saturated=0.12,
+    dim=0.15,
+    slipped=0.02,
+    blurred_away=0.02,
+    empty=0.02,
+)
+SCENES = {"clean": CLEAN, "hard": HARD}
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a simulated set of images shows.
+
+    Attributes
+    ----------
+    n_images : int
+    seed : int
+    swing : str
+        Kind of swing, see `lightpen.postures.draw_postures`.
+    disturbances : Disturbances
+    optics : Optics
+    sensor : Sensor
+    led_noise : float
+        Standard deviation of the measured LED coordinates about the truth, mm.
+    pen : Pen
+        The truth.
+    camera : Camera
+    tip_pen, cone_cam : (3,) array
+        The truth, mm.
+    """
+
+    n_images: int = 60
+    seed: int = 1
+    swing: SwingKind = "field"
+    disturbances: Disturbances = CLEAN
+    optics: Optics = field(default_factory=Optics)
+    sensor: Sensor = field(default_factory=Sensor)
+    led_noise: float = 0.002
+    pen: Pen = field(default_factory=paper_pen)
+    camera: Camera = field(default_factory=paper_camera)
+    tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)
+    cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)

@@ -1,0 +1,379 @@
+"""Simulated pens, swings and LED centres, with their truth.
+
+Everything random comes from the generator the caller hands in, so that a seed gives the
+same data every time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.camera import Camera
+from lightpen.ellipse import disc_images, ellipse_centers
+from lightpen.pen import Pen
+from lightpen.postures import Postures, SwingKind, draw_postures
+
+PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result
+PAPER_CONE = np.array([-4.871, 214.287, 1087.45])  # mm
+
+MIN_GAP = 6.0  # px between the rims of two discs
+MAX_DOUBLINGS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """A pen in motion, with the truth about its tip.
+
+    Attributes
+    ----------
+    postures : Postures
+    rotations : (F, 3, 3) array
+        Of cam_from_pen.
+    translations : (F, 3) array
+        Of cam_from_pen, mm.
+    tip_pen : (3,) array
+        Tip in the pen frame, mm.
+    cone_cam : (3,) array
+        Bottom of the cone in the camera frame, mm.
+    tips_cam : (F, 3) array
+        Where the tip is in each frame, mm: in the cone unless it slipped.
+    """
+
+    postures: Postures
+    rotations: FloatArray
+    translations: FloatArray
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    tips_cam: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    @property
+    def slipped(self) -> BoolArray:
+        """Frames whose tip is out of the cone, (F,)."""
+        slipped: BoolArray = np.any(self.tips_cam != self.cone_cam, axis=-1)
+        return slipped
+
+
+def paper_camera() -> Camera:
+    """Return the paper's camera: 5 megapixels, 4638 px focal length."""
+    return Camera(
+        width=2448,
+        height=2048,
+        fx=4638.2,
+        fy=4637.1,
+        cx=1219.6,
+        cy=1031.3,
+        distortion=np.array([-0.082, 0.105, 0.0003, -0.0002, 0.0]),
+    )
+
+
+def paper_pen() -> Pen:
+    """Return the paper's pen as designed: four LEDs behind a plane of six."""
+    back = [(0, y, -30) for y in (0, 60, 120, 180)]
+    left = [(-25, y, 0) for y in (20, 90, 160)]
+    right = [(25, y, 0) for y in (35, 105, 170)]
+    return flat_pen("paper", back + left + right)
+
+
+def flat_pen(name: str, leds: Sequence[tuple[float, float, float]]) -> Pen:
+    """Return a pen whose discs all face +z, with the paper's nominal tip.
+
+    Parameters
+    ----------
+    name : str
+    leds : sequence of tuple
+        Centre of each LED, mm.
+    """
+    return Pen(
+        leds=np.array(leds, dtype=np.float64),
+        normals=np.tile([0.0, 0.0, 1.0], (len(leds), 1)),
+        nominal_tip=np.array([0.0, -90.0, -25.0]),
+        name=name,
+    )
+
+
+def perturbed_pen(pen: Pen, sigma: float, rng: np.random.Generator) -> Pen:
+    """Return the pen with its LEDs moved by independent noise of ``sigma`` mm."""
+    return replace(pen, leds=pen.leds + sigma * rng.standard_normal(pen.leds.shape))
+
+
+def swing_poses(
+    n_frames: int,
+    rng: np.random.Generator,
+    kind: SwingKind = "field",
+    *,
+    pen: Pen | None = None,
+    camera: Camera | None = None,
+    tip_pen: FloatArray = PAPER_TIP,
+    cone_cam: FloatArray = PAPER_CONE,
+) -> Swing:
+    """Return a swing with the tip in the cone.
+
+    In a ``field`` or a ``cone`` every LED is whole in the image and clear of the rest,
+    as a careful operator holds the pen.
+
+    Parameters
+    ----------
+    n_frames : int
+    rng : numpy.random.Generator
+    kind : str
+        See `lightpen.postures.draw_postures`.
+    pen, camera : optional
+        The paper's unless given.
+    tip_pen, cone_cam : (3,) array
+        Tip in the pen frame and bottom of the cone in the camera frame, mm.
+
+    Returns
+    -------
+    Swing
+    """
+    pen = pen or paper_pen()
+    camera = camera or paper_camera()
+
+    def draw(n: int) -> Swing:
+        return swing_from_postures(draw_postures(n, rng, kind), tip_pen, cone_cam)
+
+    if kind not in {"field", "cone"}:
+        return draw(n_frames)
+    n_drawn = n_frames
+    for _ in range(MAX_DOUBLINGS):
+        swing = draw(n_drawn)
+        good = np.flatnonzero(_shows_all(camera, pen, swing))
+        if len(good) >= n_frames:
+            spread = good[np.arange(n_frames) * len(good) // max(n_frames, 1)]
+            return select_frames(swing, spread)
+        n_drawn = 2 * n_drawn + 10
+    raise ValueError(
+        "Hardly a posture shows every LED of this pen whole in this camera: "
+        "move `cone_cam`."
+    )
+
+
+def select_frames(swing: Swing, frames: IntArray) -> Swing:
+    """Return the swing of the frames with these indices."""
+    postures = swing.postures
+    return replace(
+        swing,
+        postures=Postures(
+            postures.tilts[frames], postures.directions[frames], postures.rolls[frames]
+        ),
+        rotations=swing.rotations[frames],
+        translations=swing.translations[frames],
+        tips_cam=swing.tips_cam[frames],
+    )
+
+
+def swing_from_postures(
+    postures: Postures,
+    tip_pen: FloatArray = PAPER_TIP,
+    cone_cam: FloatArray = PAPER_CONE,
+    tips_cam: FloatArray | None = None,
+) -> Swing:
+    """Return the swing that holds the pen so, with the tip where it should be.
+
+    Parameters
+    ----------
+    postures : Postures
+        Of F frames.
+    tip_pen, cone_cam : (3,) array
+        mm.
+    tips_cam : (F, 3) array, optional
+        Where the tip is in each frame, mm; in the cone unless given.
+    """
+    rotations = postures.rotations
+    if tips_cam is None:
+        tips_cam = np.tile(cone_cam, (len(postures), 1))
+    translations = tips_cam - rotations @ tip_pen
+    return Swing(postures, rotations, translations, tip_pen, cone_cam, tips_cam)
+
+
+def slip_tip(
+    swing: Swing,
+    frames: BoolArray,
+    distances: FloatArray | float,
+    rng: np.random.Generator,
+) -> Swing:
+    """Return the swing with the tip out of the cone in some frames.
+
+    Parameters
+    ----------
+    swing : Swing
+        Of F frames.
+    frames : (F,) bool array
+        Frames that slip.
+    distances : (F,) array or float
+        How far from the bottom of the cone, mm, in a random direction.
+    rng : numpy.random.Generator
+    """
+    directions = rng.standard_normal(swing.tips_cam.shape)
+    directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+    lengths = np.where(frames, distances, 0.0)
+    offsets = directions * lengths[:, None]
+    return replace(
+        swing,
+        tips_cam=swing.tips_cam + offsets,
+        translations=swing.translations + offsets,
+    )
+
+
+def simulate_centers(
+    camera: Camera,
+    pen: Pen,
+    rotations: FloatArray,
+    translations: FloatArray,
+    sigma: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return measured centres of the LEDs, without rendering an image.
+
+    The exact centre of each disc's elliptic image plus independent Gaussian noise. LEDs
+    that face away or lie outside the image are missing.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+        With L LEDs.
+    rotations, translations : (F, 3, 3) and (F, 3) array
+        cam_from_pen; mm.
+    sigma : float
+        Standard deviation per coordinate, px.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (F, L, 2) array
+        px; NaN where missing.
+    """
+    leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
+    centers = ellipse_centers(camera, leds_cam, normals_cam, pen.diameter / 2)
+    seen = faces_camera(leds_cam, normals_cam) & _inside(camera, centers)
+    noise = sigma * rng.standard_normal(centers.shape)
+    return np.where(seen[..., None], centers + noise, np.nan)
+
+
+def drop_centers(
+    centers: FloatArray, n_missing: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with ``n_missing`` random LEDs missing (NaN) in every frame.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    n_missing : int
+    rng : numpy.random.Generator
+    """
+    order = np.argsort(rng.random(centers.shape[:-1]), axis=-1)
+    return np.where((order < n_missing)[..., None], np.nan, centers)
+
+
+def displace_centers(
+    centers: FloatArray, fraction: float, distance: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with one LED displaced in a fraction of the frames.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    fraction : float
+        Of the frames, 0 to 1.
+    distance : float
+        Of the displaced LED from where it was, px, in a random direction.
+    rng : numpy.random.Generator
+    """
+    n_frames, n_leds, _ = centers.shape
+    hit = rng.permutation(n_frames)[: round(fraction * n_frames)]
+    angles = rng.uniform(0, 2 * np.pi, len(hit))
+    displaced = centers.copy()
+    displaced[hit, rng.integers(n_leds, size=len(hit))] += distance * np.stack(
+        [np.cos(angles), np.sin(angles)], axis=-1
+    )
+    return displaced
+
+
+def swap_centers(
+    centers: FloatArray, fraction: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return centres with two LEDs exchanged in a fraction of the frames.
+
+    Parameters
+    ----------
+    centers : (F, L, 2) array
+        px.
+    fraction : float
+        Of the frames, 0 to 1.
+    rng : numpy.random.Generator
+    """
+    n_frames, n_leds, _ = centers.shape
+    swapped = centers.copy()
+    for frame in rng.permutation(n_frames)[: round(fraction * n_frames)]:
+        pair = rng.permutation(n_leds)[:2]
+        swapped[frame, pair] = centers[frame, pair[::-1]]
+    return swapped
+
+
+def leds_in_camera(
+    pen: Pen, rotations: FloatArray, translations: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return centres, mm, and normals of the LEDs in the camera frame, (..., L, 3)."""
+    transposed = np.swapaxes(rotations, -1, -2)
+    return pen.leds @ transposed + translations[..., None, :], pen.normals @ transposed
+
+
+def faces_camera(leds_cam: FloatArray, normals_cam: FloatArray) -> BoolArray:
+    """Return which discs show their bright side to the camera, shape (..., L)."""
+    faces: BoolArray = np.einsum("...i,...i->...", leds_cam, normals_cam) < 0
+    return faces
+
+
+def rim_gaps(
+    camera: Camera, pen: Pen, rotations: FloatArray, translations: FloatArray
+) -> FloatArray:
+    """Return a lower bound of the narrowest gap between two discs of each frame.
+
+    Each disc reaches as far as its semi-major axis in every direction.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    rotations, translations : (F, 3, 3) and (F, 3) array
+        cam_from_pen; mm.
+
+    Returns
+    -------
+    (F,) array
+        px; negative where discs may overlap.
+    """
+    leds_cam, normals_cam = leds_in_camera(pen, rotations, translations)
+    centers, shapes = disc_images(camera, leds_cam, normals_cam, pen.diameter / 2)
+    reach = 2 * np.sqrt(np.linalg.eigvalsh(shapes)[..., 1])
+    one, other = np.triu_indices(pen.n_leds, k=1)
+    distances = np.linalg.norm(centers[..., one, :] - centers[..., other, :], axis=-1)
+    gaps = distances - reach[..., one] - reach[..., other]
+    narrowest: FloatArray = gaps.min(axis=-1)
+    return narrowest
+
+
+def _shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
+    leds_cam, normals_cam = leds_in_camera(pen, swing.rotations, swing.translations)
+    facing = faces_camera(leds_cam, normals_cam).all(axis=-1)
+    radius = camera.fx * pen.diameter / 2 / leds_cam[..., 2].min()
+    inside = _inside(camera, camera.project(leds_cam), margin=2 * radius).all(axis=-1)
+    clear = rim_gaps(camera, pen, swing.rotations, swing.translations) >= MIN_GAP
+    shows: BoolArray = facing & inside & clear
+    return shows
+
+
+def _inside(camera: Camera, pixels: FloatArray, margin: float = 0.0) -> BoolArray:
+    size = np.array([camera.width, camera.height])
+    inside: BoolArray = np.all(
+        (pixels >= margin - 0.5) & (pixels <= size - 0.5 - margin), axis=-1
+    )
+    return inside
