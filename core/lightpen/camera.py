@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 
 UNDISTORT_STEPS = 20
@@ -210,7 +210,7 @@ class Camera:
         Parameters
         ----------
         pixels : (..., 2) array
-            px.
+            px; NaN gives NaN.
 
         Returns
         -------
@@ -231,7 +231,7 @@ class Camera:
         Parameters
         ----------
         pixels : (..., 2) array
-            px.
+            px; NaN gives NaN.
 
         Returns
         -------
@@ -245,13 +245,17 @@ class Camera:
         """
         focal = np.array([self.fx, self.fy])
         normalised = (pixels - np.array([self.cx, self.cy])) / focal
-        for _ in range(UNDISTORT_STEPS):
-            there = self.pixels_with_jacobian(normalised)
-            inverse = _inverse_2x2(there.jacobian)
-            step = np.einsum("...ij,...j->...i", inverse, pixels - there.points)
-            normalised = normalised + step
-            if np.all(np.abs(step) < UNDISTORT_TOLERANCE):
-                return PointMap(normalised, inverse)
+        missing = np.isnan(pixels)
+        with np.errstate(all="ignore"):  # what diverges is refused below
+            for _ in range(UNDISTORT_STEPS):
+                there = self.pixels_with_jacobian(normalised)
+                inverse = _inverse_2x2(there.jacobian)
+                step = np.einsum("...ij,...j->...i", inverse, pixels - there.points)
+                normalised = normalised + step
+                if np.all((np.abs(step) < UNDISTORT_TOLERANCE) | missing):
+                    if np.any(_is_folded(there.jacobian)):
+                        break
+                    return PointMap(normalised, inverse)
         raise CalibrationError(
             "The lens distortion of the camera file cannot be undone for some image "
             "points: its coefficients fold the image. Check the distortion "
@@ -283,6 +287,13 @@ def _radial_slope(
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         slope = (slope - gain * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / denominator
     return np.asarray(slope)
+
+
+def _is_folded(jacobians: FloatArray) -> BoolArray:
+    """Tell where a distortion turns the image over, past the rim of its valid field."""
+    a, b = jacobians[..., 0, 0], jacobians[..., 0, 1]
+    c, d = jacobians[..., 1, 0], jacobians[..., 1, 1]
+    return np.asarray((a <= 0) | (d <= 0) | (a * d - b * c <= 0))
 
 
 def _inverse_2x2(matrices: FloatArray) -> FloatArray:

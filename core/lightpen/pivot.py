@@ -154,7 +154,7 @@ class _Equations:
         if self.covariances is not None:
             for _ in range(2):  # the weights depend on the tip, and hardly at that
                 solution = self.solve(used[None], solution[:3])[0]
-        return solution
+        return np.asarray(solution)
 
     def gate(self, solution: FloatArray, used: BoolArray) -> BoolArray:
         """Return which poses are within the gate.
