@@ -1,8 +1,10 @@
 """Images from a folder, a pattern or a video, decoded one by one."""
 
+import ctypes
 import glob
 import re
 import struct
+import sys
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,6 +24,9 @@ SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
 MAX_FILE_SIZE = 512_000_000  # bytes
 MAX_PIXELS = 200_000_000
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
+MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
+MAX_KEPT_MEMORY = 256 * 2**20
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -87,6 +92,20 @@ def image_files(files: list[Path]) -> ImageSource:
             yield partial(read_image, file)
 
     return ImageSource(tuple(file.name for file in files), tuple(files), loaders)
+
+
+def keep_freed_memory() -> None:
+    """Let the next image use the memory of the last one (Linux with glibc).
+
+    Blocks as large as an image otherwise go back to the kernel when freed, and come
+    anew page by page, zeroed: two fifths of the time that decoding takes.
+    """
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MAX_KEPT_BLOCK)
+        mallopt(M_TRIM_THRESHOLD, MAX_KEPT_MEMORY)
 
 
 def read_image(path: Path) -> Image:

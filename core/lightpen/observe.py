@@ -13,7 +13,7 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.camera import Camera
 from lightpen.ellipse import centers_from_centroids
 from lightpen.errors import FileError
-from lightpen.images import ImageSource
+from lightpen.images import ImageSource, keep_freed_memory
 from lightpen.labels import Labels, Verdict, diagnose, label_images
 from lightpen.observation_files import Centers
 from lightpen.pen import Pen
@@ -122,6 +122,7 @@ def observe_images(
     FileError
         Most images are of another size than the camera file.
     """
+    keep_freed_memory()
     sightings: list[_Sighting] = []
     labels: list[Labels] = []
     n_images = len(source.names)

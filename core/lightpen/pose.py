@@ -32,6 +32,7 @@ MAX_STEPS = 30
 STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
 MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
+WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
 MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
@@ -46,7 +47,8 @@ class Poses:
     translations : (N, 3) array
         mm.
     covariances : (N, 6, 6) array
-        Of (theta, dt) in rad and mm, for the noise ``sigma``.
+        Of (theta, dt) in rad and mm, for the noise ``sigma``, or for the image's own
+        where that is clearly larger.
     residuals : (N, L, 2) array
         Observed minus modelled centres, px; NaN where an LED was not seen.
     weights : (N, L) array
@@ -323,6 +325,13 @@ def _image_weights(residuals: FloatArray) -> FloatArray:
     return cauchy_weights(residuals, np.maximum(own, robust_sigma(residuals, 6)))
 
 
+def _own_sigma(residuals: FloatArray, weights: FloatArray, sigma: float) -> FloatArray:
+    """Return the noise of images that are clearly worse than the others, else 0, px."""
+    squares = np.nansum(weights[..., None] * residuals**2, axis=(1, 2))
+    own = np.sqrt(squares / np.maximum(2 * weights.sum(axis=1) - 6, 1))
+    return np.where(own > WORSE * sigma, own, 0.0)
+
+
 def _require_seen(pixels: FloatArray) -> None:
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
     if np.any(n_seen < MIN_LEDS):
@@ -356,7 +365,10 @@ def _refine(
     sigma = robust_sigma(residuals, 6)
     weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
     H, _ = normal_equations(J, residuals, weights)
-    covariances = np.asarray(sigma**2 * np.linalg.inv(H), dtype=np.float64)
+    variances = np.maximum(sigma, _own_sigma(residuals, weights, sigma)) ** 2
+    covariances = np.asarray(
+        variances[:, None, None] * np.linalg.inv(H), dtype=np.float64
+    )
     return Poses(R, t, covariances, residuals, weights, sigma)
 
 

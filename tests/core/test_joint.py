@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.joint import ContactModel, JointFit, fit_joint
+from lightpen.joint import ContactModel, JointFit, extend_joint, fit_joint
 from lightpen.rigid import rotation_from_vector
 from lightpen.simulate import (
     Swing,
@@ -140,3 +140,22 @@ def test_what_each_image_says_adds_up_to_the_covariance() -> None:
     )
     residual_gradient = result.gradients.sum(axis=0) @ result.covariance
     assert np.abs(residual_gradient).max() < 1e-5  # mm: the fit has settled
+
+
+def test_images_added_one_by_one_give_the_fit_of_all() -> None:
+    truth = swing(45)
+    pixels = centers(truth, 0.05)
+    growing = fit_joint(
+        CAMERA,
+        PEN,
+        pixels[:40],
+        truth.rotations[:40],
+        truth.tip_pen,
+        truth.cone_cam,
+    )
+    for n in range(41, 46):
+        growing = extend_joint(
+            CAMERA, PEN, pixels[:n], growing, truth.rotations[n - 1 : n]
+        )
+
+    np.testing.assert_allclose(growing.tip_pen, fit(truth, pixels).tip_pen, atol=1e-6)
