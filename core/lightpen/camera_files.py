@@ -1,0 +1,431 @@
+"""Intrinsics of a camera in the files of OpenCV, ROS, Kalibr and MATLAB.
+
+What a file is, is found from its content. Names are compared without regard to case
+and underscores, so that ``camera_matrix``, ``cameraMatrix`` and ``Camera_Matrix`` are
+the same.
+
+============ ==========================================================================
+OpenCV       FileStorage as YAML, XML or JSON: ``image_width``, ``image_height`` (or
+             ``image_size``), ``camera_matrix``, ``distortion_coefficients``
+ROS          camera_info: the same names, ``distortion_model`` ``plumb_bob`` or
+             ``rational_polynomial``
+Kalibr       camchain with one camera: ``intrinsics`` [fx fy cx cy], ``resolution``,
+             ``distortion_model`` ``radtan``, ``distortion_coeffs``
+MATLAB       cameraParameters or cameraIntrinsics by ``jsonencode``:
+             ``FocalLength`` and ``PrincipalPoint``, ``K`` or ``IntrinsicMatrix``;
+             ``RadialDistortion``, ``TangentialDistortion``, ``ImageSize``. Its first
+             pixel is (1, 1).
+============ ==========================================================================
+
+Optional in all: ``intrinsics_covariance``, square, of fx fy cx cy and the distortion
+coefficients; or their standard deviations ``std_deviations_intrinsics``, in the order
+of OpenCV's ``calibrateCameraExtended``; and the day of the calibration,
+``calibration_date`` or ``calibration_time``.
+"""
+
+import re
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.camera import Camera
+from lightpen.documents import parse_document
+from lightpen.entries import Entries, counted_noun
+from lightpen.errors import FileError, UsageError
+from lightpen.files import MEGABYTE, printable, quoted, read_text, write_whole
+
+CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
+LARGEST_IMAGE = 100_000  # px, along a side
+SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
+SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
+SYMMETRY_TOLERANCE = 1e-6  # of the covariance, relative: files with few digits
+
+_WIDTH = ("image_width", "width")
+_HEIGHT = ("image_height", "height")
+_SIZE = ("image_size", "resolution", "image_resolution", "img_size")
+_MATRIX = ("camera_matrix", "K", "intrinsic_matrix", "mtx")
+_DISTORTION = (
+    *("distortion_coefficients", "dist_coeffs", "distortion_coeffs"),
+    *("dist_coefficients", "distortion", "dist", "D"),
+)
+_COVARIANCE = ("intrinsics_covariance",)
+_DEVIATIONS = (
+    *("std_deviations_intrinsics", "standard_deviations_intrinsics"),
+    *("std_deviations", "standard_deviations"),
+)
+_DATE = ("calibration_date", "calibration_time")
+_MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
+_FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "fov"}
+_MONTHS = [
+    *("Jan", "Feb", "Mar", "Apr", "May", "Jun"),
+    *("Jul", "Aug", "Sep", "Oct", "Nov", "Dec"),
+]
+_ISO_DATE = r"(?a)(\d{4})[-/](\d\d)[-/](\d\d)(?!\d)"
+_C_DATE = rf"(?a)\w{{3}} ({'|'.join(_MONTHS)}) +(\d\d?) \d\d:\d\d:\d\d (\d{{4}})"
+_CAMERA_OF_CHAIN = r"(?a)cam\d+"
+
+
+def read_camera(path: Path) -> Camera:
+    """Read the intrinsics of a camera; see the module for the layouts.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Camera
+        With 5 distortion coefficients, k3 = 0 being added if the file has 4, or with 8,
+        further ones being dropped if they are zero. ``calibrated_on`` is None if the
+        file has no date or one that cannot be told, such as 03/04/25.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or is not the complete file of a pinhole camera.
+    """
+    text = read_text(path, "camera file", CAMERA_FILE_LIMIT)
+    name = printable(path.name)
+    entries = Entries.of(parse_document(text, name), name)
+    chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]
+    if chain:
+        return _from_kalibr(_only_camera(entries, chain))
+    if entries.has("intrinsics") and entries.has("camera_model"):
+        return _from_kalibr(entries)
+    if entries.has("Intrinsics") and isinstance(entries.value("Intrinsics"), dict):
+        entries = entries.part("Intrinsics")
+    if entries.has("MappingCoefficients"):
+        raise _fisheye(entries.name, "fisheyeIntrinsics")
+    if entries.has("RadialDistortion") or entries.has("PrincipalPoint"):
+        return _from_matlab(entries)
+    return _from_opencv(entries)
+
+
+def write_camera(
+    camera: Camera, path: Path, layout: Literal["opencv", "ros"] = "opencv"
+) -> None:
+    """Write the intrinsics of a camera as YAML, to be read back to the last digit.
+
+    Parameters
+    ----------
+    camera : Camera
+    path : Path
+        Name that ends in .yaml or .yml.
+    layout : {"opencv", "ros"}
+        FileStorage of OpenCV, or camera_info of ROS.
+
+    Raises
+    ------
+    UsageError
+        The name ends otherwise.
+    FileError
+        The file cannot be written.
+    """
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        raise UsageError(
+            f"A camera file is written as YAML, but {printable(path.name)} does not "
+            "end in .yaml. Choose such a name."
+        )
+    lines = _opencv_lines(camera) if layout == "opencv" else _ros_lines(camera)
+    write_whole(path, "".join(f"{line}\n" for line in lines).encode())
+
+
+def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
+    if len(chain) > 1:
+        raise FileError(
+            f"{entries.name} describes {len(chain)} cameras. Keep the one that looks "
+            "at the pen, and remove the others."
+        )
+    return entries.part(chain[0])
+
+
+def _from_opencv(entries: Entries) -> Camera:
+    _check_model(entries, "distortion_model")
+    matrix = entries.counted(9, *_MATRIX).reshape(3, 3)
+    return _camera(
+        entries,
+        _size(entries),
+        _pinhole(matrix, entries),
+        entries.numbers(*_DISTORTION),
+    )
+
+
+def _from_kalibr(entries: Entries) -> Camera:
+    model = entries.word("camera_model").casefold()
+    if model and model != "pinhole":
+        raise FileError(
+            f"{entries.name} describes a camera of the model {quoted(model)}; "
+            "the model pinhole is needed. Calibrate the camera again with "
+            "pinhole-radtan."
+        )
+    _check_model(entries, "distortion_model")
+    pinhole = entries.counted(4, "intrinsics")
+    return _camera(entries, _size(entries), pinhole, entries.numbers(*_DISTORTION))
+
+
+def _from_matlab(entries: Entries) -> Camera:
+    height, width = entries.counted(2, "ImageSize")
+    if entries.has("FocalLength"):
+        pinhole = np.concatenate(
+            [entries.counted(2, "FocalLength"), entries.counted(2, "PrincipalPoint")]
+        )
+        if entries.has("Skew"):
+            _check_skew(entries.counted(1, "Skew")[0], entries)
+    else:
+        key = "K" if entries.has("K") else "IntrinsicMatrix"
+        matrix = entries.counted(9, key).reshape(3, 3)
+        transposed = np.array_equal(matrix[:, 2], [0, 0, 1])
+        pinhole = _pinhole(matrix.T if transposed else matrix, entries)
+    pinhole[2:] -= 1  # the centre of the first pixel is (1, 1) in MATLAB
+    radial = entries.numbers("RadialDistortion")
+    if len(radial) not in (2, 3):
+        raise FileError(
+            f"RadialDistortion in {entries.name} has "
+            f"{counted_noun(len(radial), 'number')} where 2 or 3 are needed. Correct "
+            "it, or export the file again."
+        )
+    tangential = entries.counted(2, "TangentialDistortion")
+    coefficients = np.concatenate([radial[:2], tangential, radial[2:]])
+    return _camera(entries, (width, height), pinhole, coefficients)
+
+
+def _check_model(entries: Entries, key: str) -> None:
+    model = entries.word(key).casefold()
+    if model in _FISHEYE:
+        raise _fisheye(entries.name, model)
+    if model and model not in _MODELS:
+        raise FileError(
+            f"{entries.name} has the distortion model {quoted(model)}, which is not "
+            "known here. Calibrate the camera again with plumb_bob (radtan) or "
+            "rational_polynomial."
+        )
+
+
+def _fisheye(name: str, model: str) -> FileError:
+    return FileError(
+        f"{name} describes a fisheye lens ({model}). A pinhole camera is needed: "
+        "calibrate the camera again with the distortion model plumb_bob (radtan) or "
+        "rational_polynomial."
+    )
+
+
+def _size(entries: Entries) -> tuple[float, float]:
+    if entries.has(*_SIZE) and not entries.has(*_WIDTH):
+        width, height = entries.counted(2, *_SIZE)
+        return width, height
+    if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):
+        raise FileError(
+            f"{entries.name} does not say how large the images are. Add the lines "
+            "image_width and image_height, in pixels."
+        )
+    return entries.counted(1, *_WIDTH)[0], entries.counted(1, *_HEIGHT)[0]
+
+
+def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
+    """Return fx fy cx cy of a camera matrix."""
+    if not np.array_equal(matrix[2], [0, 0, 1]) or matrix[1, 0] != 0:
+        raise FileError(
+            f"The camera matrix of {entries.name} is not of the form fx 0 cx, 0 fy cy, "
+            "0 0 1; it may be transposed or incomplete. Export the file again."
+        )
+    _check_skew(matrix[0, 1], entries)
+    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
+
+
+def _check_skew(skew: float, entries: Entries) -> None:
+    if abs(skew) > SKEW_TOLERANCE:
+        raise FileError(
+            f"{entries.name} has a skew of {skew:g} px; cameras without skew are "
+            "needed. Calibrate the camera again without estimating a skew."
+        )
+
+
+def _camera(
+    entries: Entries,
+    size: tuple[float, float],
+    pinhole: FloatArray,
+    coefficients: FloatArray,
+) -> Camera:
+    width, height = _checked_size(size, entries.name)
+    _check_pinhole(pinhole, width, height, entries.name)
+    distortion = _checked_distortion(coefficients, entries)
+    fx, fy, cx, cy = map(float, pinhole)
+    return Camera(
+        width=width,
+        height=height,
+        fx=fx,
+        fy=fy,
+        cx=cx,
+        cy=cy,
+        distortion=distortion,
+        covariance=_covariance(entries, len(coefficients), len(distortion)),
+        calibrated_on=_day(entries),
+    )
+
+
+def _checked_size(size: tuple[float, float], name: str) -> tuple[int, int]:
+    for side in size:
+        if side != round(side) or not 0 < side <= LARGEST_IMAGE:
+            raise FileError(
+                f"{name} gives an image size of {size[0]:g} x {size[1]:g} px. Two "
+                f"whole numbers from 1 to {LARGEST_IMAGE} are needed."
+            )
+    return int(size[0]), int(size[1])
+
+
+def _check_pinhole(pinhole: FloatArray, width: int, height: int, name: str) -> None:
+    fx, fy, cx, cy = pinhole
+    if fx <= 0 or fy <= 0:
+        raise FileError(
+            f"{name} has the focal lengths {fx:g} and {fy:g} px; both must be "
+            "positive. Export the file again, or calibrate the camera again."
+        )
+    if min(fx, fy) < SMALLEST_FOCAL_LENGTH * max(width, height):
+        raise FileError(
+            f"{name} has the focal lengths {fx:g} and {fy:g} px, too short for "
+            f"images of {width} x {height} px; they may be in millimetres. Give them "
+            "in pixels."
+        )
+    if abs(cx - width / 2) > width or abs(cy - height / 2) > height:
+        raise FileError(
+            f"{name} has its principal point at ({cx:g}, {cy:g}) px, far outside the "
+            f"image of {width} x {height} px. Check that both belong to the same "
+            "camera and image size."
+        )
+
+
+def _checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArray:
+    """Return 5 or 8 coefficients."""
+    count = len(coefficients)
+    if count == 0 and entries.word("distortion_model").casefold() == "none":
+        return np.zeros(5)
+    if count not in (4, 5, 8, 12, 14):
+        raise FileError(
+            f"{entries.name} has {counted_noun(count, 'distortion coefficient')}; "
+            "4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again."
+        )
+    if np.any(coefficients[8:]):
+        raise FileError(
+            f"{entries.name} has {count} distortion coefficients with a thin prism or "
+            "a tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again "
+            "without these terms."
+        )
+    return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]
+
+
+def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
+    """Return the covariance of fx fy cx cy and the coefficients that are kept."""
+    if entries.has(*_COVARIANCE):
+        stated = entries.counted((4 + given) ** 2, *_COVARIANCE)
+        stated = stated.reshape(4 + given, 4 + given)
+        _check_covariance(stated, entries.name)
+    elif entries.has(*_DEVIATIONS):
+        deviations = entries.numbers(*_DEVIATIONS)
+        if len(deviations) < 4 + given or np.any(deviations < 0):
+            raise FileError(
+                f"{entries.entry(*_DEVIATIONS)[0]} in {entries.name} must hold "
+                f"{4 + given} numbers, none of them negative: of fx fy cx cy and the "
+                f"{given} distortion coefficients. Correct or remove it."
+            )
+        stated = np.diag(deviations[: 4 + given] ** 2)
+    else:
+        return None
+    covariance = np.zeros((4 + kept, 4 + kept))
+    shared = 4 + min(given, kept)
+    covariance[:shared, :shared] = stated[:shared, :shared]
+    return covariance
+
+
+def _check_covariance(covariance: FloatArray, name: str) -> None:
+    variances = np.diagonal(covariance)
+    limits = np.multiply.outer(variances, variances) * (1 + SYMMETRY_TOLERANCE)
+    asymmetry = (covariance - covariance.T) ** 2
+    if (
+        np.any(variances < 0)
+        or np.any(covariance**2 > limits)
+        or np.any(asymmetry > SYMMETRY_TOLERANCE**2 * limits)
+    ):
+        raise FileError(
+            f"The intrinsics_covariance of {name} is not a covariance: it must be "
+            "symmetric, with correlations from -1 to 1. Correct or remove it."
+        )
+
+
+def _day(entries: Entries) -> date | None:
+    if not entries.has(*_DATE):
+        return None
+    text = entries.value(*_DATE)
+    if not isinstance(text, str):
+        return None
+    iso, c_style = re.match(_ISO_DATE, text), re.match(_C_DATE, text)
+    try:
+        if iso:
+            return date(*map(int, iso.groups()))
+        if c_style:
+            month, day, year = c_style.groups()
+            return date(int(year), _MONTHS.index(month) + 1, int(day))
+    except ValueError:
+        return None
+    return None
+
+
+def _opencv_lines(camera: Camera) -> list[str]:
+    lines = [
+        "%YAML:1.0",
+        "---",
+        f"image_width: {camera.width}",
+        f"image_height: {camera.height}",
+        *_matrix_lines("camera_matrix", camera.matrix, "!!opencv-matrix"),
+        *_matrix_lines(
+            "distortion_coefficients", camera.distortion[None], "!!opencv-matrix"
+        ),
+    ]
+    return lines + _quality_lines(camera, "!!opencv-matrix")
+
+
+def _ros_lines(camera: Camera) -> list[str]:
+    model = "plumb_bob" if len(camera.distortion) == 5 else "rational_polynomial"
+    projection = np.column_stack([camera.matrix, np.zeros(3)])
+    return [
+        f"image_width: {camera.width}",
+        f"image_height: {camera.height}",
+        "camera_name: camera",
+        *_matrix_lines("camera_matrix", camera.matrix),
+        f"distortion_model: {model}",
+        *_matrix_lines("distortion_coefficients", camera.distortion[None]),
+        *_matrix_lines("rectification_matrix", np.eye(3)),
+        *_matrix_lines("projection_matrix", projection),
+        *_quality_lines(camera),
+    ]
+
+
+def _quality_lines(camera: Camera, tag: str = "") -> list[str]:
+    lines = []
+    if camera.covariance is not None:
+        lines += _matrix_lines("intrinsics_covariance", camera.covariance, tag)
+    if camera.calibrated_on is not None:
+        lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
+    return lines
+
+
+def _matrix_lines(name: str, matrix: FloatArray, tag: str = "") -> list[str]:
+    rows = ",\n      ".join(", ".join(map(_decimal, row)) for row in matrix)
+    return [
+        f"{name}: {tag}".rstrip(),
+        f"   rows: {len(matrix)}",
+        f"   cols: {matrix.shape[1]}",
+        *(["   dt: d"] if tag else []),
+        f"   data: [ {rows} ]",
+    ]
+
+
+def _decimal(value: float) -> str:
+    """Return the shortest text that reads back the same, as YAML 1.1 wants a float."""
+    text = repr(float(value))
+    if "e" in text and "." not in text:
+        return text.replace("e", ".0e")
+    return text

@@ -1,0 +1,327 @@
+"""Trees of plain values out of YAML, XML and JSON files, none of which is trusted.
+
+Everything that is not a mapping or a sequence stays text, so that a number is read to
+its last digit whatever the format. Nothing in a file is executed, expanded or followed:
+tags that name a type of a program, anchors and aliases, document type definitions and
+entities are refused, and so are keys given twice and deep nesting.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NoReturn, TypeAlias
+
+from lightpen.errors import FileError
+from lightpen.files import quoted
+
+Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str | bool | None"
+
+MAX_DEPTH = 20  # of nesting; the files read here have at most six levels
+
+_YAML_NAMESPACE = "tag:yaml.org,2002:"
+_YAML_TAGS = {
+    _YAML_NAMESPACE + name
+    for name in (
+        *("map", "seq", "str", "int", "float", "bool", "null", "timestamp"),
+        *("opencv-matrix", "opencv-nd-matrix"),
+    )
+}
+_YAML_DIRECTIVE = r"%YAML[: ].*"
+_PLAIN_HEAD = r"(?:%YAML(?::1\.0| 1\.2)\n)?---\n"
+_PLAIN_ENTRY = (
+    r"(?a)([A-Za-z]\w*): (?:"
+    r'(?:([+-]?\w[\w.]*(?:[+-]\w+)?)|"([^"\\\n]*)")\n'
+    r"|!!opencv-matrix\n( +)rows: (\d+)\n\4cols: (\d+)\n\4dt: (\w+)\n"
+    r"\4data: \[([\w.+\-, \n]*)\]\n)"
+)
+_PLAIN_CELL = r"(?a:[+-]?[\w.]+(?:[+-]\w+)?)"
+
+
+def parse_document(text: str, name: str) -> dict[str, Tree]:
+    """Return the mapping that a YAML, XML or JSON file holds, recognised by content.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file.
+    name : str
+        Name of the file, for the sentences.
+
+    Raises
+    ------
+    FileError
+        The content is none of the three, or has something that is refused.
+    """
+    start = text.lstrip()[:1]
+    if start == "<":
+        tree = parse_xml(text, name)
+    elif start in ("{", "["):
+        tree = parse_json(text, name)
+    else:
+        tree = _parse_plain_yaml(text) or parse_yaml(text, name)
+    if not isinstance(tree, dict):
+        raise FileError(
+            f"{name} begins with {quoted(text.strip())}, which names no values. "
+            "Check that the right file is named."
+        )
+    return tree
+
+
+def parse_json(text: str, name: str) -> Tree:
+    """Return the tree of a JSON text; see `parse_document`."""
+    import json
+
+    def entries(pairs: list[tuple[str, Tree]]) -> dict[str, Tree]:
+        mapping: dict[str, Tree] = {}
+        for key, value in pairs:
+            if key in mapping:
+                _refuse_twice(key, "", name)
+            mapping[key] = value
+        return mapping
+
+    try:
+        tree: Tree = json.loads(
+            text,
+            object_pairs_hook=entries,
+            parse_int=str,
+            parse_float=str,
+            parse_constant=str,
+        )
+    except json.JSONDecodeError as error:
+        raise FileError(
+            f"Line {error.lineno} of {name} is not valid JSON ({error.msg}, column "
+            f"{error.colno}). The file may be cut short: copy or export it again."
+        ) from error
+    except RecursionError as error:
+        raise _too_deep(name) from error
+    _check_depth(tree, name)
+    return tree
+
+
+def parse_yaml(text: str, name: str) -> Tree:
+    """Return the tree of a YAML text; see `parse_document`.
+
+    The directive ``%YAML:1.0`` of OpenCV, which is no valid YAML, is skipped.
+    """
+    import yaml
+
+    loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+    if text.startswith("%YAML"):
+        text = re.sub(_YAML_DIRECTIVE, "", text, count=1)
+    try:
+        return _yaml_document(iter(yaml.parse(text, Loader=loader)), name)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = name if mark is None else f"Line {mark.line + 1} of {name}"
+        raise FileError(
+            f"{place} is not valid YAML ({error.problem or error.context}). The file "
+            "may be cut short: copy or export it again."
+        ) from error
+    except yaml.YAMLError as error:
+        raise FileError(
+            f"{name} is not valid YAML. Check that the right file is named."
+        ) from error
+
+
+def parse_xml(text: str, name: str) -> Tree:
+    """Return the tree of an XML text as OpenCV's FileStorage writes it.
+
+    Elements with children become mappings, or sequences if the children are named
+    ``_``; see `parse_document`.
+    """
+    from xml.parsers import expat
+
+    builder = _XmlBuilder(name)
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler = lambda tag, _: builder.open(
+        tag, parser.CurrentLineNumber
+    )
+    parser.EndElementHandler = lambda _: builder.close()
+    parser.CharacterDataHandler = builder.add_text
+    parser.StartDoctypeDeclHandler = lambda *_: builder.refuse_definition(
+        parser.CurrentLineNumber
+    )
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        raise FileError(
+            f"Line {error.lineno} of {name} is not valid XML "
+            f"({expat.ErrorString(error.code)}). The file may be cut short: copy or "
+            "export it again."
+        ) from error
+    return builder.root
+
+
+def _parse_plain_yaml(text: str) -> dict[str, Tree] | None:
+    """Return the tree of a YAML file as OpenCV itself writes it, or None.
+
+    Such a file needs no YAML parser, whose import takes longer than all the reading.
+    What looks different in any way is left to `parse_yaml`.
+    """
+    head = re.match(_PLAIN_HEAD, text)
+    place = head.end() if head else 0
+    tree: dict[str, Tree] = {}
+    pattern = re.compile(_PLAIN_ENTRY)
+    while place < len(text):
+        entry = pattern.match(text, place)
+        if not entry or entry[1] in tree:
+            return None
+        key, plain, quotation, indent, rows, cols, dt, data = entry.groups()
+        if indent is None:
+            tree[key] = plain if quotation is None else quotation
+        else:
+            cells = [cell.strip() for cell in data.split(",")]
+            if not all(re.fullmatch(_PLAIN_CELL, cell) for cell in cells):
+                return None
+            tree[key] = {"rows": rows, "cols": cols, "dt": dt, "data": [*cells]}
+        place = entry.end()
+    return tree
+
+
+def _yaml_document(events: Iterator[Any], name: str) -> Tree:
+    import yaml
+
+    tree: Tree = None
+    for event in events:
+        if isinstance(event, yaml.DocumentStartEvent):
+            if tree is not None:
+                raise FileError(
+                    f"{name} holds more than one YAML document. Keep one of them."
+                )
+            tree = _yaml_node(next(events), events, 0, name)
+    return tree
+
+
+def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree:
+    import yaml
+
+    _check_yaml_event(event, name)
+    if isinstance(event, yaml.ScalarEvent):
+        return str(event.value)
+    if depth >= MAX_DEPTH:
+        raise _too_deep(name)
+    if isinstance(event, yaml.SequenceStartEvent):
+        items: list[Tree] = []
+        while not isinstance(child := next(events), yaml.SequenceEndEvent):
+            items.append(_yaml_node(child, events, depth + 1, name))
+        return items
+    mapping: dict[str, Tree] = {}
+    while not isinstance(child := next(events), yaml.MappingEndEvent):
+        key = _yaml_node(child, events, depth + 1, name)
+        line = child.start_mark.line + 1
+        if not isinstance(key, str):
+            raise FileError(
+                f"Line {line} of {name} has a list in place of a name. Check that the "
+                "right file is named."
+            )
+        if key in mapping:
+            _refuse_twice(key, f" on line {line}", name)
+        mapping[key] = _yaml_node(next(events), events, depth + 1, name)
+    return mapping
+
+
+def _check_yaml_event(event: Any, name: str) -> None:
+    import yaml
+
+    line = event.start_mark.line + 1
+    if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
+        raise FileError(
+            f"Line {line} of {name} has the YAML anchor or alias "
+            f"{quoted(event.anchor)}, which can make a small file fill the memory. "
+            "Write the values out."
+        )
+    if event.tag is not None and event.tag not in _YAML_TAGS and event.tag != "!":
+        tag = event.tag.replace(_YAML_NAMESPACE, "!!")
+        raise FileError(
+            f"Line {line} of {name} has the tag {quoted(tag)}. Such a tag can "
+            "ask for code to be run, so only plain values and matrices of OpenCV are "
+            "read. Remove the tag, or use a file from a source you trust."
+        )
+
+
+@dataclass(frozen=True)
+class _Element:
+    tag: str
+    names: list[str] = field(default_factory=list)
+    values: list[Tree] = field(default_factory=list)
+    seen: set[str] = field(default_factory=set)
+    text: list[str] = field(default_factory=list)
+
+    def tree(self) -> Tree:
+        if not self.names:
+            return _xml_scalar("".join(self.text).strip())
+        if self.seen == {"_"}:
+            return self.values
+        return dict(zip(self.names, self.values, strict=True))
+
+
+class _XmlBuilder:
+    """Builds a tree from the elements an XML parser meets."""
+
+    def __init__(self, name: str) -> None:
+        self.root: Tree = None
+        self._name = name
+        self._open: list[_Element] = []
+
+    def open(self, tag: str, line: int) -> None:
+        if len(self._open) > MAX_DEPTH:
+            raise _too_deep(self._name)
+        if self._open:
+            parent = self._open[-1]
+            if tag in parent.seen and (tag != "_" or len(parent.seen) > 1):
+                _refuse_twice(tag, f" on line {line}", self._name)
+            parent.seen.add(tag)
+        self._open.append(_Element(tag))
+
+    def add_text(self, text: str) -> None:
+        self._open[-1].text.append(text)
+
+    def close(self) -> None:
+        element = self._open.pop()
+        if self._open:
+            self._open[-1].names.append(element.tag)
+            self._open[-1].values.append(element.tree())
+        else:
+            self.root = element.tree()
+
+    def refuse_definition(self, line: int) -> NoReturn:
+        raise FileError(
+            f"Line {line} of {self._name} begins a document type definition, which can "
+            "make a small file fill the memory. Remove it; a camera file of OpenCV has "
+            "none."
+        )
+
+
+def _xml_scalar(text: str) -> str:
+    if len(text) > 1 and text[0] == text[-1] == '"':
+        return text[1:-1]
+    return text
+
+
+def _check_depth(tree: Tree, name: str) -> None:
+    level = [tree]
+    for _ in range(MAX_DEPTH + 1):
+        below: list[Tree] = []
+        for node in level:
+            if isinstance(node, dict):
+                below.extend(node.values())
+            elif isinstance(node, list):
+                below.extend(node)
+        if not below:
+            return
+        level = below
+    raise _too_deep(name)
+
+
+def _too_deep(name: str) -> FileError:
+    return FileError(
+        f"{name} is nested more than {MAX_DEPTH} levels deep. Check that the right "
+        "file is named."
+    )
+
+
+def _refuse_twice(key: str, place: str, name: str) -> NoReturn:
+    raise FileError(
+        f"{quoted(key)} is given a second time{place} in {name}. Keep the right one."
+    )

@@ -1,0 +1,172 @@
+"""Values looked up by name in a file that is a tree, as numbers and words."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.documents import Tree
+from lightpen.errors import FileError
+from lightpen.files import printable, quoted
+from lightpen.tables import number_flaw
+
+LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
+
+
+@dataclass(frozen=True)
+class Entries:
+    """A mapping of a file, its names compared without case and underscores.
+
+    Every method that takes several names takes them as spellings of one entry, of
+    which the file may have one.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file, for the sentences.
+    values : dict
+        By the name without case and underscores: the name in the file, and the value.
+    """
+
+    name: str
+    values: dict[str, tuple[str, Tree]]
+
+    @staticmethod
+    def of(tree: dict[str, Tree], name: str) -> "Entries":
+        """Return the entries of a mapping in the file called `name`."""
+        values: dict[str, tuple[str, Tree]] = {}
+        for key, value in tree.items():
+            plain = _plain(key)
+            if plain in values:
+                raise _same_meaning(name, values[plain][0], key)
+            values[plain] = (key, value)
+        return Entries(name, values)
+
+    def has(self, *names: str) -> bool:
+        """Tell whether an entry is there."""
+        return any(_plain(name) in self.values for name in names)
+
+    def entry(self, *names: str) -> tuple[str, Tree]:
+        """Return the name that an entry has in the file, and its value.
+
+        Raises
+        ------
+        FileError
+            It is missing, or there under two names.
+        """
+        found = [self.values[_plain(n)] for n in names if _plain(n) in self.values]
+        if not found:
+            raise FileError(
+                f"{self.name} has no {names[0]}. Check that the right file is named "
+                "and that it is complete."
+            )
+        if len(found) > 1:
+            raise _same_meaning(self.name, found[0][0], found[1][0])
+        return found[0]
+
+    def value(self, *names: str) -> Tree:
+        """Return the value of an entry; see `entry`."""
+        return self.entry(*names)[1]
+
+    def part(self, *names: str) -> "Entries":
+        """Return the entries of a mapping within this one; see `entry`."""
+        key, value = self.entry(*names)
+        if not isinstance(value, dict):
+            raise FileError(
+                f"{printable(key)} in {self.name} has no named values below it. The "
+                "file may be cut short: copy or export it again."
+            )
+        return Entries.of(value, self.name)
+
+    def numbers(self, *names: str) -> FloatArray:
+        """Return the numbers of a list, matrix or single value in one row.
+
+        A matrix is a list of rows, or a mapping with ``rows``, ``cols`` and ``data``.
+
+        Raises
+        ------
+        FileError
+            It is missing, has something else than finite numbers, or not as many as
+            its ``rows`` and ``cols`` say.
+        """
+        key, value = self.entry(*names)
+        cells = _cells(value)
+        for cell in cells:
+            flaw = _flaw(cell)
+            if flaw:
+                raise FileError(
+                    f"{printable(key)} in {self.name} cannot be read: {flaw} Correct "
+                    "it, or export the file again."
+                )
+        numbers = np.array([float(str(cell)) for cell in cells])
+        if isinstance(value, dict):
+            self._check_shape(key, value, len(cells))
+            if value.get("dt") == "f":  # OpenCV keeps such a matrix in single precision
+                return numbers.astype(np.float32).astype(np.float64)
+        return numbers
+
+    def counted(self, count: int, *names: str) -> FloatArray:
+        """Return the numbers of an entry that must have `count` of them.
+
+        See `numbers`.
+        """
+        numbers = self.numbers(*names)
+        if len(numbers) != count:
+            raise FileError(
+                f"{printable(self.entry(*names)[0])} in {self.name} has "
+                f"{counted_noun(len(numbers), 'number')} where {count} are needed. "
+                "Correct it, or export the file again."
+            )
+        return numbers
+
+    def word(self, *names: str) -> str:
+        """Return the text of an entry, empty if it is missing or is not a text."""
+        value = self.value(*names) if self.has(*names) else ""
+        return value.strip() if isinstance(value, str) else ""
+
+    def _check_shape(self, key: str, matrix: dict[str, Tree], count: int) -> None:
+        shape = Entries.of(matrix, self.name)
+        if not shape.has("rows") or not shape.has("cols"):
+            return
+        rows, cols = (float(shape.counted(1, side)[0]) for side in ("rows", "cols"))
+        if rows * cols != count:
+            raise FileError(
+                f"{printable(key)} in {self.name} has {counted_noun(count, 'number')} "
+                f"where its {rows:g} rows of {cols:g} need {rows * cols:g}. The file "
+                "may be cut short: copy or export it again."
+            )
+
+
+def counted_noun(count: int, noun: str) -> str:
+    """Return a number with its noun: "1 number", "2 numbers"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", "").casefold()
+
+
+def _same_meaning(name: str, first: str, second: str) -> FileError:
+    return FileError(
+        f"{name} has {quoted(first)} and {quoted(second)}, which mean the same. Keep "
+        "the right one."
+    )
+
+
+def _cells(value: Tree) -> list[Tree]:
+    if isinstance(value, dict):
+        return _cells(value.get("data"))
+    if isinstance(value, list):
+        return [cell for item in value for cell in _cells(item)]
+    if isinstance(value, str):
+        return list(value.split())
+    return [value]
+
+
+def _flaw(cell: Tree) -> str:
+    if not isinstance(cell, str):
+        return "it is not a list of numbers."
+    flaw = number_flaw(cell)
+    if not flaw and abs(float(cell)) > LARGEST_NUMBER:
+        return f"{quoted(cell)} is too large a number."
+    return flaw

@@ -1,0 +1,263 @@
+"""LED centres and poses that were found elsewhere, as tables.
+
+LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
+``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
+and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
+translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. Further
+columns, such as the number of the pose, are not read. Without a header the columns
+stand in this order, the number of the pose being optional.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import FileError
+from lightpen.files import MEGABYTE, write_whole
+from lightpen.rigid import nearest_rotation
+from lightpen.tables import Table, read_table
+
+OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
+MAX_FRAMES = 30_000
+LARGEST_PIXEL = 1e6
+LARGEST_TRANSLATION = 1e6  # mm
+LARGEST_COVARIANCE = 1e12  # rad^2, rad mm or mm^2
+ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
+ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
+SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative
+
+_CENTERS = (("frame",), ("led",), ("x_px", "x"), ("y_px", "y"))
+_POSE = (
+    *((f"r{i}{j}",) for i in "123" for j in "123"),
+    *((f"t{axis}_mm", f"t{axis}") for axis in "xyz"),
+)
+_COVARIANCE = tuple((f"c{i}{j}",) for i in "123456" for j in "123456")
+
+
+@dataclass(frozen=True, eq=False)
+class Centers:
+    """Images of the LEDs in a series of frames.
+
+    Attributes
+    ----------
+    frames : (F,) array
+        Numbers of the frames, ascending.
+    pixels : (F, L, 2) array
+        Image of each LED, px; NaN where it was not seen.
+    path : Path
+        The file they are from.
+    """
+
+    frames: IntArray
+    pixels: FloatArray
+    path: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of a pen, cam_from_pen.
+
+    Attributes
+    ----------
+    rotations : (N, 3, 3) array
+    translations : (N, 3) array
+        mm.
+    covariances : (N, 6, 6) array or None
+        Of the rotation vector w, with true rotation ``exp([w]x) R``, and of the
+        translation; rad and mm.
+    path : Path
+        The file they are from.
+    """
+
+    rotations: FloatArray
+    translations: FloatArray
+    covariances: FloatArray | None
+    path: Path
+
+
+def read_centers(path: Path, n_leds: int) -> Centers:
+    """Read LED centres; see the module for the layout.
+
+    Parameters
+    ----------
+    path : Path
+    n_leds : int
+        Number of LEDs of the pen.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or has LEDs that the pen does not have, an LED twice
+        in a frame, or cells that are not numbers. The text names the line.
+    """
+    table = read_table(path, "file of LED centres", OBSERVATION_FILE_LIMIT)
+    columns = table.columns(_CENTERS, "LED centres")
+    frame_of_row = table.whole_numbers(columns[0])
+    led_of_row = table.whole_numbers(columns[1])
+    pixels = table.numbers(columns[2:])
+    _check_centers(table, led_of_row, pixels, n_leds)
+    frames, place = np.unique(frame_of_row, return_inverse=True)
+    if len(frames) > MAX_FRAMES:
+        raise FileError(
+            f"{table.name} has {len(frames)} frames; at most {MAX_FRAMES} are read. "
+            "Check that the right file is named, or divide it."
+        )
+    _check_no_pair_twice(table, frame_of_row, led_of_row, place * n_leds + led_of_row)
+    grid = np.full((len(frames), n_leds, 2), np.nan)
+    grid[place, led_of_row - 1] = pixels
+    return Centers(frames, grid, path)
+
+
+def write_centers(centers: Centers, path: Path) -> None:
+    """Write LED centres as a table, to be read back to the last digit.
+
+    Frames without any LED leave no trace in the file.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    seen = np.isfinite(centers.pixels).all(axis=2)
+    frames = np.broadcast_to(centers.frames[:, None], seen.shape)[seen].tolist()
+    leds = (np.nonzero(seen)[1] + 1).tolist()
+    pixels = centers.pixels[seen].tolist()
+    rows = zip(frames, leds, pixels, strict=True)
+    text = "".join(f"{frame},{led},{x!r},{y!r}\n" for frame, led, (x, y) in rows)
+    write_whole(path, f"frame,led,x_px,y_px\n{text}".encode())
+
+
+def read_poses(path: Path) -> Poses:
+    """Read poses; see the module for the layout.
+
+    Rotations given in few digits are replaced by the nearest rotations; those that are
+    rotations to 1e-6 stay as they are.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or has matrices that are no rotations or covariances,
+        or cells that are not numbers. The text names the line.
+    """
+    table = read_table(path, "pose file", OBSERVATION_FILE_LIMIT)
+    columns, covariance_columns = _pose_columns(table)
+    numbers = table.numbers(columns)
+    translations = numbers[:, 9:]
+    far = np.abs(translations).max(axis=1) > LARGEST_TRANSLATION
+    if np.any(far):
+        raise table.error(
+            int(np.argmax(far)),
+            f"the translation is more than {LARGEST_TRANSLATION / 1000:g} m. Check its "
+            "units: millimetres are needed.",
+        )
+    covariances = None
+    if covariance_columns:
+        covariances = table.numbers(covariance_columns).reshape(-1, 6, 6)
+        _check_covariances(table, covariances)
+    rotations = _checked_rotations(table, numbers[:, :9].reshape(-1, 3, 3))
+    return Poses(rotations, translations, covariances, path)
+
+
+def _check_centers(
+    table: Table, leds: IntArray, pixels: FloatArray, n_leds: int
+) -> None:
+    unknown = (leds < 1) | (leds > n_leds)
+    if np.any(unknown):
+        row = int(np.argmax(unknown))
+        raise table.error(
+            row,
+            f"there is no LED {leds[row]}; the pen has LEDs 1 to {n_leds}. Check that "
+            "the pen file is of this pen, and that LEDs are numbered from 1.",
+        )
+    far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL
+    if np.any(far):
+        row = int(np.argmax(far))
+        raise table.error(
+            row,
+            f"({pixels[row, 0]:g}, {pixels[row, 1]:g}) px lies outside every image. "
+            "Correct or remove the line.",
+        )
+
+
+def _check_no_pair_twice(
+    table: Table, frames: IntArray, leds: IntArray, keys: IntArray
+) -> None:
+    order = np.argsort(keys, kind="stable")
+    twice = np.flatnonzero(np.diff(keys[order]) == 0)
+    if len(twice):
+        pair = np.argmin(order[twice + 1])
+        first, second = order[twice][pair], order[twice + 1][pair]
+        raise table.error(
+            int(second),
+            f"LED {leds[second]} of frame {frames[second]} stands already on line "
+            f"{table.lines[first]}. Keep the right one.",
+        )
+
+
+def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
+    """Return the columns of the pose and those, if any, of its covariance."""
+    what = "poses"
+    if table.header:
+        with_covariance = any(name in table.header for (name,) in _COVARIANCE)
+        return (
+            table.columns(_POSE, what),
+            table.columns(_COVARIANCE, what) if with_covariance else [],
+        )
+    skipped = table.n_columns % 12  # the number of the pose
+    if skipped > 1 or table.n_columns - skipped not in (12, 48):
+        raise FileError(
+            f"{table.name} has no header and {table.n_columns} columns; poses need the "
+            "12 columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, with "
+            "the number of the pose before them and the covariance c11 to c66 behind "
+            "them if known. Put a header line with these names on top."
+        )
+    places = list(range(skipped, table.n_columns))
+    return places[:12], places[12:]
+
+
+def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
+    """Return rotations; all are kept as they are but those in few digits."""
+    large = np.abs(matrices).max(axis=(1, 2)) > 2
+    safe = np.where(large[:, None, None], 0.0, matrices)
+    deviations = np.abs(safe @ np.swapaxes(safe, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    wrong = deviations > ROTATION_TOLERANCE
+    if np.any(wrong):
+        raise table.error(
+            int(np.argmax(wrong)),
+            "r11 to r33 are not a rotation: their rows must have the length 1 and be "
+            "at right angles to each other. Check the order of the columns.",
+        )
+    mirrored = np.linalg.det(matrices) < 0
+    if np.any(mirrored):
+        raise table.error(
+            int(np.argmax(mirrored)),
+            "r11 to r33 are a mirrored rotation (determinant -1). Give the poses in "
+            "right-handed frames.",
+        )
+    coarse = deviations > ROUNDING_TOLERANCE
+    rotations = matrices.copy()
+    rotations[coarse] = nearest_rotation(matrices[coarse])
+    return rotations
+
+
+def _check_covariances(table: Table, covariances: FloatArray) -> None:
+    variances = np.diagonal(covariances, axis1=1, axis2=2)
+    large = np.abs(covariances).max(axis=(1, 2)) > LARGEST_COVARIANCE
+    safe = np.where(large[:, None, None], 0.0, covariances)
+    safe_variances = np.diagonal(safe, axis1=1, axis2=2)
+    limits = safe_variances[:, :, None] * safe_variances[:, None, :]
+    asymmetry = (safe - np.swapaxes(safe, 1, 2)) ** 2
+    wrong = (
+        large
+        | np.any(variances < 0, axis=1)
+        | np.any(safe**2 > limits * (1 + SYMMETRY_TOLERANCE), axis=(1, 2))
+        | np.any(asymmetry > limits * SYMMETRY_TOLERANCE**2, axis=(1, 2))
+    )
+    if np.any(wrong):
+        raise table.error(
+            int(np.argmax(wrong)),
+            "c11 to c66 are not a covariance: they must be symmetric, with "
+            "correlations from -1 to 1. Correct or remove these columns.",
+        )

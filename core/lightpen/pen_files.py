@@ -1,0 +1,437 @@
+"""The LED geometry of a pen as a table (CSV) or as JSON.
+
+A table has the columns ``led,x_mm,y_mm,z_mm``, optionally ``nx,ny,nz`` (normals) and
+``diameter_mm``. Without a header its columns stand in this order, the normals being
+optional. Units may be written as in ``x_mm``, ``x [mm]``, ``x (m)`` and ``x/inch``.
+
+A JSON file has
+
+=============== ======================================================================
+``units``       of all lengths: ``mm``, ``cm``, ``m``, ``um`` or ``inch``
+``leds``        list of ``{"led": 1, "x": 0, "y": 0, "z": -30, "normal": [0, 0, 1]}``,
+                ``normal`` being optional
+``diameter``    of the LED discs, optional
+``nominal_tip`` list of three coordinates, optional
+``name``        name or serial number, optional
+``comment``     not read
+=============== ======================================================================
+
+LEDs are numbered from 1, in ascending order. Normals are +z and discs 10 mm wide unless
+the file says otherwise.
+"""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.documents import Tree, parse_json
+from lightpen.entries import Entries
+from lightpen.errors import FileError, UsageError
+from lightpen.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.pen import (
+    DISC_DIAMETER,
+    Pen,
+    check_frame,
+    check_leds,
+    in_pen_frame,
+)
+from lightpen.tables import Table, parse_table
+
+PEN_FILE_LIMIT = MEGABYTE
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
+LARGEST_DIAMETER = 100.0  # mm
+NORMAL_TOLERANCE = 0.01  # of the length of a normal in the file
+
+_SPELLINGS = {
+    "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres"),
+    "cm": ("cm",),
+    "m": ("m", "meter", "metre", "meters", "metres"),
+    "um": ("um", "μm", "micron", "microns"),
+    "inch": ("inch", "in", "inches"),
+}
+_UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in names}
+_LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
+_COORDINATES = (("x",), ("y",), ("z",))
+_NORMALS = (("nx",), ("ny",), ("nz",))
+_COLUMN = r"(nx|ny|nz|x|y|z|diameter)(?:[\s_/]*[\[(]?\s*([a-zμ]+)\s*[\])]?)?"
+_LED_KEYS = {"led", "x", "y", "z", "normal"}
+_FILE_KEYS = {"units", "leds", "diameter", "nominaltip", "name", "comment"}
+
+
+def read_pen(
+    path: Path,
+    units: str | None = None,
+    diameter: float | None = None,
+    nominal_tip: FloatArray | None = None,
+) -> Pen:
+    """Read a pen whose LEDs are given in the pen frame; see the module for the layouts.
+
+    Parameters
+    ----------
+    path : Path
+    units : {"mm", "cm", "m", "um", "inch"} or None
+        Unit of the file's lengths; needed if the file does not state it.
+    diameter : float or None
+        Diameter of the LED discs, mm, in place of the file's.
+    nominal_tip : (3,) array or None
+        Nominal tip in the pen frame, mm, in place of the file's.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, is not a complete pen, or a pen of the paper's layout
+        is not in the paper's frame.
+    UsageError
+        The units are neither in the file nor given, or both and different.
+    """
+    pen = _pen(_read(path, units), diameter, nominal_tip)
+    try:
+        check_leds(pen.leds, pen.diameter)
+        check_frame(pen)
+    except FileError as error:
+        raise FileError(f"{printable(path.name)}: {error}") from error
+    return pen
+
+
+def read_raw_pen(
+    path: Path,
+    units: str | None = None,
+    diameter: float | None = None,
+    nominal_tip: FloatArray | None = None,
+) -> Pen:
+    """Read a pen of the paper's layout from a measuring machine's coordinates.
+
+    Parameters
+    ----------
+    path : Path
+        File as for `read_pen`, in any right-handed frame.
+    units, diameter, nominal_tip
+        As for `read_pen`.
+
+    Returns
+    -------
+    Pen
+        In the pen frame; see `lightpen.pen.pen_frame_from_raw`. A nominal tip of the
+        file is moved with the LEDs.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or its LEDs do not define the pen frame.
+    UsageError
+        As for `read_pen`.
+    """
+    content = _read(path, units)
+    raw = _pen(content, diameter, None)
+    try:
+        check_leds(raw.leds, raw.diameter)
+        pen = in_pen_frame(raw)
+        if content.normals is None:
+            pen = replace(pen, normals=_facing_normals(pen.n_leds))
+        check_frame(pen)
+    except FileError as error:
+        raise FileError(f"{printable(path.name)}: {error}") from error
+    return pen if nominal_tip is None else replace(pen, nominal_tip=nominal_tip)
+
+
+def write_pen(pen: Pen, path: Path) -> None:
+    """Write a pen as a table or as JSON, to be read back to the last digit.
+
+    Parameters
+    ----------
+    pen : Pen
+    path : Path
+        Name that ends in .csv or .json.
+
+    Raises
+    ------
+    UsageError
+        The name ends otherwise, or the pen has a name or a nominal tip, for which a
+        table has no place.
+    FileError
+        The file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        text = _json_text(pen)
+    elif suffix == ".csv":
+        if pen.name or pen.nominal_tip is not None:
+            raise UsageError(
+                f"{printable(path.name)} is a table, which has no place for the name "
+                "and the nominal tip of the pen. Choose a name that ends in .json."
+            )
+        text = _csv_text(pen)
+    else:
+        raise UsageError(
+            f"A pen is written as .csv or .json, but {printable(path.name)} ends in "
+            "neither. Choose such a name."
+        )
+    write_whole(path, text.encode())
+
+
+@dataclass(frozen=True, eq=False)
+class _Content:
+    """What a pen file states, in mm; None is what it leaves out."""
+
+    leds: FloatArray
+    normals: FloatArray | None
+    diameter: float | None
+    nominal_tip: FloatArray | None = None
+    name: str = ""
+
+
+def _pen(
+    content: _Content, diameter: float | None, nominal_tip: FloatArray | None
+) -> Pen:
+    if diameter is not None and not 0 < diameter <= LARGEST_DIAMETER:
+        raise UsageError(
+            f"The LED discs cannot be {diameter:g} mm wide. Give a diameter of up to "
+            f"{LARGEST_DIAMETER:g} mm."
+        )
+    if nominal_tip is None:
+        nominal_tip = content.nominal_tip
+    if diameter is None:
+        diameter = DISC_DIAMETER if content.diameter is None else content.diameter
+    normals = content.normals
+    if normals is None:
+        normals = _facing_normals(len(content.leds))
+    return Pen(content.leds, normals, diameter, nominal_tip, content.name)
+
+
+def _facing_normals(n_leds: int) -> FloatArray:
+    return np.tile([0.0, 0.0, 1.0], (n_leds, 1))
+
+
+def _read(path: Path, units: str | None) -> _Content:
+    if units is not None and units not in UNITS:
+        raise UsageError(
+            f"{quoted(units)} is not a unit of length known here. Choose one of "
+            f"{', '.join(UNITS)}."
+        )
+    text = read_text(path, "pen file", PEN_FILE_LIMIT)
+    name = printable(path.name)
+    if text.lstrip().startswith(("{", "[")):
+        return _from_json(parse_json(text, name), units, name)
+    return _from_table(parse_table(text, name), units)
+
+
+def _from_table(table: Table, units: str | None) -> _Content:
+    named = [_name_and_unit(column) for column in table.header]
+    stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}
+    if len(stated) > 1:
+        raise FileError(
+            f"{table.name} has coordinates in {' and in '.join(sorted(stated))}. Give "
+            "all of them in one unit."
+        )
+    unit = _agreed_unit(stated.pop() if stated else "", units, table.name)
+    bare = replace(table, header=tuple(name for name, _ in named))
+    with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
+    wanted = [_LED_NAMES, *_COORDINATES, *(_NORMALS if with_normals else ())]
+    columns = bare.columns(wanted, "the LEDs of a pen")
+    _check_numbering(table, columns[0])
+    numbers = table.numbers(columns[1:])
+    diameter = None
+    if "diameter" in bare.header:
+        place = bare.header.index("diameter")
+        diameter = _common_diameter(table, place) * UNITS[named[place][1] or unit]
+        _check_diameter(diameter, table.name)
+    normals = None
+    if with_normals:
+        normals = np.empty((len(numbers), 3))
+        for i, line in enumerate(table.lines):
+            normals[i] = _unit(numbers[i, 3:], f"Line {line} of {table.name}")
+    return _Content(numbers[:, :3] * UNITS[unit], normals, diameter)
+
+
+def _name_and_unit(column: str) -> tuple[str, str]:
+    """Return the name of a column without its unit, and the unit or an empty string."""
+    match = re.fullmatch(_COLUMN, column)
+    if not match:
+        return column, ""
+    unit = _UNIT_NAMES.get(match[2] or "", "")
+    return (match[1], unit) if unit or not match[2] else (column, "")
+
+
+def _agreed_unit(stated: str, given: str | None, name: str) -> str:
+    if stated and given and stated != given:
+        raise UsageError(
+            f"{name} states its lengths in {stated}, but --units {given} is given. "
+            "Leave the option away, or correct the file."
+        )
+    unit = stated or given
+    if not unit:
+        raise UsageError(
+            f"{name} does not say which units its coordinates have. Name them, such as "
+            "--units mm, or in the header: led,x_mm,y_mm,z_mm."
+        )
+    return unit
+
+
+def _check_numbering(table: Table, column: int) -> None:
+    """Refuse LEDs that are not numbered 1, 2, 3 and so on from row to row."""
+    numbers = table.whole_numbers(column)
+    wrong = numbers != np.arange(1, len(numbers) + 1)
+    if not np.any(wrong):
+        return
+    row = int(np.argmax(wrong))
+    found, needed = int(numbers[row]), row + 1
+    earlier = np.flatnonzero(numbers[:row] == found)
+    if len(earlier):
+        text = f"LED {found} is listed already on line {table.lines[earlier[0]]}."
+    elif needed in numbers:
+        text = (
+            f"LED {found} stands where LED {needed} is needed. List the LEDs from 1 to "
+            f"{len(numbers)} in ascending order."
+        )
+    else:
+        text = (
+            f"LED {found} stands where LED {needed} is needed, and no line has LED "
+            f"{needed}. Number the LEDs from 1 without gaps."
+        )
+    raise table.error(row, text)
+
+
+def _common_diameter(table: Table, column: int) -> float:
+    diameters = table.numbers([column])[:, 0]
+    other = diameters != diameters[0]
+    if np.any(other):
+        raise table.error(
+            int(np.argmax(other)),
+            f"the diameter is {diameters[other][0]:g} where the first LED has "
+            f"{diameters[0]:g}. All LEDs of a pen must be equally wide.",
+        )
+    return float(diameters[0])
+
+
+def _check_diameter(diameter: float, name: str) -> None:
+    if not 0 < diameter <= LARGEST_DIAMETER:
+        raise FileError(
+            f"{name} has LED discs {diameter:g} mm wide. A diameter of up to "
+            f"{LARGEST_DIAMETER:g} mm is needed; check its units."
+        )
+
+
+def _unit(normal: FloatArray, place: str) -> FloatArray:
+    """Return a normal of unit length, unchanged if it has it but for rounding."""
+    squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
+    if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
+        raise FileError(
+            f"{place}: the normal {' '.join(f'{c:g}' for c in normal)} does not have "
+            "the length 1. Correct it, or leave the normals away if all discs face +z."
+        )
+    return normal if abs(squared - 1) < 1e-9 else normal / np.sqrt(squared)
+
+
+def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
+    if not isinstance(tree, dict):
+        raise FileError(
+            f"{name} is a list; a pen file is a mapping with leds and units. Write it "
+            "so."
+        )
+    entries = Entries.of(tree, name)
+    _refuse_other_keys(entries, _FILE_KEYS, name)
+    stated = entries.word("units").casefold()
+    if stated and stated not in _UNIT_NAMES:
+        raise FileError(
+            f"{name} has the units {quoted(stated)}, which are not known here. Use one "
+            f"of {', '.join(UNITS)}."
+        )
+    unit = UNITS[_agreed_unit(_UNIT_NAMES.get(stated, ""), units, name)]
+    leds = _listed_leds(entries, name)
+    coordinates = [[led.counted(1, axis)[0] for axis in "xyz"] for led in leds]
+    diameter = None
+    if entries.has("diameter"):
+        diameter = float(entries.counted(1, "diameter")[0]) * unit
+        _check_diameter(diameter, name)
+    nominal_tip = None
+    if entries.has("nominal_tip") and entries.value("nominal_tip") is not None:
+        nominal_tip = entries.counted(3, "nominal_tip") * unit
+    return _Content(
+        leds=np.array(coordinates) * unit,
+        normals=_listed_normals(leds, name),
+        diameter=diameter,
+        nominal_tip=nominal_tip,
+        name=printable(entries.word("name")),
+    )
+
+
+def _listed_leds(entries: Entries, name: str) -> list[Entries]:
+    listed = entries.value("leds")
+    if not isinstance(listed, list) or not listed:
+        raise FileError(
+            f"leds in {name} is no list of LEDs. Write it as [{{"
+            '"led": 1, "x": 0, "y": 0, "z": -30}, ...].'
+        )
+    leds = []
+    for number, tree in enumerate(listed, 1):
+        place = f"LED {number} of {name}"
+        if not isinstance(tree, dict):
+            raise FileError(
+                f"{place} is no mapping. Write it as "
+                '{"led": 1, "x": 0, "y": 0, "z": -30}.'
+            )
+        led = Entries.of(tree, place)
+        _refuse_other_keys(led, _LED_KEYS, place)
+        if led.counted(1, "led")[0] != number:
+            raise FileError(
+                f"Entry {number} of leds in {name} is LED "
+                f"{led.counted(1, 'led')[0]:g}. List the LEDs from 1 in ascending "
+                "order, each once."
+            )
+        leds.append(led)
+    return leds
+
+
+def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
+    given = [led.has("normal") for led in leds]
+    if not any(given):
+        return None
+    if not all(given):
+        raise FileError(
+            f"LED {given.index(False) + 1} of {name} has no normal, but others have. "
+            "Give the normals of all LEDs or of none."
+        )
+    return np.array([_unit(led.counted(3, "normal"), led.name) for led in leds])
+
+
+def _refuse_other_keys(entries: Entries, known: set[str], name: str) -> None:
+    for plain, (key, _) in entries.values.items():
+        if plain not in known:
+            raise FileError(
+                f"{name} has {quoted(key)}, which means nothing here. Remove it, or "
+                f"correct it to one of {', '.join(sorted(known))}."
+            )
+
+
+def _csv_text(pen: Pen) -> str:
+    lines = ["led,x_mm,y_mm,z_mm,nx,ny,nz,diameter_mm"]
+    for number, (led, normal) in enumerate(
+        zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
+    ):
+        cells = [number, *led, *normal, float(pen.diameter)]
+        lines.append(",".join(map(repr, cells)))
+    return "\n".join(lines) + "\n"
+
+
+def _json_text(pen: Pen) -> str:
+    import json
+
+    leds = [
+        {"led": number, "x": led[0], "y": led[1], "z": led[2], "normal": normal}
+        for number, (led, normal) in enumerate(
+            zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
+        )
+    ]
+    rows = ",\n    ".join(json.dumps(led, allow_nan=False) for led in leds)
+    tip = None if pen.nominal_tip is None else pen.nominal_tip.tolist()
+    entries = [
+        f'"name": {json.dumps(pen.name)}',
+        '"units": "mm"',
+        f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
+        f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
+        f'"leds": [\n    {rows}\n  ]',
+    ]
+    return "{\n  " + ",\n  ".join(entries) + "\n}\n"

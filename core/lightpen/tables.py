@@ -1,0 +1,356 @@
+"""Tables in delimited text: comma, semicolon, tab or blanks; decimal comma; header."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import FileError
+from lightpen.files import printable, quoted, read_text
+
+MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
+MAX_LINE_LENGTH = 10_000  # characters
+LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
+
+_NUMBER = r"(?a:[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)"
+_NUMBER_CHARACTERS = b"0123456789+-.eE\n"
+_NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
+_LOOK_ALIKES = {
+    "O": "letter O",
+    "o": "letter o",
+    "l": "letter l",
+    "I": "letter I",
+    "S": "letter S",
+    "B": "letter B",
+    "\N{MINUS SIGN}": "a typographic minus sign",
+    "\N{EN DASH}": "a dash in place of a minus sign",
+    "_": "underscore",
+    " ": "blank inside",
+    "\N{NO-BREAK SPACE}": "blank inside",
+}
+_CUT_SHORT_ROWS = 20  # fewer rows are typed by hand and may end in a shorter number
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """The cells of a table, as text.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file, for the sentences.
+    header : tuple of str
+        Column names in lower case; empty if the file has none.
+    rows : list of list of str
+        Cells without surrounding blanks; all rows are equally long.
+    lines : list of int
+        Line of the file that each row stands on, from 1.
+    """
+
+    name: str
+    header: tuple[str, ...]
+    rows: list[list[str]]
+    lines: list[int]
+
+    @property
+    def n_columns(self) -> int:
+        """Number of columns."""
+        return len(self.rows[0])
+
+    def columns(self, names: Sequence[Sequence[str]], what: str) -> list[int]:
+        """Return where columns are.
+
+        A table without header has its columns in the order of `names`.
+
+        Parameters
+        ----------
+        names : sequence of sequences of str
+            For each column the names it may have, the preferred one first.
+        what : str
+            What the table holds, for the sentences.
+
+        Raises
+        ------
+        FileError
+            A column is missing.
+        """
+        wanted = ",".join(alternatives[0] for alternatives in names)
+        if not self.header:
+            if self.n_columns == len(names):
+                return list(range(len(names)))
+            raise FileError(
+                f"{self.name} has no header and {self.n_columns} "
+                f"{'column' if self.n_columns == 1 else 'columns'}; {what} need the "
+                f"{len(names)} columns {wanted}. Put a header line with these names on "
+                "top, and separate the columns by commas, semicolons or tabs."
+            )
+        places = []
+        for alternatives in names:
+            found = [i for i, name in enumerate(self.header) if name in alternatives]
+            if not found:
+                raise FileError(
+                    f"{self.name} has no column {alternatives[0]}; {what} need the "
+                    f"columns {wanted}. Its header is "
+                    f"{quoted(','.join(self.header))}. Name the columns so."
+                )
+            if len(found) > 1:
+                raise FileError(
+                    f"Columns {found[0] + 1} and {found[1] + 1} of {self.name} both "
+                    f"hold {alternatives[0]}. Remove one of them."
+                )
+            places.append(found[0])
+        return places
+
+    def numbers(self, columns: Sequence[int]) -> FloatArray:
+        """Return columns as numbers.
+
+        Parameters
+        ----------
+        columns : sequence of k int
+            Which columns, from 0.
+
+        Returns
+        -------
+        (N, k) array
+
+        Raises
+        ------
+        FileError
+            A cell is not a finite number; the text names its line.
+        """
+        cells = [row[column] for row in self.rows for column in columns]
+        values = _clean_numbers(cells)
+        if values is None:
+            self._refuse_numbers(columns)
+        return values.reshape(len(self.rows), len(columns))
+
+    def whole_numbers(self, column: int) -> IntArray:
+        """Return a column of whole numbers, such as frame or LED numbers.
+
+        Parameters
+        ----------
+        column : int
+            Which column, from 0.
+
+        Returns
+        -------
+        (N,) array
+
+        Raises
+        ------
+        FileError
+            A cell is not a whole number; the text names its line.
+        """
+        values = self.numbers([column])[:, 0]
+        wrong = (values != np.round(values)) | (np.abs(values) > LARGEST_WHOLE)
+        if np.any(wrong):
+            row = int(np.argmax(wrong))
+            raise self.error(
+                row, f"{quoted(self.rows[row][column])} is not a whole number."
+            )
+        return values.astype(np.int64)
+
+    def error(self, row: int, text: str) -> FileError:
+        """Return the error that names the line of a row."""
+        return FileError(f"Line {self.lines[row]} of {self.name}: {text}")
+
+    def _refuse_numbers(self, columns: Sequence[int]) -> NoReturn:
+        """Raise the error of the cell that keeps `numbers` from its result."""
+        first: dict[str, int] = {}
+        for i, row in enumerate(self.rows):
+            for cell in (row[column] for column in columns):
+                if number_flaw(cell.replace(",", ".")):
+                    raise self.error(i, number_flaw(cell))
+                for mark in ".,":
+                    if mark in cell:
+                        first.setdefault(mark, i)
+        raise self.error(
+            max(first.values()),
+            "the file has decimal points and decimal commas, the other ones on line "
+            f"{self.lines[min(first.values())]}. Use one of them throughout.",
+        )
+
+
+def read_table(path: Path, what: str, limit: int) -> Table:
+    """Read a table from delimited text.
+
+    The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
+    have decimal commas unless the comma separates columns. Blank lines and lines that
+    begin with ``#`` are skipped. A first line without numbers is a header.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What the file is, for the sentences.
+    limit : int
+        Largest size, bytes.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read or is not such a table.
+    """
+    return parse_table(read_text(path, what, limit), printable(path.name))
+
+
+def parse_table(text: str, name: str) -> Table:
+    r"""Read a table from a text with ``\n`` at the line ends; see `read_table`."""
+    lines = _filled_lines(text, name)
+    separator = _separator([line for _, line in lines])
+    hint = re.fullmatch(r"sep=([;,\t|])\s*", lines[0][1])  # of Excel, to itself
+    if hint:
+        separator = hint[1]
+        del lines[0]
+    if not lines:
+        raise FileError(f"{name} has no rows. Check that it is complete.")
+    numbers = [number for number, _ in lines]
+    rows = [_cells(line, separator, number, name) for number, line in lines]
+    if all(row[-1] == "" and len(row) > 1 for row in rows):
+        rows = [row[:-1] for row in rows]
+    _check_lengths(rows, numbers, separator, name)
+    header: tuple[str, ...] = ()
+    if not any(map(_looks_numeric, rows[0])):
+        header = tuple(cell.casefold() for cell in rows.pop(0))
+        _check_header(header, numbers.pop(0), name)
+    if not rows:
+        raise FileError(f"{name} has a header but no rows below it.")
+    table = Table(name, header, rows, numbers)
+    if not text.endswith("\n"):
+        _check_last_number(table)
+    return table
+
+
+def number_flaw(text: str) -> str:
+    """Return what keeps a text from being a finite number, or an empty string."""
+    if re.fullmatch(_NUMBER, text):
+        if math.isfinite(float(text)):
+            return ""
+        return f"{quoted(text)} is too large a number."
+    if not text:
+        return "a cell is empty where a number is needed."
+    if re.fullmatch(_NOT_FINITE, text):
+        return f"{quoted(text)} is not a finite number."
+    for character, meaning in _LOOK_ALIKES.items():
+        if character in text and any(map(str.isdigit, text)):
+            return f"{quoted(text)} is not a number ({meaning})."
+    return f"{quoted(text)} is not a number."
+
+
+def _clean_numbers(cells: list[str]) -> FloatArray | None:
+    """Return the cells as numbers, or None if any of them is not one."""
+    text = "\n".join(cells)
+    if "," in text:
+        if "." in text:
+            return None
+        text = text.replace(",", ".")
+    if not text.isascii() or text.encode().translate(None, _NUMBER_CHARACTERS):
+        return None
+    try:
+        values = np.array(list(map(float, text.split("\n"))))
+    except ValueError:
+        return None
+    return values if np.all(np.isfinite(values)) else None
+
+
+def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
+    """Return the lines that are neither blank nor comments, with their numbers."""
+    if text.count("\n") > MAX_LINES:
+        raise FileError(
+            f"{name} has more than {MAX_LINES} lines. Check that the right file is "
+            "named, or divide it."
+        )
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), 1)
+        if line and not line.isspace() and line.lstrip()[0] != "#"
+    ]
+    if not lines:
+        raise FileError(f"{name} has no lines but comments. Check that it is complete.")
+    for number, line in lines:
+        if len(line) > MAX_LINE_LENGTH:
+            raise FileError(
+                f"Line {number} of {name} has {len(line)} characters, which no row of "
+                "a table has. Check that the right file is named."
+            )
+    return lines
+
+
+def _separator(lines: list[str]) -> str | None:
+    """Return what separates columns in most lines; None stands for blanks."""
+    for candidate in (";", "\t", ","):
+        if 2 * sum(candidate in line for line in lines) > len(lines):
+            return candidate
+    return None
+
+
+def _cells(line: str, separator: str | None, number: int, name: str) -> list[str]:
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    import csv
+
+    try:
+        if separator is None:
+            reader = csv.reader([" ".join(line.split())], delimiter=" ", strict=True)
+        else:
+            reader = csv.reader(
+                [line], delimiter=separator, skipinitialspace=True, strict=True
+            )
+        return [cell.strip() for cell in next(reader)]
+    except csv.Error as error:
+        raise FileError(
+            f"Line {number} of {name}: the quotation marks do not pair up. Remove or "
+            "complete them."
+        ) from error
+
+
+def _looks_numeric(cell: str) -> bool:
+    flaw = number_flaw(cell.replace(",", "."))
+    return not flaw or re.fullmatch(_NOT_FINITE, cell) is not None
+
+
+def _check_lengths(
+    rows: list[list[str]], numbers: list[int], separator: str | None, name: str
+) -> None:
+    expected = len(rows[0])
+    for number, row in zip(numbers, rows, strict=True):
+        if len(row) != expected:
+            hint = (
+                "If numbers have decimal commas, separate the columns by semicolons."
+                if separator == "," and len(row) > expected
+                else "Complete the line; if it is the last one, the file is cut short."
+            )
+            raise FileError(
+                f"Line {number} of {name} has {len(row)} cells where line {numbers[0]} "
+                f"has {expected}. {hint}"
+            )
+
+
+def _check_header(header: tuple[str, ...], number: int, name: str) -> None:
+    seen: set[str] = set()
+    for column in header:
+        if column in seen:
+            raise FileError(
+                f"Line {number} of {name}: the header names {quoted(column)} twice. "
+                "Give each column a name of its own."
+            )
+        seen.add(column)
+
+
+def _check_last_number(table: Table) -> None:
+    """Refuse a file whose writer was stopped within its last number."""
+    if len(table.rows) < _CUT_SHORT_ROWS:
+        return
+    decimals = [len(row[-1].partition(".")[2]) for row in table.rows]
+    if len(set(decimals[:-1])) == 1 and decimals[-1] < decimals[0]:
+        raise table.error(
+            len(table.rows) - 1,
+            f"the file ends within the number {quoted(table.rows[-1][-1])}, which has "
+            f"{decimals[-1]} decimals where all others have {decimals[0]}. Copy the "
+            "file again, or remove the line.",
+        )
