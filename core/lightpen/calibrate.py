@@ -20,6 +20,8 @@ from lightpen.two_stage import TwoStageFit, fit_two_stage, propagated_covariance
 from lightpen.uncertainty import Budget, Halves, combine, compare_halves
 
 MIN_IMAGES = 6  # the paper starts from six
+MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
+USUAL_SIGMA = 0.1  # px
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 
@@ -106,6 +108,7 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         observations.rotations[posed],
         observations.translations[posed],
     )
+    _require_fit(all_poses)
     fitting = _fitting(all_poses)
     reasons[posed[~fitting]] = Reason.MISFIT
     _require_images(posed[fitting], reasons, observations.advice)
@@ -156,6 +159,15 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         leds=measure_leds(camera, pen, pixels, geometry),
         coverage=measure_coverage(joint.rotations),
     )
+
+
+def _require_fit(poses: Poses) -> None:
+    if poses.sigma > MAX_SIGMA:
+        raise CalibrationError(
+            f"The LED positions do not fit the images: {poses.sigma:.1f} px, "
+            f"{USUAL_SIGMA} px or less is usual. Check that the pen file is of this "
+            "pen with its LEDs in order, and the camera file of this camera."
+        )
 
 
 def _fitting(poses: Poses) -> BoolArray:
