@@ -4,6 +4,8 @@ Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable i
 """
 
 import argparse
+import math
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -44,12 +46,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run: Callable[[argparse.Namespace], None] = options.run
     try:
         run(options)
+        sys.stdout.flush()
     except CalibrationError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return NO_TIP
     except LightpenError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return BAD_INPUT
+    except BrokenPipeError:  # the reader of our output has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except KeyboardInterrupt:
         print("lightpen: stopped; nothing was written.", file=sys.stderr)
         return BAD_INPUT
@@ -88,7 +93,7 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     _add_pen_options(parser)
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
-        "--nominal-tip", type=float, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+        "--nominal-tip", type=_finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
 
@@ -96,8 +101,8 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
 def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_simulate)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
-    parser.add_argument("--images", type=_count, default=60, metavar="N")
-    parser.add_argument("--seed", type=_count, default=0, metavar="S")
+    parser.add_argument("--images", type=_n_images, default=60, metavar="N")
+    parser.add_argument("--seed", type=_whole_number, default=0, metavar="S")
     parser.add_argument(
         "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
     )
@@ -116,11 +121,27 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _count(text: str) -> int:
-    count = int(text)
-    if count < 0:
-        raise argparse.ArgumentTypeError(f"{text} is negative; 0 or more is needed.")
-    return count
+def _whole_number(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more.")
+    return int(text)
+
+
+def _n_images(text: str) -> int:
+    number = _whole_number(text)
+    if number == 0:
+        raise argparse.ArgumentTypeError("at least one image is needed.")
+    return number
+
+
+def _finite(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text} is not a number.")
+    return number
 
 
 def _add_pivot(parser: argparse.ArgumentParser) -> None:
@@ -145,7 +166,7 @@ def _add_pen_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--led-diameter",
-        type=float,
+        type=_finite,
         metavar="MM",
         help="of the LED discs, where the pen file does not say (10)",
     )
