@@ -1,0 +1,107 @@
+"""The spots of many images as arrays, freed of distortion.
+
+Pinhole pixels are the undistorted normalised plane times the focal length.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.camera import Camera
+from lightpen.spots import Flaw, Spots
+
+FAR = 1e7  # px, where no spot is
+UNWHOLE = int(Flaw.MERGED | Flaw.CUT)
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """The spots of B images in pinhole pixels, padded to N spots each.
+
+    Attributes
+    ----------
+    pinhole : Camera
+        The camera without its distortion, principal point at (0, 0).
+    points : (B, N, 2) array
+        Centres, `FAR` where there is no usable spot.
+    unwhole_points : (B, N, 2) array
+        Centres of the merged and cut spots, `FAR` elsewhere.
+    shapes : (B, N, 2, 2) array
+        Covariances of the areas.
+    rays : (B, N, 3) array
+        Unit vectors to the spots.
+    ranges : (B, N) array
+        Distances, mm, at which discs of the pen look as large as the spots.
+    usable : (B, N) array
+    """
+
+    pinhole: Camera
+    points: FloatArray
+    unwhole_points: FloatArray
+    shapes: FloatArray
+    rays: FloatArray
+    ranges: FloatArray
+    usable: BoolArray
+
+
+def sight_of(
+    spots: Sequence[Spots], camera: Camera, radius: float, use_unwhole: bool = False
+) -> Sight:
+    """Return the spots of images, undistorted, with the distance each suggests.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    camera : Camera
+    radius : float
+        Radius of the discs, mm.
+    use_unwhole : bool
+        Take merged and cut spots for whole ones.
+    """
+    n_spots = np.array([len(s) for s in spots])
+    there = np.arange(max(int(n_spots.max()), 1)) < n_spots[:, None]
+    flaws = np.zeros(there.shape, dtype=np.int64)
+    flaws[there] = np.concatenate([s.flaws for s in spots])
+    focal = float(np.sqrt(camera.fx * camera.fy))
+    plane = camera.unproject_with_jacobian(np.concatenate([s.centers for s in spots]))
+    J = focal * plane.jacobian
+    points = np.full((*there.shape, 2), FAR)
+    points[there] = focal * plane.points
+    shapes = np.tile(np.eye(2), (*there.shape, 1, 1))
+    shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ np.swapaxes(J, 1, 2)
+    unwhole = flaws & UNWHOLE != 0
+    usable = there & (use_unwhole | ~unwhole)
+    rays = np.zeros((*there.shape, 3))
+    rays[..., 2] = 1
+    rays[there, :2] = plane.points
+    stretch = np.linalg.norm(rays, axis=-1)
+    ranges = np.full(there.shape, np.inf)
+    ranges[there] = _ranges(rays[there, :2], shapes[there] / focal**2, radius)
+    return Sight(
+        pinhole=Camera(camera.width, camera.height, focal, focal, 0.0, 0.0),
+        points=np.where(usable[..., None], points, FAR),
+        unwhole_points=np.where(unwhole[..., None], points, FAR),
+        shapes=shapes,
+        rays=rays / stretch[..., None],
+        ranges=ranges,
+        usable=usable,
+    )
+
+
+def _ranges(x: FloatArray, shapes: FloatArray, radius: float) -> FloatArray:
+    """Return distances of discs from their shapes in the normalised plane.
+
+    Seen along its ray, a disc's longer semi-axis is radius / distance whatever its
+    tilt; the plane is first turned square to the ray.
+    """
+    stretch = np.sqrt(1 + np.einsum("ni,ni->n", x, x))
+    turn = np.eye(2) - x[:, :, None] * (x / (stretch * (stretch + 1))[:, None])[:, None]
+    square = turn @ shapes @ np.swapaxes(turn, 1, 2) / (stretch**2)[:, None, None]
+    half_trace = 0.5 * (square[:, 0, 0] + square[:, 1, 1])
+    difference = 0.5 * (square[:, 0, 0] - square[:, 1, 1])
+    largest = half_trace + np.hypot(difference, square[:, 0, 1])
+    ranges: FloatArray = radius / (2 * np.sqrt(largest))
+    return ranges
