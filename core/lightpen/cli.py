@@ -17,13 +17,13 @@ import cv2
 import numpy as np
 
 from lightpen.calibrate import calibrate
-from lightpen.camera_files import read_camera
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.files import sha256, write_whole
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.observation_files import read_centers, read_poses
+from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
 from lightpen.images import find_images
-from lightpen.observation_files import read_centers, read_poses
 from lightpen.observe import observe_centers, observe_images
-from lightpen.pen_files import UNITS, read_pen, read_raw_pen, write_pen
 from lightpen.pivot import fit_pivot
 from lightpen.report import (
     METHODS,
@@ -202,10 +202,10 @@ def _calibrate(options: argparse.Namespace) -> None:
 
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
-    from lightpen.sample_pens import SAMPLE_PENS
-    from lightpen.scene_files import write_scene
-    from lightpen.scenes import SCENES, Scene
-    from lightpen.sensor import Sensor
+    from lightpen.simulator.sample_pens import SAMPLE_PENS
+    from lightpen.simulator.scene_files import write_scene
+    from lightpen.simulator.scenes import SCENES, Scene
+    from lightpen.simulator.sensor import Sensor
 
     scene = Scene(
         n_images=options.images,

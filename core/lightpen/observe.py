@@ -13,9 +13,9 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.camera import Camera
 from lightpen.ellipse import centers_from_centroids
 from lightpen.errors import FileError
+from lightpen.formats.observation_files import Centers
 from lightpen.images import ImageSource, keep_freed_memory
-from lightpen.labels import Labels, Verdict, diagnose, label_images
-from lightpen.observation_files import Centers
+from lightpen.labelling.labels import Labels, Verdict, diagnose, label_images
 from lightpen.pen import Pen
 from lightpen.pose import MIN_LEDS, start_poses
 from lightpen.spots import Flaw, Spots, detect_spots

@@ -9,11 +9,11 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.calibrate import Calibration, calibrate
 from lightpen.errors import CalibrationError
-from lightpen.observation_files import Centers
+from lightpen.formats.observation_files import Centers
 from lightpen.observe import Reason, observe_centers
 from lightpen.pen import Pen
-from lightpen.postures import SwingKind
-from lightpen.simulate import (
+from lightpen.simulator.postures import SwingKind
+from lightpen.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

@@ -16,11 +16,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lightpen import documents
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
-from lightpen.camera_files import read_camera, write_camera
 from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats import documents
+from lightpen.formats.camera_files import read_camera, write_camera
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])
 OPENCV = """%YAML:1.0
@@ -669,7 +669,7 @@ def test_a_plain_file_is_read_without_importing_yaml(tmp_path: Path) -> None:
     path = saved(tmp_path, OPENCV)
     program = (
         "import sys\nfrom pathlib import Path\n"
-        "from lightpen.camera_files import read_camera\n"
+        "from lightpen.formats.camera_files import read_camera\n"
         f"read_camera(Path({str(path)!r}))\n"
         "print('yaml' in sys.modules, 'xml.parsers' in sys.modules)"
     )

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lightpen.constellation import constellation_of
-from lightpen.simulate import flat_pen, paper_pen
+from lightpen.labelling.constellation import constellation_of
+from lightpen.simulator.swings import flat_pen, paper_pen
 
 
 def test_six_leds_are_needed_where_the_pen_has_more() -> None:

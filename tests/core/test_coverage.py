@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.coverage import DIRECTION_NAMES, measure_coverage, posture_spread
 from lightpen.rigid import rotation_from_vector
-from lightpen.simulate import swing_poses
+from lightpen.simulator.swings import swing_poses
 
 UPRIGHT = np.diag([1.0, -1.0, -1.0])  # pen's y up in the image, z to the camera
 

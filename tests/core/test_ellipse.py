@@ -9,7 +9,12 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
 from lightpen.ellipse import centers_from_centroids, disc_images, ellipse_centers
-from lightpen.simulate import leds_in_camera, paper_camera, paper_pen, swing_poses
+from lightpen.simulator.swings import (
+    leds_in_camera,
+    paper_camera,
+    paper_pen,
+    swing_poses,
+)
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -9,7 +9,7 @@ from lightpen.geometry import GeometryFit, fit_geometry
 from lightpen.joint import JointFit, fit_joint
 from lightpen.pen import Pen
 from lightpen.rigid import fit_rigid
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,

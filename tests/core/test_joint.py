@@ -5,7 +5,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.joint import ContactModel, JointFit, extend_joint, fit_joint
 from lightpen.rigid import rotation_from_vector
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     Swing,
     displace_centers,
     drop_centers,

@@ -13,7 +13,7 @@ import pytest
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.camera import Camera
 from lightpen.ellipse import disc_images
-from lightpen.labels import (
+from lightpen.labelling.labels import (
     Labels,
     Verdict,
     diagnose,
@@ -23,8 +23,8 @@ from lightpen.labels import (
 )
 from lightpen.pen import Pen
 from lightpen.rigid import rotation_from_vector
-from lightpen.sample_pens import SAMPLE_PENS
-from lightpen.simulate import flat_pen, paper_camera, paper_pen
+from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.swings import flat_pen, paper_camera, paper_pen
 from lightpen.spots import Flaw, Spots
 
 CAMERA = paper_camera()

@@ -9,7 +9,7 @@ from lightpen.geometry import fit_geometry
 from lightpen.joint import fit_joint
 from lightpen.led_quality import LedQuality, measure_leds
 from lightpen.pen import Pen
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     drop_centers,
     paper_camera,
     paper_pen,

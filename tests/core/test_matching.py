@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.constellation import constellation_of
 from lightpen.ellipse import disc_images
-from lightpen.matching import log_false_alarms, match, settle
+from lightpen.labelling.constellation import constellation_of
+from lightpen.labelling.matching import log_false_alarms, match, settle
+from lightpen.labelling.sight import Sight, sight_of
 from lightpen.rigid import rotation_from_vector
-from lightpen.sight import Sight, sight_of
-from lightpen.simulate import paper_camera, paper_pen
+from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.spots import Spots
 
 CAMERA = paper_camera()

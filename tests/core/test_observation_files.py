@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError
-from lightpen.observation_files import (
+from lightpen.formats.observation_files import (
     Centers,
     read_centers,
     read_poses,

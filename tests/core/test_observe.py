@@ -9,12 +9,12 @@ import pytest
 from lightpen.arrays import FloatArray, Image
 from lightpen.ellipse import ellipse_centers
 from lightpen.errors import FileError
+from lightpen.formats.observation_files import Centers
 from lightpen.images import ImageSource
-from lightpen.observation_files import Centers
 from lightpen.observe import Observations, Reason, observe_centers, observe_images
-from lightpen.scenes import Scene
-from lightpen.shots import ScenePlan, plan_scene, render_shot
-from lightpen.simulate import leds_in_camera, paper_camera, paper_pen
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.shots import ScenePlan, plan_scene, render_shot
+from lightpen.simulator.swings import leds_in_camera, paper_camera, paper_pen
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -1,7 +1,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.p3p import solve_p3p
+from lightpen.labelling.p3p import solve_p3p
 from lightpen.rigid import rotation_from_vector
 
 

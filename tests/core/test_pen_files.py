@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
 from lightpen.pen import DISC_DIAMETER, Pen
-from lightpen.pen_files import read_pen, read_raw_pen, write_pen
 from lightpen.rigid import rotation_from_vector
 
 LEDS = np.array(

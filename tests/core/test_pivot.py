@@ -8,10 +8,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.coverage import require_spread
 from lightpen.errors import CalibrationError
-from lightpen.observation_files import Poses, read_poses
+from lightpen.formats.observation_files import Poses, read_poses
 from lightpen.pivot import fit_pivot, tip_covariances
 from lightpen.rigid import rotation_from_vector
-from lightpen.simulate import swing_poses
+from lightpen.simulator.swings import swing_poses
 
 TIP_PEN = np.array([2.0, -1.0, 150.0])
 PIVOT_CAM = np.array([10.0, 20.0, 800.0])

@@ -7,7 +7,7 @@ from lightpen.arrays import FloatArray
 from lightpen.pen import Pen
 from lightpen.pose import disc_residuals, fit_paper_poses, fit_poses, start_poses
 from lightpen.rigid import rotation_from_vector, vector_from_rotation
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     Swing,
     displace_centers,
     drop_centers,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from lightpen.postures import (
+from lightpen.simulator.postures import (
     FRAME_RATE,
     MAX_TILT,
     Postures,

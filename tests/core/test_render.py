@@ -8,11 +8,25 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
-from lightpen.render import Light, Window, hidden_fraction, led_levels, render_view
-from lightpen.rims import disc_rims, measure_insides
-from lightpen.scenery import Finger, Glare, Lamp, Optics, View, moving_poses, still_view
-from lightpen.sensor import Sensor
-from lightpen.simulate import (
+from lightpen.simulator.render import (
+    Light,
+    Window,
+    hidden_fraction,
+    led_levels,
+    render_view,
+)
+from lightpen.simulator.rims import disc_rims, measure_insides
+from lightpen.simulator.scenery import (
+    Finger,
+    Glare,
+    Lamp,
+    Optics,
+    View,
+    moving_poses,
+    still_view,
+)
+from lightpen.simulator.sensor import Sensor
+from lightpen.simulator.swings import (
     PAPER_TIP,
     leds_in_camera,
     paper_camera,

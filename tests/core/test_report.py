@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lightpen.calibrate import Calibration, calibrate
-from lightpen.observation_files import Centers
+from lightpen.formats.observation_files import Centers
 from lightpen.observe import observe_centers
 from lightpen.pivot import fit_pivot
 from lightpen.report import (
@@ -20,7 +20,12 @@ from lightpen.report import (
     pivot_json,
     pivot_text,
 )
-from lightpen.simulate import paper_camera, paper_pen, simulate_centers, swing_poses
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
 
 CAMERA = paper_camera()
 PEN = paper_pen()

@@ -3,8 +3,8 @@ import pytest
 from scipy.special import ndtr
 
 from lightpen.arrays import FloatArray
-from lightpen.postures import Postures
-from lightpen.rims import (
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.rims import (
     Patch,
     Rims,
     blurred_insides,
@@ -12,7 +12,7 @@ from lightpen.rims import (
     ellipse_rim,
     measure_insides,
 )
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     leds_in_camera,
     paper_camera,
     paper_pen,

@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from lightpen.sample_pens import NEARLY, SAMPLE_PENS, fanned_pen, near_symmetric_pen
+from lightpen.simulator.sample_pens import (
+    NEARLY,
+    SAMPLE_PENS,
+    fanned_pen,
+    near_symmetric_pen,
+)
 
 
 @pytest.mark.parametrize("name", SAMPLE_PENS)

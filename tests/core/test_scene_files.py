@@ -9,17 +9,17 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.camera import Camera
-from lightpen.camera_files import read_camera
 from lightpen.errors import Cancelled, FileError
-from lightpen.pen_files import read_pen
-from lightpen.render import render_view
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
 from lightpen.rigid import fit_rigid
-from lightpen.sample_pens import six_led_pen
-from lightpen.scene_files import scene_truth, write_scene
-from lightpen.scenes import HARD, Disturbances, Scene
-from lightpen.sensor import Sensor, quantize
-from lightpen.shots import plan_scene
-from lightpen.simulate import PAPER_CONE, PAPER_TIP, paper_camera
+from lightpen.simulator.render import render_view
+from lightpen.simulator.sample_pens import six_led_pen
+from lightpen.simulator.scene_files import scene_truth, write_scene
+from lightpen.simulator.scenes import HARD, Disturbances, Scene
+from lightpen.simulator.sensor import Sensor, quantize
+from lightpen.simulator.shots import plan_scene
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera
 
 
 def quarter_camera() -> Camera:

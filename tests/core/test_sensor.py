@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from lightpen.render import Light, Window
-from lightpen.sensor import Sensor, expose, quantize
+from lightpen.simulator.render import Light, Window
+from lightpen.simulator.sensor import Sensor, expose, quantize
 
 SHAPE = (400, 500)
 WHOLE = Window(0, SHAPE[0], 0, SHAPE[1])

@@ -4,10 +4,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lightpen.sample_pens import SAMPLE_PENS
-from lightpen.scenes import HARD, SCENES, Disturbances, Scene
-from lightpen.shots import SLIP, live_shot, plan_scene, render_shot
-from lightpen.simulate import PAPER_CONE, leds_in_camera, paper_camera
+from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.scenes import HARD, SCENES, Disturbances, Scene
+from lightpen.simulator.shots import SLIP, live_shot, plan_scene, render_shot
+from lightpen.simulator.swings import PAPER_CONE, leds_in_camera, paper_camera
 
 CAMERA = paper_camera()
 

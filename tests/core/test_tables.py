@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.tables import Table, number_flaw, parse_table, read_table
+from lightpen.formats.tables import Table, number_flaw, parse_table, read_table
 
 COLUMNS = (("led",), ("x_mm",), ("y_mm",))
 NUMBERS = [[1, 0.5, -2.25], [2, 60.125, 1e-7], [3, 120.0, 3e2]]

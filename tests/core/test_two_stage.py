@@ -6,8 +6,8 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.pivot import fit_pivot
-from lightpen.postures import SwingKind
-from lightpen.simulate import Swing, swing_poses
+from lightpen.simulator.postures import SwingKind
+from lightpen.simulator.swings import Swing, swing_poses
 from lightpen.two_stage import fit_two_stage, propagated_covariance
 
 

@@ -8,7 +8,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.geometry import GeometryFit
 from lightpen.joint import fit_joint
-from lightpen.simulate import (
+from lightpen.simulator.swings import (
     Swing,
     paper_camera,
     paper_pen,

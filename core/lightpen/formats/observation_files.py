@@ -16,8 +16,8 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.files import MEGABYTE, write_whole
+from lightpen.formats.tables import Table, read_table
 from lightpen.rigid import nearest_rotation
-from lightpen.tables import Table, read_table
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 30_000

@@ -10,16 +10,16 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.camera import Camera
-from lightpen.clutter import random_finger, random_glares, random_lamps
 from lightpen.ellipse import Ellipses, disc_images
 from lightpen.pen import Pen
-from lightpen.postures import operator_postures
-from lightpen.render import render_view
 from lightpen.rigid import vector_from_rotation
-from lightpen.scenery import Optics, View, moving_poses
-from lightpen.scenes import Scene
-from lightpen.sensor import expose
-from lightpen.simulate import (
+from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
+from lightpen.simulator.postures import operator_postures
+from lightpen.simulator.render import render_view
+from lightpen.simulator.scenery import Optics, View, moving_poses
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.sensor import expose
+from lightpen.simulator.swings import (
     Swing,
     leds_in_camera,
     perturbed_pen,

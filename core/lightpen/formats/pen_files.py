@@ -27,10 +27,11 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.documents import Tree, parse_json
-from lightpen.entries import Entries
 from lightpen.errors import FileError, UsageError
 from lightpen.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.formats.documents import Tree, parse_json
+from lightpen.formats.entries import Entries
+from lightpen.formats.tables import Table, parse_table
 from lightpen.pen import (
     DISC_DIAMETER,
     Pen,
@@ -38,7 +39,6 @@ from lightpen.pen import (
     check_leds,
     in_pen_frame,
 )
-from lightpen.tables import Table, parse_table
 
 PEN_FILE_LIMIT = MEGABYTE
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}

@@ -13,7 +13,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.camera import Camera
 from lightpen.ellipse import disc_images, ellipse_centers
 from lightpen.pen import Pen
-from lightpen.postures import Postures, SwingKind, draw_postures
+from lightpen.simulator.postures import Postures, SwingKind, draw_postures
 
 PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result
 PAPER_CONE = np.array([-4.871, 214.287, 1087.45])  # mm
@@ -121,7 +121,7 @@ def swing_poses(
     n_frames : int
     rng : numpy.random.Generator
     kind : str
-        See `lightpen.postures.draw_postures`.
+        See `lightpen.simulator.postures.draw_postures`.
     pen, camera : optional
         The paper's unless given.
     tip_pen, cone_cam : (3,) array

@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.pen import Pen
 from lightpen.rigid import rotation_from_vector
-from lightpen.rims import MIN_SIGMA
+from lightpen.simulator.rims import MIN_SIGMA
 
 PEAK = 205 / 255
 CAP_STEPS = 16  # corners of a round finger end

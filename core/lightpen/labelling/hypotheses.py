@@ -12,9 +12,9 @@ from itertools import combinations
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.constellation import Constellation
 from lightpen.ellipse import disc_images
-from lightpen.matching import (
+from lightpen.labelling.constellation import Constellation
+from lightpen.labelling.matching import (
     AREA_RANGE,
     MIN_FACING,
     Candidates,
@@ -22,8 +22,8 @@ from lightpen.matching import (
     join,
     match,
 )
-from lightpen.p3p import solve_p3p
-from lightpen.sight import Sight
+from lightpen.labelling.p3p import solve_p3p
+from lightpen.labelling.sight import Sight
 
 MAX_SPOTS = 14  # of which triples are made
 MAX_GAP = 1.15  # between two LEDs, over the size of the pen

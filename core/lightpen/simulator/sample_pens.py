@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.pen import Pen
 from lightpen.rigid import rotation_from_vector
-from lightpen.simulate import flat_pen, paper_pen
+from lightpen.simulator.swings import flat_pen, paper_pen
 
 FAN_ANGLE = np.radians(20)  # of a fanned column's discs from +z
 NEARLY = 2.0  # mm by which the near-symmetric pen misses its mirror image

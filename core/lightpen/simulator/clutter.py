@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
 from lightpen.ellipse import Ellipses
-from lightpen.scenery import Finger, Glare, Lamp
+from lightpen.simulator.scenery import Finger, Glare, Lamp
 
 MAX_TRIES = 30
 CLEARANCE = 6.0  # px between a foreign light and a disc

@@ -11,18 +11,18 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.camera_files import write_camera
 from lightpen.ellipse import disc_images
 from lightpen.errors import FileError
 from lightpen.files import write_whole
+from lightpen.formats.camera_files import write_camera
+from lightpen.formats.pen_files import write_pen
 from lightpen.pen import pen_frame_from_raw
-from lightpen.pen_files import write_pen
-from lightpen.render import hidden_fraction, led_levels
 from lightpen.rigid import fit_rigid, vector_from_rotation
-from lightpen.rims import disc_rims, measure_insides
-from lightpen.scenes import Scene
-from lightpen.shots import ScenePlan, Shot, plan_scene, render_shot
-from lightpen.simulate import leds_in_camera, rim_gaps
+from lightpen.simulator.render import hidden_fraction, led_levels
+from lightpen.simulator.rims import disc_rims, measure_insides
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.shots import ScenePlan, Shot, plan_scene, render_shot
+from lightpen.simulator.swings import leds_in_camera, rim_gaps
 
 Json: TypeAlias = dict[str, Any]
 

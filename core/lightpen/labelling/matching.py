@@ -1,7 +1,7 @@
 """Supposed poses of a pen laid over the spots of images: matched, refined, weighed.
 
 Everything is batched over candidates, each a pose supposed for one image, and done in
-the pinhole pixels of `lightpen.sight`.
+the pinhole pixels of `lightpen.labelling.sight`.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ import numpy as np
 from scipy.special import gammaln
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.constellation import Constellation
 from lightpen.ellipse import disc_images, ellipse_centers
+from lightpen.labelling.constellation import Constellation
+from lightpen.labelling.sight import Sight
 from lightpen.rigid import rotation_from_vector
-from lightpen.sight import Sight
 
 MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the camera
 

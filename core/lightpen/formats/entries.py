@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.documents import Tree
 from lightpen.errors import FileError
 from lightpen.files import printable, quoted
-from lightpen.tables import number_flaw
+from lightpen.formats.documents import Tree
+from lightpen.formats.tables import number_flaw
 
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
 

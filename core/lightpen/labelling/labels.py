@@ -15,15 +15,15 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.camera import Camera
-from lightpen.constellation import Constellation, constellation_of
-from lightpen.hypotheses import (
+from lightpen.labelling.constellation import Constellation, constellation_of
+from lightpen.labelling.hypotheses import (
     Effort,
     first_of_each,
     lookalike_poses,
     poses_from_triples,
     shifted_poses,
 )
-from lightpen.matching import (
+from lightpen.labelling.matching import (
     AREA_RANGE,
     Candidates,
     join,
@@ -31,8 +31,8 @@ from lightpen.matching import (
     match,
     settle,
 )
+from lightpen.labelling.sight import FAR, UNWHOLE, Sight, sight_of
 from lightpen.pen import Pen
-from lightpen.sight import FAR, UNWHOLE, Sight, sight_of
 from lightpen.spots import Spots
 
 MAX_LOG_FALSE_ALARMS = -4.0

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from lightpen.ellipse import ellipse_centers
-from lightpen.postures import SWING_KINDS, Postures
-from lightpen.sample_pens import SAMPLE_PENS
-from lightpen.simulate import (
+from lightpen.simulator.postures import SWING_KINDS, Postures
+from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.simulator.swings import (
     MIN_GAP,
     PAPER_CONE,
     PAPER_TIP,

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, fields
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
 from lightpen.pen import Pen
-from lightpen.postures import SwingKind
-from lightpen.scenery import Optics
-from lightpen.sensor import Sensor
-from lightpen.simulate import PAPER_CONE, PAPER_TIP, paper_camera, paper_pen
+from lightpen.simulator.postures import SwingKind
+from lightpen.simulator.scenery import Optics
+from lightpen.simulator.sensor import Sensor
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera, paper_pen
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Scene:
     n_images : int
     seed : int
     swing : str
-        Kind of swing, see `lightpen.postures.draw_postures`.
+        Kind of swing, see `lightpen.simulator.postures.draw_postures`.
     disturbances : Disturbances
     optics : Optics
     sensor : Sensor

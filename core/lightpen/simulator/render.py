@@ -12,7 +12,7 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
 from lightpen.pen import Pen
-from lightpen.rims import (
+from lightpen.simulator.rims import (
     LightArray,
     Patch,
     Rims,
@@ -20,8 +20,8 @@ from lightpen.rims import (
     disc_rims,
     ellipse_rim,
 )
-from lightpen.scenery import Finger, Glare, Lamp, Optics, View
-from lightpen.simulate import faces_camera, leds_in_camera
+from lightpen.simulator.scenery import Finger, Glare, Lamp, Optics, View
+from lightpen.simulator.swings import faces_camera, leds_in_camera
 
 OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
 HIDDEN_SAMPLES = 8  # per pixel and axis

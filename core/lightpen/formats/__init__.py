@@ -1,0 +1,1 @@
+"""Files of cameras, pens, LED centres and poses, read with care and written whole."""

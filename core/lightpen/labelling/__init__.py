@@ -1,0 +1,1 @@
+"""Which spot of an image is which LED of the pen."""
