@@ -12,15 +12,16 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image
 from lightpen.camera import Camera
 from lightpen.ellipse import centers_from_centroids
-from lightpen.errors import FileError
+from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.observation_files import Centers
 from lightpen.images import ImageSource, keep_freed_memory
-from lightpen.labelling.labels import Labels, Verdict, diagnose, label_images
+from lightpen.labelling.diagnosis import diagnose, diagnose_mirror
+from lightpen.labelling.labels import Labels, Verdict, label_images
 from lightpen.pen import Pen
 from lightpen.pose import MIN_LEDS, start_poses
 from lightpen.spots import Flaw, Spots, detect_spots
 
-LABELLED_AT_ONCE = 32  # images; labelling is vectorised over them
+LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
 
 NO_SPOTS = Spots(
@@ -121,6 +122,8 @@ def observe_images(
     ------
     FileError
         Most images are of another size than the camera file.
+    CalibrationError
+        The images are of the mirror image of the pen.
     """
     keep_freed_memory()
     sightings: list[_Sighting] = []
@@ -245,8 +248,10 @@ def _assemble(
             whole[i] = label.whole & labelled
     seen = centers_from_centroids(camera, seen, shapes)
     reasons = tuple(map(_reason, sightings, labels))
-    n_labelled = reasons.count(Reason.NONE)
     spots = [s.spots for s in sightings if s.spots is not None]
+    mostly_labelled = 2 * reasons.count(Reason.NONE) > n_images
+    if mostly_labelled and not np.isfinite(seen[..., 0]).any(axis=0).all():
+        _require_right_hand(spots, camera, pen)
     return Observations(
         names=names,
         pixels=np.where(whole[..., None], seen, np.nan),
@@ -255,8 +260,15 @@ def _assemble(
         translations=np.array([label.t for label in labels]).reshape(-1, 3),
         reasons=reasons,
         details=tuple(s.detail for s in sightings),
-        advice="" if 2 * n_labelled > n_images else diagnose(spots, camera, pen),
+        advice="" if mostly_labelled else diagnose(spots, camera, pen),
     )
+
+
+def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:
+    """Refuse a mirrored pen, of which only the asymmetric LEDs are not found."""
+    sentence = diagnose_mirror(spots, camera, pen)
+    if sentence:
+        raise CalibrationError(sentence)
 
 
 def _reason(sighting: _Sighting, label: Labels) -> Reason:

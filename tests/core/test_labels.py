@@ -13,10 +13,10 @@ import pytest
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.camera import Camera
 from lightpen.ellipse import disc_images
+from lightpen.labelling.diagnosis import diagnose
 from lightpen.labelling.labels import (
     Labels,
     Verdict,
-    diagnose,
     label_images,
     label_spots,
     track_spots,

@@ -52,12 +52,6 @@ MAX_OFF_CENTER = 0.5  # of the radius, of a cut disc: half a disc is off by 0.42
 DISPLACED_REACH = 8.0  # px, of an LED from its place in the pen file
 MIN_DISPLACED = 5  # images that show it, and half of all
 
-N_DIAGNOSED = 4  # images
-MOSTLY = 0.8  # of the spots that may be LEDs
-UNIT_FACTORS = (1000.0, 0.001, 25.4, 1 / 25.4, 10.0, 0.1, 100.0, 0.01)
-DISC_FACTORS = (0.6, 1.6, 0.4, 2.5)
-FOCAL_FACTORS = (0.9, 1.1, 0.8, 1.25, 0.7, 1.4, 0.5, 2.0)
-
 MAX_PREDICTION_ERROR = 0.25  # rad
 
 
@@ -108,9 +102,15 @@ EFFORTS = (
     Effort(n_triples=110, n_hypotheses=32, n_poses=100, n_settled=8),
     Effort(n_triples=4, n_hypotheses=700, n_poses=100, n_settled=8, sized=False),
 )
+MODERATE = EFFORTS[:3]
 
 
-def label_images(spots: Sequence[Spots], camera: Camera, pen: Pen) -> list[Labels]:
+def label_images(
+    spots: Sequence[Spots],
+    camera: Camera,
+    pen: Pen,
+    efforts: Sequence[Effort] = EFFORTS,
+) -> list[Labels]:
     """Label the LEDs in images that have nothing to do with each other.
 
     Parameters
@@ -119,6 +119,8 @@ def label_images(spots: Sequence[Spots], camera: Camera, pen: Pen) -> list[Label
         One per image.
     camera : Camera
     pen : Pen
+    efforts : sequence of Effort
+        How hard to search, one after the other, until an image is labelled.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def label_images(spots: Sequence[Spots], camera: Camera, pen: Pen) -> list[Label
         be displaced in the pen file and gets these spots; the poses do without it.
     """
     constellation = constellation_of(pen)
-    labels = _label_whole(spots, camera, constellation, EFFORTS)
+    labels = _label_whole(spots, camera, constellation, efforts)
     # The last resort where whole spots do not suffice.
     again = [
         i
@@ -138,7 +140,7 @@ def label_images(spots: Sequence[Spots], camera: Camera, pen: Pen) -> list[Label
         and len(s) >= constellation.min_leds
     ]
     retried = _label_whole(
-        [spots[i] for i in again], camera, constellation, EFFORTS, use_unwhole=True
+        [spots[i] for i in again], camera, constellation, efforts, use_unwhole=True
     )
     for i, found in zip(again, retried, strict=True):
         labels[i] = found
@@ -192,86 +194,6 @@ def track_spots(
     if np.sum(label.R * R) < 1 + 2 * np.cos(MAX_PREDICTION_ERROR):
         return _refused(pen.n_leds, Verdict.NO_FIT)
     return label
-
-
-def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> str:
-    """Name the likely cause why LEDs are not found where the pen file has them.
-
-    Pens and cameras with one thing changed are tried on a few images; the first that
-    explains clearly more spots tells.
-
-    Parameters
-    ----------
-    spots : sequence of Spots
-        One per image.
-    camera : Camera
-    pen : Pen
-
-    Returns
-    -------
-    str
-        Some sentences for the user, what was found and what to do; empty if most
-        spots are LEDs of the pen.
-    """
-    needed = constellation_of(pen).min_leds
-    counts = np.array([len(s) for s in spots])
-    rich = [i for i in np.argsort(counts, kind="stable") if counts[i] >= needed]
-    if 2 * len(rich) < len(spots):
-        return (
-            f"Most images show fewer than {needed} spots (median "
-            f"{np.median(counts):.0f}); of the {pen.n_leds} LEDs of the pen {needed} "
-            "must be seen. Check that the LEDs are lit and in the image, and the "
-            "exposure."
-        )
-    # The images with the fewest spots have the least clutter.
-    some = [spots[i] for i in rich[:N_DIAGNOSED]]
-    n_possible = sum(min(len(s), pen.n_leds) for s in some)
-    n_explained = _n_explained(some, camera, pen)
-    if n_explained > MOSTLY * n_possible:
-        return ""
-
-    def fits(camera: Camera, pen: Pen) -> bool:
-        n = _n_explained(some, camera, pen)
-        return n > MOSTLY * n_possible and n >= n_explained + len(some)
-
-    for sign, name in (([-1.0, 1.0, 1.0], "x"), ([1.0, 1.0, -1.0], "z")):
-        if fits(camera, replace(pen, leds=pen.leds * np.array(sign))):
-            return (
-                "The images fit the mirror image of the pen: with the opposite sign of "
-                f"{name} its LEDs match. Change the sign of {name} in the pen file."
-            )
-    for factor in UNIT_FACTORS:
-        if fits(camera, replace(pen, leds=pen.leds * factor)):
-            return (
-                f"The images fit LED coordinates {factor:g} times those of the pen "
-                "file. Check its unit: millimetres are needed."
-            )
-    for factor in DISC_FACTORS:
-        if fits(camera, replace(pen, diameter=pen.diameter * factor)):
-            return (
-                f"The LEDs look about {factor:g} times as large as the pen file says "
-                f"({pen.diameter:g} mm). Check the disc diameter and the unit of the "
-                "coordinates."
-            )
-    for factor in FOCAL_FACTORS:
-        changed = replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
-        if fits(changed, pen):
-            return (
-                f"The images fit the pen with about {factor:g} times the focal length "
-                "of the camera file. Choose the file of this camera and lens, or "
-                "calibrate the camera again."
-            )
-    return (
-        f"Most images show {needed} or more spots, but these do not fit the pen file "
-        f"with its {pen.n_leds} LEDs. Check that it is the file of this pen and that "
-        "the camera file belongs to these images."
-    )
-
-
-def _n_explained(spots: Sequence[Spots], camera: Camera, pen: Pen) -> int:
-    """Return the number of spots labelled with moderate effort."""
-    labels = _label_whole(spots, camera, constellation_of(pen), EFFORTS[:3])
-    return sum(int((label.spot >= 0).sum()) for label in labels)
 
 
 def _label_whole(

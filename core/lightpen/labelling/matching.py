@@ -6,9 +6,10 @@ the pinhole pixels of `lightpen.labelling.sight`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from math import lgamma
 
 import numpy as np
-from scipy.special import gammaln
+import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.ellipse import disc_images, ellipse_centers
@@ -31,6 +32,9 @@ MAX_CHANCE = 1e-3  # that a pair dropped as stray was none
 SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted one
 MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion
 AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
+
+# Of 0, 1/2, 1, ... 511; a table, as importing scipy takes longer than labelling.
+LOG_FACTORIALS = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,17 +186,22 @@ def log_false_alarms(sight: Sight, candidates: Candidates) -> FloatArray:
        matches between two images and estimate the fundamental matrix", International
        Journal of Computer Vision 57 (2004) 201-218.
     """
-    n = candidates.n_explained.astype(np.float64)
+    n = candidates.n_explained
     n_leds = candidates.spot.shape[1]
     n_spots = sight.usable.sum(axis=1)[candidates.image]
-    choices = gammaln(n_leds + 1) - gammaln(n + 1) - gammaln(n_leds - n + 1)
-    choices += gammaln(n_spots + 1) - gammaln(n_spots - n + 1)
+    choices = _log_factorial(n_leds) - _log_factorial(n) - _log_factorial(n_leds - n)
+    choices += _log_factorial(n_spots) - _log_factorial(n_spots - n)
     surplus = np.maximum(2 * n - 6, 0)
     radius = np.sqrt(np.maximum(candidates.sum_squares, 1e-12))
-    ball = 0.5 * surplus * np.log(np.pi) - gammaln(0.5 * surplus + 1)
+    ball = 0.5 * surplus * np.log(np.pi) - _log_factorial(0.5 * surplus)
     ball += surplus * (np.log(radius) - 0.5 * np.log(_covered_area(sight, candidates)))
     logs: FloatArray = (choices + np.minimum(ball, 0)) / np.log(10)
     return logs
+
+
+def _log_factorial(x: npt.ArrayLike) -> FloatArray:
+    """Return log x! of whole and half numbers."""
+    return np.asarray(LOG_FACTORIALS[np.asarray(2 * np.asarray(x), dtype=np.int64)])
 
 
 def _covered_area(sight: Sight, candidates: Candidates) -> FloatArray:
