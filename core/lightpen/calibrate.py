@@ -22,6 +22,10 @@ from lightpen.uncertainty import Budget, Halves, combine, compare_halves
 MIN_IMAGES = 6  # the paper starts from six
 MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
 USUAL_SIGMA = 0.1  # px
+# An LED that runs along an arc during the exposure appears inside it, which moves the
+# pose of a blurred image by some hundredths of a millimetre; more is a slip.
+MAX_SMEAR = 0.15  # mm
+SMEARED = 1.5  # times the usual width of the LEDs' rims
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 
@@ -117,7 +121,10 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         all_poses.translations[fitting],
         all_poses.covariances[fitting],
     )
-    reasons[posed[fitting][~pivot.used]] = Reason.SLIPPED
+    gated = posed[fitting][~pivot.used]
+    distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
+    smeared = _smeared(observations)[gated] & (distances < MAX_SMEAR)
+    reasons[gated] = np.where(smeared, Reason.BLURRED, Reason.SLIPPED)
     kept = np.flatnonzero(fitting)[pivot.used]
     chosen, poses = posed[kept], all_poses.of(kept)
 
@@ -159,6 +166,14 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         leds=measure_leds(camera, pen, pixels, geometry),
         coverage=measure_coverage(joint.rotations),
     )
+
+
+def _smeared(observations: Observations) -> BoolArray:
+    """Return which images have clearly wider LED rims than most."""
+    widths = observations.edge_widths
+    known = widths[np.isfinite(widths)]
+    usual = np.median(known) if len(known) else np.inf
+    return np.asarray(np.nan_to_num(widths) > SMEARED * usual)
 
 
 def _require_fit(poses: Poses) -> None:

@@ -19,7 +19,7 @@ from lightpen.labelling.diagnosis import diagnose, diagnose_mirror
 from lightpen.labelling.labels import Labels, Verdict, label_images
 from lightpen.pen import Pen
 from lightpen.pose import MIN_LEDS, start_poses
-from lightpen.spots import Flaw, Spots, detect_spots
+from lightpen.spots import Flaw, Spots, detect_spots, shows_smears
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
@@ -51,6 +51,9 @@ class Reason(StrEnum):
     SLIPPED = "tip slipped"
 
 
+UNSEEN = (Reason.UNREADABLE, Reason.WRONG_SIZE)
+
+
 @dataclass(frozen=True, eq=False)
 class Observations:
     """What N images show of the pen.
@@ -65,6 +68,9 @@ class Observations:
         Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Rough cam_from_pen, mm; NaN where there is none.
+    edge_widths : (N,) array
+        Mean width of the rims of the labelled LEDs from dark to bright, px; NaN where
+        none is labelled, or only centres are given.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
     details : tuple of str
@@ -78,6 +84,7 @@ class Observations:
     seen_pixels: FloatArray
     rotations: FloatArray
     translations: FloatArray
+    edge_widths: FloatArray
     reasons: tuple[Reason, ...]
     details: tuple[str, ...]
     advice: str = ""
@@ -85,9 +92,9 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class _Sighting:
-    """One image after detection."""
+    """The spots of one image, or why it cannot have any."""
 
-    spots: Spots | None
+    spots: Spots
     reason: Reason
     detail: str
 
@@ -170,6 +177,7 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
         seen_pixels=pixels,
         rotations=rotations,
         translations=translations,
+        edge_widths=np.full(len(pixels), np.nan),
         reasons=tuple(Reason.NONE if e else Reason.TOO_FEW_LEDS for e in enough),
         details=("",) * len(pixels),
     )
@@ -193,17 +201,20 @@ def _detect(load: Callable[[], Image], camera: Camera) -> _Sighting:
     try:
         image = load()
     except FileError as error:
-        return _Sighting(None, Reason.UNREADABLE, str(error))
+        return _Sighting(NO_SPOTS, Reason.UNREADABLE, str(error))
     height, width = image.shape
     if (width, height) != (camera.width, camera.height):
-        return _Sighting(None, Reason.WRONG_SIZE, f"{width} x {height} px")
-    return _Sighting(detect_spots(image), Reason.NONE, "")
+        return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, f"{width} x {height} px")
+    spots = detect_spots(image)
+    if len(spots) == 0:
+        return _Sighting(
+            spots, Reason.BLURRED if shows_smears(image) else Reason.EMPTY, ""
+        )
+    return _Sighting(spots, Reason.NONE, "")
 
 
 def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]:
-    """Label images; those without spots get the labels of an empty image."""
-    spots = [NO_SPOTS if s.spots is None else s.spots for s in sightings]
-    return label_images(spots, camera, pen)
+    return label_images([s.spots for s in sightings], camera, pen)
 
 
 def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
@@ -240,15 +251,17 @@ def _assemble(
     seen = np.full((n_images, pen.n_leds, 2), np.nan)
     shapes = np.full((n_images, pen.n_leds, 2, 2), np.nan)
     whole = np.zeros((n_images, pen.n_leds), dtype=bool)
+    edge_widths = np.full(n_images, np.nan)
     for i, (sighting, label) in enumerate(zip(sightings, labels, strict=True)):
         labelled = label.spot >= 0
-        if sighting.spots is not None and labelled.any():
+        if labelled.any():
             seen[i, labelled] = sighting.spots.centers[label.spot[labelled]]
             shapes[i, labelled] = sighting.spots.shapes[label.spot[labelled]]
             whole[i] = label.whole & labelled
+            edge_widths[i] = sighting.spots.edge_widths[label.spot[labelled]].mean()
     seen = centers_from_centroids(camera, seen, shapes)
     reasons = tuple(map(_reason, sightings, labels))
-    spots = [s.spots for s in sightings if s.spots is not None]
+    spots = [s.spots for s in sightings if s.reason not in UNSEEN]
     mostly_labelled = 2 * reasons.count(Reason.NONE) > n_images
     if mostly_labelled and not np.isfinite(seen[..., 0]).any(axis=0).all():
         _require_right_hand(spots, camera, pen)
@@ -258,6 +271,7 @@ def _assemble(
         seen_pixels=seen,
         rotations=np.array([label.R for label in labels]).reshape(-1, 3, 3),
         translations=np.array([label.t for label in labels]).reshape(-1, 3),
+        edge_widths=edge_widths,
         reasons=reasons,
         details=tuple(s.detail for s in sightings),
         advice="" if mostly_labelled else diagnose(spots, camera, pen),
@@ -272,16 +286,13 @@ def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:
 
 
 def _reason(sighting: _Sighting, label: Labels) -> Reason:
-    if sighting.spots is None:
+    if sighting.reason is not Reason.NONE:
         return sighting.reason
     if label.reason is Verdict.LABELLED:
         return Reason.NONE
     if label.reason is Verdict.AMBIGUOUS:
         return Reason.AMBIGUOUS
-    if len(sighting.spots) == 0:
-        return Reason.EMPTY
-    blurred = np.mean((sighting.spots.flaws & Flaw.BLURRED) > 0)
-    if blurred > 0.5:
+    if np.mean((sighting.spots.flaws & Flaw.BLURRED) > 0) > 0.5:
         return Reason.BLURRED
     if label.reason is Verdict.TOO_FEW:
         return Reason.TOO_FEW_LEDS

@@ -46,6 +46,8 @@ MIN_ROUNDNESS = 0.85  # half a disc has 0.95, a square 0.955, two touching discs
 MAX_AXIS_RATIO = 4.0
 MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
 
+SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
+
 MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
 SATURATED_LEVEL = 0.99  # of the full scale
 BLURRED_EDGE = 5.0  # px; a sharp image has 2 to 3
@@ -143,6 +145,26 @@ def detect_spots(
         full_scale = 255 if image.dtype == np.uint8 else 4095
         full_scale = full_scale if scene.peak <= full_scale else 65535
     return _as_spots(discs, full_scale, scene.noise)
+
+
+def shows_smears(image: Image) -> bool:
+    """Return whether an image in which no spot was found shows light all the same.
+
+    Discs moved by many times their size during the exposure leave streaks that are no
+    spots; a dark image leaves nothing.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    """
+    if min(image.shape) < MIN_SIZE:
+        return False
+    scene = _survey(image, None, 4)
+    level = scene.background + LEVEL_SIGMAS * scene.noise
+    lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
+    low, high = SMEARED_FRACTIONS
+    return low < lit / scene.thinned.size < high
 
 
 @dataclass(frozen=True, eq=False)

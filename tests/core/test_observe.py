@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -72,7 +73,8 @@ def test_images_that_cannot_be_used_are_named_with_their_reason(
 ) -> None:
     dark = np.zeros((2048, 2448), dtype=np.uint8)
     small = images[0][:1000]
-    loaders = [loader(image) for image in (*images, dark, small)]
+    smeared = np.asarray(cv2.blur(images[0], (1, 401)), dtype=np.uint8)
+    loaders = [loader(image) for image in (*images, dark, small, smeared)]
     loaders.insert(2, damaged)
 
     found = observe(loaders)
@@ -82,8 +84,9 @@ def test_images_that_cannot_be_used_are_named_with_their_reason(
     assert found.reasons[7] is Reason.EMPTY
     assert found.reasons[8] is Reason.WRONG_SIZE
     assert "2448 x 1000" in found.details[8]
+    assert found.reasons[9] is Reason.BLURRED
     assert found.reasons.count(Reason.NONE) == 6
-    assert np.isnan(found.pixels[[2, 7, 8]]).all()
+    assert np.isnan(found.pixels[[2, 7, 8, 9]]).all()
 
 
 def test_images_of_another_camera_are_refused(images: list[Image]) -> None:
