@@ -144,6 +144,25 @@ def test_source_paths_of_the_installation_hold_no_umlaut(machine: Machine) -> No
     assert (packages / written).resolve() == core.resolve()
 
 
+def test_the_benchmark_gets_its_options_in_the_environment_of_the_program(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    set_up: list[str] = []
+    commands: list[list[str]] = []
+    monkeypatch.setattr(
+        run.Environment, "set_up", lambda _, group: set_up.append(group)
+    )
+    monkeypatch.setattr(run, "become", commands.append)
+    monkeypatch.chdir(run.ROOT)  # puts the folder back after the test
+    run.main(["bench", "speed"])
+
+    [[python, script, *options]] = commands
+    assert set_up == ["program"]
+    assert python == run.Environment(run.ROOT).program("python")
+    assert Path(script).is_file()
+    assert options == ["speed"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "status"), [(["help"], 0), ([], 2), (["dmeo"], 2)]
 )
