@@ -1,7 +1,16 @@
 """Fixtures that every test may use."""
 
+import io
+import json
 import os
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from functools import cache
 from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
 
 import pytest
 
@@ -16,3 +25,99 @@ def shared_data() -> Path:
     if not (path / "swing-clean").is_dir():
         pytest.fail(f"LIGHTPEN_DATA={folder} holds no folder swing-clean")
     return path
+
+
+@pytest.fixture(scope="session")
+def lightpen() -> Callable[..., CompletedProcess[str]]:
+    """Return a function that runs the command line in this process."""
+    # Imported here: a broken command line must not keep the other tests from running.
+    from lightpen.cli import main
+
+    def run(*arguments: str | Path) -> CompletedProcess[str]:
+        words = [str(argument) for argument in arguments]
+        out, err = io.StringIO(), io.StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            try:
+                status = main(words)
+            except SystemExit as stop:  # argparse ends so
+                status = stop.code if isinstance(stop.code, int) else 1
+        return CompletedProcess(words, status, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def script() -> Callable[..., CompletedProcess[str]]:
+    """Return a function that runs the installed console script, as a user does."""
+    name = "lightpen.exe" if os.name == "nt" else "lightpen"
+    program = Path(sys.executable).with_name(name)
+
+    def run(*arguments: str | Path, **options: Any) -> CompletedProcess[str]:
+        return subprocess.run(
+            [program, *arguments],
+            **{"capture_output": True, "encoding": "utf-8", "timeout": 120} | options,
+        )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def scene(
+    lightpen: Callable[..., CompletedProcess[str]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[..., Path]:
+    """Return a function that simulates a set with `options`, each set once."""
+
+    @cache
+    def simulated(*options: str) -> Path:
+        folder = tmp_path_factory.mktemp("scene") / "set"
+        outcome = lightpen("simulate", folder, *options)
+        assert outcome.returncode == 0, outcome.stderr
+        return folder
+
+    return simulated
+
+
+@pytest.fixture(scope="session")
+def record(
+    lightpen: Callable[..., CompletedProcess[str]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[..., dict[str, Any]]:
+    """Return a function that calibrates from a set and reads the JSON, each set once.
+
+    The JSON holds the printed text, too, as `text`.
+    """
+
+    @cache
+    def calibrated(folder: Path, *options: str) -> dict[str, Any]:
+        file = tmp_path_factory.mktemp("record") / "calibration.json"
+        given = options if "--centers" in options else (folder / "images", *options)
+        outcome = lightpen(
+            "calibrate", *given,
+            "--camera", folder / "camera.yaml",
+            "--pen", folder / "leds.csv",
+            "--json", file,
+        )  # fmt: skip
+        assert outcome.returncode == 0, outcome.stderr
+        fields: dict[str, Any] = json.loads(
+            file.read_text(encoding="utf-8"), parse_constant=_refuse_constant
+        )
+        return fields | {"text": outcome.stdout}
+
+    return calibrated
+
+
+@pytest.fixture(scope="session")
+def truth() -> Callable[[Path], dict[str, Any]]:
+    """Return a function that reads the true answer of a set."""
+
+    def read(folder: Path) -> dict[str, Any]:
+        text = (folder / "truth.json").read_text(encoding="utf-8")
+        fields: dict[str, Any] = json.loads(text)
+        return fields
+
+    return read
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"JSON has no {name}")

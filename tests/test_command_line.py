@@ -467,9 +467,11 @@ def test_nothing_but_the_result_is_written_when_piped(
 @pytest.mark.skipif(os.name == "nt", reason="needs a pseudo terminal")
 def test_a_terminal_shows_progress(script: Run, shared_data: Path) -> None:
     import pty
+    import termios
 
     folder = shared_data / "fixed-point"
     controller, terminal = pty.openpty()
+    termios.tcsetwinsize(terminal, (24, 80))
     outcome = script(
         "calibrate", folder / "images", *input_options(folder),
         capture_output=False, stdout=-1, stderr=terminal,

@@ -45,8 +45,8 @@ class Calibration:
     tips_cam : (N, 3) array
         Where each image alone puts the tip, camera frame, mm; NaN without a pose.
     rms : (N,) array
-        Root mean square residual of each image about its own pose, px; NaN without a
-        pose.
+        Root mean square residual of each image, px: of a used one in the joint fit, of
+        another about its own pose; NaN without a pose.
     leds_used : (N, L) array of bool
     geometry : GeometryFit
         The joint fit, with the LED geometry as far as the images tell it.
@@ -146,6 +146,7 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
     tips_cam[posed] = all_poses.rotations @ joint.tip_pen + all_poses.translations
     rms = np.full(n_images, np.nan)
     rms[posed] = all_poses.rms
+    rms[chosen] = joint.image_rms
     leds_used = np.zeros((n_images, n_leds), dtype=bool)
     leds_used[chosen] = joint.used
     corrected = replace(pen, leds=pen.leds + geometry.corrections)

@@ -6,11 +6,13 @@ Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable i
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
+from io import TextIOWrapper
 from pathlib import Path
 
 import cv2
@@ -36,12 +38,20 @@ from lightpen.report import (
 )
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
+BAR_WIDTH = 72  # characters
+NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
-    parser = _parser()
-    options = parser.parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
+    options = _parser().parse_args(
+        [f" {text}" if NEGATIVE_NUMBER.match(text) else text for text in given]
+    )
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a console may lack letters of a name
+            stream.reconfigure(errors="backslashreplace")
     cv2.setNumThreads(1)  # images are spread over threads, one each
     run: Callable[[argparse.Namespace], None] = options.run
     try:
@@ -80,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_calibrate)
     parser.add_argument(
-        "images", nargs="?", metavar="IMAGES", help="a folder, a pattern or a video"
+        "images", nargs="*", metavar="IMAGES", help="a folder, a pattern or a video"
     )
     parser.add_argument(
         "--centers",
@@ -173,7 +183,7 @@ def _add_pen_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _calibrate(options: argparse.Namespace) -> None:
-    if (options.images is None) == (options.centers is None):
+    if bool(options.images) == (options.centers is not None):
         raise UsageError("Give either IMAGES or --centers FILE.csv.")
     camera = read_camera(options.camera)
     nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
@@ -183,7 +193,7 @@ def _calibrate(options: argparse.Namespace) -> None:
         files: tuple[Path, ...] = (options.centers,)
         observations = observe_centers(centers, camera, pen)
     else:
-        source = find_images(options.images)
+        source = find_images(*options.images)
         files = source.files
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
@@ -260,9 +270,8 @@ def _progress(title: str) -> Iterator[Callable[[float], None]]:
         return
     from tqdm import tqdm
 
-    with tqdm(
-        total=1.0, desc=title, bar_format="{desc} {bar} {percentage:3.0f}%"
-    ) as bar:
+    layout = "{desc} {bar} {percentage:3.0f}%"
+    with tqdm(total=1.0, desc=title, bar_format=layout, ncols=BAR_WIDTH) as bar:
 
         def report(fraction: float) -> None:
             bar.update(fraction - bar.n)

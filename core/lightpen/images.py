@@ -50,19 +50,23 @@ class ImageSource:
     open: Callable[[], Iterator[Callable[[], Image]]]
 
 
-def find_images(where: str) -> ImageSource:
+def find_images(*places: str) -> ImageSource:
     """Find the images of a folder, a pattern such as ``swing/*.png``, or a video.
 
     Parameters
     ----------
-    where : str
-        Images are taken in the natural order of their names: 2 before 10.
+    *places : str
+        One folder, pattern or video, or several image files, as a shell makes them of
+        a pattern. Images are taken in the natural order of their names: 2 before 10.
 
     Raises
     ------
     FileError
         There is nothing there, or no image.
     """
+    if len(places) > 1:
+        return image_files(sorted(map(Path, places), key=_natural_order))
+    where = places[0]
     path = Path(where)
     if path.is_dir():
         files = [p for p in path.iterdir() if p.suffix.lower() in SUFFIXES]

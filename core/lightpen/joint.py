@@ -85,8 +85,16 @@ class JointFit:
     @property
     def rms(self) -> float:
         """Root mean square length of the residuals of used LEDs, px."""
-        squares = np.einsum("nli,nli->nl", self.residuals, self.residuals)
+        squares = np.sum(self.residuals**2, axis=2)
         return float(np.sqrt(np.mean(squares[self.used])))
+
+    @property
+    def image_rms(self) -> FloatArray:
+        """The same of each image, px, (N,); NaN where no LED is used."""
+        squares = np.sum(self.residuals**2, axis=2, where=self.used[..., None])
+        n_used = self.used.sum(axis=1)
+        means = squares.sum(axis=1) / np.maximum(n_used, 1)
+        return np.where(n_used > 0, np.sqrt(means), np.nan)
 
     @property
     def translations(self) -> FloatArray:

@@ -1,0 +1,309 @@
+"""Simulated stations from image to tip: hard scenes, other pens, swings that fail."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+Run = Callable[..., CompletedProcess[str]]
+Record = Callable[..., dict[str, Any]]
+Scene = Callable[..., Path]
+Truth = Callable[[Path], dict[str, Any]]
+
+HARD_SEEDS = ("1", "2", "3", "4", "5")
+OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")
+
+# Frames that tell nothing right about the tip. The simulator's flags are truth.
+USELESS = {"slipped", "blurred_away", "empty"}
+
+
+def tip_error_um(fields: dict[str, Any], truth: dict[str, Any]) -> float:
+    true_tip = np.array(truth["pen"]["tip_in_leds_csv_frame_bestfit"])
+    return 1000 * float(np.linalg.norm(np.array(fields["tip_pen_mm"]) - true_tip))
+
+
+def wrong_leds(fields: dict[str, Any], truth: dict[str, Any]) -> list[str]:
+    """Return the used LEDs that are not where the truth has them, in words."""
+    wrong = []
+    for frame, answer in zip(fields["frames"], truth["frames"], strict=True):
+        assert Path(frame["file"]).name == Path(answer["file"]).name
+        leds = {led["led"]: led for led in answer["leds"]}
+        for led in frame["leds"]:
+            true = leds[led["led"]]
+            away = np.hypot(
+                led["x_px"] - true["ellipse_center"][0],
+                led["y_px"] - true["ellipse_center"][1],
+            )
+            if led["used"] and (away > 1.5 or not true["visible"]):
+                wrong.append(
+                    f"{frame['file']} {answer['flags']} LED {led['led']}: "
+                    f"{away:.2f} px off, visible: {true['visible']}"
+                )
+    return wrong
+
+
+def calibrate_set(lightpen: Run, folder: Path, *options: str) -> CompletedProcess[str]:
+    return lightpen(
+        "calibrate", folder / "images",
+        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv", *options,
+    )  # fmt: skip
+
+
+def assert_refused(outcome: CompletedProcess[str], words: str) -> None:
+    """Assert status 1, no result, and a sentence with the words."""
+    assert outcome.returncode == 1, outcome.stdout
+    assert not outcome.stdout
+    assert re.search(words, outcome.stderr, re.IGNORECASE), outcome.stderr
+    assert outcome.stderr.rstrip().endswith(".")
+
+
+# What goes wrong at a station
+
+
+@pytest.fixture(params=HARD_SEEDS)
+def hard(request: pytest.FixtureRequest, scene: Scene) -> Path:
+    return scene("--scene", "hard", "--images", "50", "--seed", request.param)
+
+
+def test_a_hard_scene_holds_what_it_must(scene: Scene, truth: Truth) -> None:
+    flags = {
+        flag
+        for seed in HARD_SEEDS
+        for frame in truth(
+            scene("--scene", "hard", "--images", "50", "--seed", seed)
+        )["frames"]
+        for flag in frame["flags"]
+    }
+    assert flags >= USELESS | {"clutter", "fingers", "missing", "saturated"}
+
+
+def test_no_led_of_a_hard_scene_is_mislabelled(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    assert wrong_leds(record(hard), truth(hard)) == []
+
+
+def test_a_hard_scene_gives_the_tip_to_8_um(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    assert tip_error_um(record(hard), truth(hard)) <= 8.0
+
+
+def test_useless_images_of_a_hard_scene_are_dropped_with_their_reason(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    reasons = {}
+    for frame, answer in zip(
+        record(hard)["frames"], truth(hard)["frames"], strict=True
+    ):
+        assert frame["used"] != bool(frame["reason"])
+        for flag in USELESS.intersection(answer["flags"]):
+            reasons[flag] = frame["reason"]
+    words = {"slipped": "slip", "blurred_away": "blur", "empty": "empty|no LED"}
+    assert reasons, "the scene has no useless image, which makes this no test"
+    for flag, reason in reasons.items():
+        assert re.search(words[flag], reason, re.IGNORECASE), (flag, reason)
+
+
+def test_good_images_of_a_hard_scene_are_used(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    flags = {
+        frame["file"]: answer["flags"]
+        for frame, answer in zip(
+            record(hard)["frames"], truth(hard)["frames"], strict=True
+        )
+        if not frame["used"] and set(answer["flags"]) <= {"clutter", "dim"}
+    }
+    assert not flags
+
+
+def test_hard_images_in_any_order_give_the_same_labels(
+    scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
+) -> None:
+    folder = scene("--scene", "hard", "--images", "50", "--seed", "3")
+    mixed = tmp_path / "images"
+    mixed.mkdir()
+    answer = truth(folder)
+    order = np.random.default_rng(3).permutation(50)
+    for i, j in enumerate(order):
+        name = f"frame_{i + 1:04d}.png"
+        shutil.copy(folder / answer["frames"][j]["file"], mixed / name)
+    frames = [answer["frames"][j] | {"file": f"frame_{i + 1:04d}.png"}
+              for i, j in enumerate(order)]  # fmt: skip
+    file = tmp_path / "out.json"
+    outcome = lightpen(
+        "calibrate", mixed, "--camera", folder / "camera.yaml",
+        "--pen", folder / "leds.csv", "--json", file,
+    )  # fmt: skip
+    assert outcome.returncode == 0, outcome.stderr
+    fields = json.loads(file.read_text(encoding="utf-8"))
+    assert wrong_leds(fields, answer | {"frames": frames}) == []
+    assert tip_error_um(fields, answer) <= 8.0
+
+
+def test_images_without_any_pen_are_refused(
+    scene: Scene, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = scene("--images", "40", "--seed", "8")
+    images = tmp_path / "images"
+    images.mkdir()
+    noise = np.random.default_rng(8)
+    for i in range(6):
+        image = noise.integers(0, 40, (2048, 2448), dtype=np.uint8)
+        cv2.circle(image, (300 * i + 200, 900), 20, 255, -1)
+        (images / f"{i}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
+    outcome = lightpen(
+        "calibrate", images,
+        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
+    )  # fmt: skip
+    assert_refused(outcome, "image")
+
+
+# The image formats
+
+
+@pytest.mark.parametrize("bits", ["8", "12", "16"])
+def test_images_of_any_depth_give_the_tip_to_8_um(
+    bits: str, scene: Scene, record: Record, truth: Truth
+) -> None:
+    folder = scene("--bits", bits, "--images", "40", "--seed", "8")
+    image = cv2.imread(
+        str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED
+    )
+    assert image is not None
+    assert image.dtype == (np.uint8 if bits == "8" else np.uint16)
+    assert image.max() < 2 ** int(bits)
+    assert image.max() > 2 ** (int(bits) - 2)
+    assert tip_error_um(record(folder), truth(folder)) <= 8.0
+    assert wrong_leds(record(folder), truth(folder)) == []
+
+
+# Degenerate swings
+
+
+def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
+    scene: Scene, lightpen: Run
+) -> None:
+    for seed in ("1", "2", "3"):
+        folder = scene("--swing", "one-axis", "--images", "40", "--seed", seed)
+        outcome = calibrate_set(lightpen, folder)
+        assert_refused(outcome, r"(axis|direction).*(tilt|lean|swing|swung|turn)"
+                                r"|(tilt|lean|swing|swung|turn).*(axis|direction)")  # fmt: skip
+
+
+def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
+    scene: Scene, lightpen: Run
+) -> None:
+    for seed in ("1", "2", "3"):
+        folder = scene("--swing", "upright", "--images", "40", "--seed", seed)
+        outcome = calibrate_set(lightpen, folder)
+        assert_refused(outcome, "tilt|lean")
+
+
+@pytest.mark.parametrize("method", ["joint", "two-stage"])
+def test_degenerate_swings_are_refused_by_either_method(
+    method: str, scene: Scene, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = scene("--swing", "one-axis", "--images", "40", "--seed", "1")
+    file = tmp_path / "out.json"
+    outcome = calibrate_set(lightpen, folder, "--method", method, "--json", str(file))
+    assert outcome.returncode == 1
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("n_images", [1, 2, 3])
+def test_too_few_images_are_refused_and_more_asked_for(
+    n_images: int, scene: Scene, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = scene("--images", "40", "--seed", "8")
+    images = tmp_path / "images"
+    images.mkdir()
+    for path in sorted((folder / "images").iterdir())[:n_images]:
+        shutil.copy(path, images)
+    outcome = lightpen(
+        "calibrate", images,
+        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
+    )  # fmt: skip
+    assert_refused(outcome, rf"\b({n_images}|one|two|three)\b.*image|image.*{n_images}")
+
+
+def test_one_image_again_and_again_is_refused(
+    scene: Scene, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = scene("--images", "40", "--seed", "8")
+    images = tmp_path / "images"
+    images.mkdir()
+    for i in range(20):
+        shutil.copy(folder / "images" / "frame_0001.png", images / f"{i}.png")
+    outcome = lightpen(
+        "calibrate", images,
+        "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv",
+    )  # fmt: skip
+    assert_refused(outcome, "tilt|lean|alike|same")
+
+
+# Other pens
+
+
+@pytest.mark.parametrize("seed", ["1", "2"])
+@pytest.mark.parametrize("pen", OTHER_PENS)
+def test_another_layout_gives_its_tip_or_is_refused(
+    pen: str, seed: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
+) -> None:
+    folder = scene("--pen", pen, "--images", "40", "--seed", seed)
+    file = tmp_path / "out.json"
+    outcome = calibrate_set(lightpen, folder, "--json", str(file))
+    if outcome.returncode == 1:
+        assert_refused(outcome, "pen|LED")
+        return
+    assert outcome.returncode == 0, outcome.stderr
+    fields = json.loads(file.read_text(encoding="utf-8"))
+    assert wrong_leds(fields, truth(folder)) == []
+    assert tip_error_um(fields, truth(folder)) <= 15.0  # fewer LEDs tell less
+
+
+@pytest.mark.parametrize("pen", OTHER_PENS)
+def test_clutter_and_missing_leds_never_mislabel_another_layout(
+    pen: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
+) -> None:
+    folder = scene("--pen", pen, "--scene", "hard", "--images", "40", "--seed", "6")
+    file = tmp_path / "out.json"
+    outcome = calibrate_set(lightpen, folder, "--json", str(file))
+    if outcome.returncode == 1:
+        assert_refused(outcome, "pen|LED|image")
+        return
+    fields = json.loads(file.read_text(encoding="utf-8"))
+    assert wrong_leds(fields, truth(folder)) == []
+
+
+def test_one_other_layout_at_least_is_calibrated(
+    scene: Scene, lightpen: Run
+) -> None:
+    statuses = {
+        pen: calibrate_set(
+            lightpen, scene("--pen", pen, "--images", "40", "--seed", "1")
+        ).returncode
+        for pen in ("eight", "fanned")
+    }
+    assert statuses == {"eight": 0, "fanned": 0}
+
+
+@pytest.mark.parametrize("pen", OTHER_PENS)
+def test_the_file_of_another_pen_is_refused(
+    pen: str, scene: Scene, lightpen: Run
+) -> None:
+    images = scene("--images", "40", "--seed", "8")
+    other = scene("--pen", pen, "--images", "40", "--seed", "1")
+    outcome = lightpen(
+        "calibrate", images / "images",
+        "--camera", images / "camera.yaml", "--pen", other / "leds.csv",
+    )  # fmt: skip
+    assert_refused(outcome, "pen")
