@@ -5,6 +5,7 @@ Pinhole pixels are the undistorted normalised plane times the focal length.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,26 +31,40 @@ class Sight:
         Centres of the merged and cut spots, `FAR` elsewhere.
     shapes : (B, N, 2, 2) array
         Covariances of the areas.
-    rays : (B, N, 3) array
-        Unit vectors to the spots.
-    ranges : (B, N) array
-        Distances, mm, at which discs of the pen look as large as the spots.
     usable : (B, N) array
+    radius : float
+        Radius of the discs of the pen, mm.
     """
 
     pinhole: Camera
     points: FloatArray
     unwhole_points: FloatArray
     shapes: FloatArray
-    rays: FloatArray
-    ranges: FloatArray
     usable: BoolArray
+    radius: float
+
+    @cached_property
+    def rays(self) -> FloatArray:
+        """Unit vectors to the usable spots, (B, N, 3)."""
+        rays = np.ones((*self.usable.shape, 3))
+        rays[..., :2] = self.points / self.pinhole.fx
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        return rays
+
+    @cached_property
+    def ranges(self) -> FloatArray:
+        """Distances of the usable spots, if they are discs of the pen, (B, N), mm."""
+        ranges = np.full(self.usable.shape, np.inf)
+        points = self.points[self.usable] / self.pinhole.fx
+        shapes = self.shapes[self.usable] / self.pinhole.fx**2
+        ranges[self.usable] = _ranges(points, shapes, self.radius)
+        return ranges
 
 
 def sight_of(
     spots: Sequence[Spots], camera: Camera, radius: float, use_unwhole: bool = False
 ) -> Sight:
-    """Return the spots of images, undistorted, with the distance each suggests.
+    """Return the spots of images, undistorted.
 
     Parameters
     ----------
@@ -74,20 +89,13 @@ def sight_of(
     shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ np.swapaxes(J, 1, 2)
     unwhole = flaws & UNWHOLE != 0
     usable = there & (use_unwhole | ~unwhole)
-    rays = np.zeros((*there.shape, 3))
-    rays[..., 2] = 1
-    rays[there, :2] = plane.points
-    stretch = np.linalg.norm(rays, axis=-1)
-    ranges = np.full(there.shape, np.inf)
-    ranges[there] = _ranges(rays[there, :2], shapes[there] / focal**2, radius)
     return Sight(
         pinhole=Camera(camera.width, camera.height, focal, focal, 0.0, 0.0),
         points=np.where(usable[..., None], points, FAR),
         unwhole_points=np.where(unwhole[..., None], points, FAR),
         shapes=shapes,
-        rays=rays / stretch[..., None],
-        ranges=ranges,
         usable=usable,
+        radius=radius,
     )
 
 
