@@ -1,0 +1,62 @@
+"""Time as a source of images sees it: the machine's, or one that skips every wait."""
+
+import time
+from threading import Event, Lock
+from typing import Protocol
+
+
+class Clock(Protocol):
+    """What tells the time and waits."""
+
+    @property
+    def is_real(self) -> bool:
+        """Whether time goes on while nobody waits."""
+
+    def now_ns(self) -> int:
+        """Return a time that never goes back, ns from an arbitrary start."""
+
+    def wait(self, seconds: float, wake: Event | None = None) -> bool:
+        """Wait, or until ``wake`` is set; return whether it is."""
+
+
+class MachineClock:
+    """The monotonic clock of the machine."""
+
+    is_real = True
+
+    def now_ns(self) -> int:
+        """Return the monotonic time, ns."""
+        return time.monotonic_ns()
+
+    def wait(self, seconds: float, wake: Event | None = None) -> bool:
+        """Wait, or until ``wake`` is set; return whether it is."""
+        if wake is not None:
+            return wake.wait(seconds)
+        time.sleep(seconds)
+        return False
+
+
+class SkippingClock:
+    """A clock that goes on only when somebody waits, and then at once.
+
+    With it a simulated hour takes as long as its images take to make, and the same
+    calls give the same images.
+    """
+
+    is_real = False
+
+    def __init__(self) -> None:
+        self._now_ns = 0
+        self._lock = Lock()
+
+    def now_ns(self) -> int:
+        """Return the sum of all waits, ns."""
+        return self._now_ns
+
+    def wait(self, seconds: float, wake: Event | None = None) -> bool:
+        """Let ``seconds`` pass unless ``wake`` is set; return whether it is."""
+        if wake is not None and wake.is_set():
+            return True
+        with self._lock:
+            self._now_ns += round(seconds * 1e9)
+        return False

@@ -1,0 +1,115 @@
+"""How a hand moves: after a goal, with tremor, or in an endless swing.
+
+A hand goes after a goal x* with a limited speed and a lag,
+
+    x'' = (w - x') / lag,    w = x*' + clip(gain (x* - x), top speed),
+
+which is a damping of ``1 / (2 sqrt(gain lag))``: 0.8 overshoots by some two per cent.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.simulator.postures import TREMOR_BAND, Postures, operator_postures
+
+STEP = 0.01  # s
+STEPS_PER_PIECE = 100  # of a swing, computed at once
+
+
+@dataclass(frozen=True)
+class Pursuit:
+    """How a goal is gone after.
+
+    Attributes
+    ----------
+    gain : float
+        1/s.
+    lag : float
+        s.
+    top_speed : float
+        rad/s or mm/s.
+    """
+
+    gain: float
+    lag: float
+    top_speed: float
+
+
+class Tremor:
+    """Three smooth random functions of time with unit variance."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rates = 2 * np.pi * rng.uniform(*TREMOR_BAND, (3, 4))
+        self._phases = rng.uniform(0, 2 * np.pi, (3, 4))
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return them at times (F,), shape (F, 3)."""
+        waves = np.sin(times[:, None, None] * self._rates + self._phases)
+        return np.asarray(waves.sum(axis=-1) / np.sqrt(2))
+
+
+def pursue(
+    place: FloatArray,
+    rate: FloatArray,
+    goal: FloatArray,
+    goal_rate: FloatArray,
+    pursuit: Pursuit,
+) -> tuple[FloatArray, FloatArray]:
+    """Return place and rate of a hand one `STEP` on.
+
+    Parameters
+    ----------
+    place, rate : (3,) array
+        Now, rad and rad/s, or mm and mm/s.
+    goal, goal_rate : (3,) array
+        What it goes after, and how that moves.
+    pursuit : Pursuit
+    """
+    wish = pursuit.gain * (goal - place)
+    speed = float(np.linalg.norm(wish))
+    if speed > pursuit.top_speed:
+        wish *= pursuit.top_speed / speed
+    rate = rate + STEP / pursuit.lag * (goal_rate + wish - rate)
+    return place + STEP * rate, rate
+
+
+def swing_at(seed: int, step: int) -> tuple[FloatArray, FloatArray]:
+    """Return the lean of an endless swing and its rate, (3,) each, rad and rad/s.
+
+    Parameters
+    ----------
+    seed : int
+        Chooses the swing, see `lightpen.simulator.postures.operator_postures`.
+    step : int
+        `STEP` s each, from the start of the clock.
+    """
+    piece, i = divmod(step, STEPS_PER_PIECE)
+    leans = _swing_piece(seed, piece)
+    return leans[i], (leans[i + 1] - leans[i]) / STEP
+
+
+@lru_cache(maxsize=4)
+def _swing_piece(seed: int, piece: int) -> FloatArray:
+    steps = piece * STEPS_PER_PIECE + np.arange(STEPS_PER_PIECE + 1.0)
+    postures = operator_postures(steps * STEP, seed)
+    return lean_vectors(postures.tilts, postures.directions, postures.rolls)
+
+
+def lean_vectors(
+    tilt: FloatArray | float, direction: FloatArray | float, turn: FloatArray | float
+) -> FloatArray:
+    """Return postures as vectors that are smooth through upright, (..., 3), rad.
+
+    The tilt to the right, the tilt away from the camera, and the turn.
+    """
+    lean = [tilt * np.cos(direction), tilt * np.sin(direction), turn]
+    return np.stack([np.asarray(part, dtype=np.float64) for part in lean], axis=-1)
+
+
+def postures_of(leans: FloatArray) -> Postures:
+    """Return the postures of such vectors, (F, 3), rad."""
+    sideways, away, turns = leans.T
+    return Postures(np.hypot(sideways, away), np.arctan2(away, sideways), turns)

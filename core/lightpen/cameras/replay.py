@@ -1,0 +1,274 @@
+"""Recorded images as a live camera, at the rate they were taken or as fast as asked."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from math import inf
+from pathlib import Path
+
+from lightpen.arrays import Image
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.protocol import (
+    Caps,
+    ConfigError,
+    DeviceInfo,
+    DeviceNotFound,
+    EndOfImages,
+    Frame,
+    FrameIncomplete,
+    FrameTimeout,
+    Range,
+    Settings,
+    Stats,
+    sealed,
+)
+from lightpen.errors import FileError
+from lightpen.images import ImageSource, find_images
+
+FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
+USUAL_FRAME_RATE = 20.0
+IMAGE_FOLDER = "images"
+
+
+def find_recording(where: str) -> ImageSource:
+    """Find the images of a folder, its subfolder ``images``, a pattern or a video.
+
+    Raises
+    ------
+    FileError
+        There are none.
+    """
+    inner = Path(where) / IMAGE_FOLDER
+    return find_images(str(inner) if inner.is_dir() else where)
+
+
+class ReplayCamera:
+    """Images of a source, one after the other, then the end.
+
+    Each start begins with the first image. No image is lost, however late it is read.
+
+    Parameters
+    ----------
+    where : str
+        Folder, pattern or video; the serial number of this camera.
+    find : callable, optional
+        Returns the images; by default `find_recording` looks ``where``.
+    frame_rate : float
+        1/s, at which the images come at most; `math.inf` for as fast as asked.
+    loops : bool
+        Whether the first image follows the last.
+    clock : Clock, optional
+    """
+
+    def __init__(
+        self,
+        where: str,
+        find: Callable[[], ImageSource] | None = None,
+        *,
+        frame_rate: float = USUAL_FRAME_RATE,
+        loops: bool = False,
+        clock: Clock | None = None,
+    ) -> None:
+        self._where = where
+        self._find = find or partial(find_recording, where)
+        self._frame_rate = FRAME_RATE.nearest(frame_rate)
+        self._loops = loops
+        self._clock = clock or MachineClock()
+        self._stats = Stats()
+        self._next_seq = 0
+        self._next_due_ns = 0
+        self._source: ImageSource | None = None
+        self._caps: Caps | None = None
+        self._loaders: Iterator[Callable[[], Image]] | None = None
+
+    @property
+    def serial(self) -> str:
+        """Where the images are."""
+        return self._where
+
+    @property
+    def caps(self) -> Caps:
+        """What the camera can do."""
+        if self._caps is None:
+            raise ValueError("The camera is not open: call `open` first.")
+        return self._caps
+
+    def open(self) -> None:
+        """Find the images; nothing if it is open."""
+        if self._caps is not None:
+            return
+        try:
+            source = self._find()
+            first = _first_image(source, self._where)
+        except FileError as error:
+            raise DeviceNotFound(str(error)) from error
+        height, width = first.shape
+        self._source = source
+        self._caps = Caps(
+            width=width,
+            height=height,
+            pixel_formats=(f"Mono{8 * first.itemsize}",),
+            frame_rate=FRAME_RATE,
+            waits=True,
+        )
+
+    def close(self) -> None:
+        """Stop and forget the images."""
+        self.stop()
+        self._caps = self._source = None
+
+    def configure(self, settings: Settings) -> Settings:
+        """Set the frame rate before the start; return what is in force."""
+        (pixel_format,) = self.caps.pixel_formats
+        if self._loaders is not None:
+            raise ValueError("`configure` needs a stopped camera.")
+        if settings.pixel_format not in {None, pixel_format}:
+            raise ConfigError(
+                f"The recorded images are {pixel_format}, not "
+                f"{settings.pixel_format}. Choose {pixel_format}."
+            )
+        if settings.triggered:
+            raise _no_trigger()
+        if settings.frame_rate is not None:
+            self._frame_rate = FRAME_RATE.nearest(settings.frame_rate)
+        return Settings(frame_rate=self._frame_rate, pixel_format=pixel_format)
+
+    def set_exposure(self, exposure_us: float) -> float:
+        """Refuse: the images are taken."""
+        raise _already_taken("exposure")
+
+    def set_gain(self, gain_db: float) -> float:
+        """Refuse: the images are taken."""
+        raise _already_taken("gain")
+
+    def start(self) -> None:
+        """Let images come from the first on; nothing if they do."""
+        self.probe()
+        if self._loaders is None:
+            self._loaders = self._open_source()
+            self._next_due_ns = self._clock.now_ns()
+
+    def stop(self) -> None:
+        """Let no more images come; nothing if none do."""
+        self._loaders = None
+
+    def read(self, timeout_s: float) -> Frame:
+        """Return the next image, decoded now."""
+        if self._loaders is None:
+            raise ValueError("The camera delivers no images: call `start` first.")
+        self._await_turn(timeout_s)
+        frame = self._decode(self._next_loader())
+        self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
+        return frame
+
+    def trigger(self) -> None:
+        """Refuse: the images are taken."""
+        raise _no_trigger()
+
+    def probe(self) -> None:
+        """Do nothing: files are looked at when they are read."""
+        if self._caps is None:
+            raise ValueError("The camera is not open: call `open` first.")
+
+    def stats(self) -> Stats:
+        """Return what became of the images so far."""
+        return self._stats
+
+    def _open_source(self) -> Iterator[Callable[[], Image]]:
+        if self._source is None:
+            raise ValueError("The camera is not open: call `open` first.")
+        return self._source.open()
+
+    def _await_turn(self, timeout_s: float) -> None:
+        """Wait until it is time for the next image."""
+        wait_s = (self._next_due_ns - self._clock.now_ns()) * 1e-9
+        if wait_s > timeout_s:
+            self._clock.wait(timeout_s)
+            self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
+            raise FrameTimeout(
+                f"The next image of {self._where} comes {wait_s - timeout_s:.1f} s "
+                "later. Wait, or replay the images faster."
+            )
+        if wait_s > 0:
+            self._clock.wait(wait_s)
+
+    def _next_loader(self) -> Callable[[], Image]:
+        """Return the loader of the next image and set the time of the one after."""
+        loaders = self._loaders or iter(())
+        loader = next(loaders, None)
+        if loader is None and self._loops:
+            self._loaders = self._open_source()
+            loader = next(self._loaders, None)
+        if loader is None:
+            raise EndOfImages
+        on_schedule = self._next_due_ns + round(1e9 / self._frame_rate)
+        self._next_due_ns = max(on_schedule, self._clock.now_ns())
+        return loader
+
+    def _decode(self, loader: Callable[[], Image]) -> Frame:
+        seq = self._next_seq
+        self._next_seq += 1
+        try:
+            image = loader()
+            _check_like_first(image, seq, self.caps)
+        except FileError as error:
+            self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
+            raise FrameIncomplete(str(error)) from error
+        return Frame(
+            image=sealed(image),
+            seq=seq,
+            host_ts_ns=self._clock.now_ns(),
+            pixel_format=self.caps.pixel_formats[0],
+            bits=8 * image.itemsize,
+        )
+
+
+class ReplayBackend:
+    """Recorded images among the ways of getting at cameras."""
+
+    name = "recorded"
+
+    def available(self) -> str | None:
+        """Return None: it always can be used."""
+        return None
+
+    def discover(self) -> tuple[DeviceInfo, ...]:
+        """Return nothing: the user names the images."""
+        return ()
+
+    def camera(self, serial: str) -> ReplayCamera:
+        """Return the images of a folder, a pattern or a video, not yet opened."""
+        return ReplayCamera(serial)
+
+
+def _first_image(source: ImageSource, where: str) -> Image:
+    for loader in source.open():
+        return loader()
+    raise FileError(f"{where} holds no images. Choose a recording that holds some.")
+
+
+def _check_like_first(image: Image, seq: int, caps: Caps) -> None:
+    height, width = image.shape
+    if (width, height) != (caps.width, caps.height):
+        raise FileError(
+            f"Image {seq + 1} is {width} x {height} px, the first one is {caps.width} "
+            f"x {caps.height} px. Replay only images of one camera together."
+        )
+    if f"Mono{8 * image.itemsize}" not in caps.pixel_formats:
+        raise FileError(
+            f"Image {seq + 1} has {8 * image.itemsize} bits, the first one is "
+            f"{caps.pixel_formats[0]}. Replay only images of one camera together."
+        )
+
+
+def _already_taken(what: str) -> ConfigError:
+    return ConfigError(
+        f"The {what} of recorded images cannot be changed. Choose a live camera."
+    )
+
+
+def _no_trigger() -> ConfigError:
+    return ConfigError(
+        "Recorded images cannot be triggered. Switch the trigger off, or choose a "
+        "live camera."
+    )

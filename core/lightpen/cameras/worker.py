@@ -1,0 +1,401 @@
+"""The one thread that owns a camera: it reads, watches, and reconnects.
+
+Every call of the camera is made in this thread. Frames leave it two ways: through a box
+for the newest one, for showing, and through a queue that loses nothing, for measuring.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+from typing import TypeAlias
+
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.mailbox import FrameQueue, Mailbox
+from lightpen.cameras.protocol import (
+    CameraFailure,
+    ConfigError,
+    DeviceBusy,
+    DeviceLost,
+    DeviceNotFound,
+    EndOfImages,
+    Frame,
+    FrameIncomplete,
+    FramesSkipped,
+    FrameTimeout,
+    ImageCamera,
+    Settings,
+    Stats,
+)
+from lightpen.errors import LightpenError
+
+N_QUEUED = 16  # frames of 5 MB: 0.8 s at 20 a second
+QUIET_PERIODS = 3
+LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is there
+LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
+LONGEST_READ = 2.0  # s, after which requests are served at the latest
+BUSY_PAUSE = 0.5  # s
+# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
+LONGEST_BUSY = 4.0  # s
+BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
+REQUEST_PAUSE = 0.5  # s between probes of a camera that waits for a trigger
+LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
+
+
+class Connection(Enum):
+    """How a camera and its worker get on."""
+
+    OPENING = auto()
+    STREAMING = auto()
+    SILENT = auto()
+    LOST = auto()
+    CLOSED = auto()
+
+
+@dataclass(frozen=True)
+class FrameReady:
+    """A frame lies in the box, which was empty before."""
+
+
+@dataclass(frozen=True)
+class ConnectionChanged:
+    """The camera is in another state."""
+
+    connection: Connection
+
+
+@dataclass(frozen=True)
+class SettingsApplied:
+    """The camera has these settings in force."""
+
+    settings: Settings
+
+
+@dataclass(frozen=True)
+class Troubled:
+    """Something went wrong; the worker carries on."""
+
+    error: CameraFailure
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Something went wrong that ended the worker."""
+
+    error: LightpenError
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The camera has no more images, which ended the worker."""
+
+
+WorkerEvent: TypeAlias = (
+    FrameReady | ConnectionChanged | SettingsApplied | Troubled | Failed | Ended
+)
+
+
+class CameraWorker:
+    """Runs a camera in a thread of its own.
+
+    Parameters
+    ----------
+    camera : ImageCamera
+        Not open yet. Nobody else may call it any more.
+    settings : Settings
+        To be applied, again at each reconnection.
+    on_event : callable
+        Called in the thread of the worker with what happens; must return at once and
+        not call `stop`.
+    clock : Clock, optional
+        The one that the camera goes by.
+    n_queued : int
+        Frames that wait to be measured at most.
+    """
+
+    def __init__(
+        self,
+        camera: ImageCamera,
+        settings: Settings,
+        on_event: Callable[[WorkerEvent], None],
+        *,
+        clock: Clock | None = None,
+        n_queued: int = N_QUEUED,
+    ) -> None:
+        self._camera = camera
+        self._settings = settings
+        self._applied = settings
+        self._on_event = on_event
+        self._clock = clock or MachineClock()
+        self._mailbox = Mailbox()
+        self._queue = FrameQueue(n_queued)
+        self._requests: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._stopping = Event()
+        self._measures = Event()
+        self._thread = Thread(target=self._run, name="camera", daemon=True)
+        self._connection: Connection | None = None
+        self._stats = Stats()
+        self._n_skipped = 0
+        self._is_full = False
+        self._heard_ns = 0
+        self._n_triggered = 0
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the camera."""
+        return self._camera.serial
+
+    @property
+    def stats(self) -> Stats:
+        """What became of the images up to the last one."""
+        return self._stats
+
+    def start(self) -> None:
+        """Open the camera and let images come; once only."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float = LONGEST_STOP) -> None:
+        """Close the camera and end the thread.
+
+        Raises
+        ------
+        DeviceLost
+            The camera did not come back from a call within ``timeout_s``.
+        """
+        self._stopping.set()
+        self._requests.put(_wake)
+        self._queue.end()
+        if self._thread.ident is None:
+            return
+        self._thread.join(timeout_s)
+        if self._thread.is_alive():
+            raise DeviceLost(
+                f"The camera {self.serial} did not stop within {timeout_s:.0f} s. "
+                "Unplug it, and start the program again before you use it."
+            )
+
+    def latest(self) -> Frame | None:
+        """Return the newest frame if it was not yet taken, for showing."""
+        return self._mailbox.take()
+
+    def measure(self, measures: bool) -> None:
+        """Begin or stop to queue every frame for `next_frame`."""
+        if measures and not self._measures.is_set():
+            self._queue.clear()
+            self._measures.set()
+        elif not measures:
+            self._measures.clear()
+
+    def next_frame(self, timeout_s: float) -> Frame:
+        """Return the oldest queued frame, for measuring.
+
+        Raises
+        ------
+        FrameTimeout
+            None came in ``timeout_s``.
+        EndOfImages
+            None will come: the images or the worker ended.
+        """
+        return self._queue.take(timeout_s)
+
+    def configure(self, settings: Settings) -> None:
+        """Ask for other settings; images come anew, those of a file from the first."""
+        self._requests.put(lambda: self._configure(settings))
+
+    def set_exposure(self, exposure_us: float) -> None:
+        """Ask for another exposure while images come."""
+        self._requests.put(lambda: self._set_exposure(exposure_us))
+
+    def set_gain(self, gain_db: float) -> None:
+        """Ask for another gain while images come."""
+        self._requests.put(lambda: self._set_gain(gain_db))
+
+    def trigger(self) -> None:
+        """Ask for one image of a triggered camera."""
+        self._requests.put(self._trigger)
+
+    def _run(self) -> None:
+        try:
+            self._open_first()
+            while not self._stopping.is_set():
+                self._serve()
+        except EndOfImages:
+            self._on_event(Ended())
+        except LightpenError as error:
+            self._on_event(Failed(error))
+        finally:
+            self._camera.close()
+            self._queue.end()
+            self._change(Connection.CLOSED)
+
+    def _serve(self) -> None:
+        """Run the camera for one image, or reconnect."""
+        try:
+            self._serve_requests(waits=self._awaits_trigger)
+            if self._awaits_trigger:
+                self._camera.probe()
+            elif not self._stopping.is_set():
+                self._read()
+        except DeviceLost as error:
+            self._on_event(Troubled(error))
+            self._reconnect()
+
+    def _read(self) -> None:
+        try:
+            frame = self._camera.read(min(self._quiet_time(), LONGEST_READ))
+        except FrameTimeout:
+            self._watch()
+            return
+        except FrameIncomplete as error:
+            self._hear()
+            self._on_event(Troubled(error))
+        else:
+            self._hear()
+            self._change(Connection.STREAMING)
+            self._deliver(frame)
+        self._n_triggered = max(self._n_triggered - 1, 0)
+
+    def _deliver(self, frame: Frame) -> None:
+        if self._mailbox.put(frame):
+            self._on_event(FrameReady())
+        if self._measures.is_set():
+            self._enqueue(frame)
+        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+
+    def _enqueue(self, frame: Frame) -> None:
+        if self._camera.caps.waits:
+            self._queue.put(frame)
+        elif self._queue.offer(frame):
+            self._is_full = False
+        elif not self._stopping.is_set():
+            self._n_skipped += 1
+            if not self._is_full:
+                self._is_full = True
+                self._on_event(Troubled(_too_slow(frame)))
+
+    def _quiet_time(self) -> float:
+        """Return how long no image may come before the camera is probed, s."""
+        rate, exposure_us = self._applied.frame_rate, self._applied.exposure_us
+        period = 1 / rate if rate else 0.0
+        exposure = (exposure_us or 0.0) * 1e-6
+        return max(QUIET_PERIODS * period + exposure, LEAST_QUIET)
+
+    def _watch(self) -> None:
+        """Find out whether a camera that sent nothing for long is still there."""
+        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        silence = round((self._clock.now_ns() - self._heard_ns) * 1e-9, 3)
+        if silence >= self._quiet_time():
+            self._change(Connection.SILENT)
+        if silence >= max(LONGEST_SILENCE, 2 * self._quiet_time()):
+            raise DeviceLost(
+                f"The camera {self.serial} sent no image for {silence:.0f} s. Check "
+                "its cable and its power."
+            )
+        self._camera.probe()
+
+    def _hear(self) -> None:
+        self._heard_ns = self._clock.now_ns()
+
+    def _open_first(self) -> None:
+        """Open the camera, waiting a little for another program to let go of it."""
+        self._change(Connection.OPENING)
+        limit_ns = self._clock.now_ns() + round(LONGEST_BUSY * 1e9)
+        while True:
+            try:
+                self._connect()
+                return
+            except DeviceBusy:
+                if self._clock.now_ns() >= limit_ns:
+                    raise
+            if self._clock.wait(BUSY_PAUSE, self._stopping):
+                return
+
+    def _reconnect(self) -> None:
+        """Open the camera anew until it succeeds or the worker is stopped."""
+        self._change(Connection.LOST)
+        n_attempts = 0
+        while True:
+            self._camera.close()
+            pause = BACK_OFF[min(n_attempts, len(BACK_OFF) - 1)]
+            if self._clock.wait(pause, self._stopping):
+                return
+            n_attempts += 1
+            try:
+                self._connect()
+                return
+            except (DeviceNotFound, DeviceBusy, DeviceLost):
+                continue
+
+    def _connect(self) -> None:
+        self._camera.open()
+        self._begin(self._settings)
+
+    def _begin(self, settings: Settings) -> None:
+        self._applied = self._camera.configure(settings)
+        self._settings = settings
+        self._camera.start()
+        self._n_triggered = 0
+        self._hear()
+        self._on_event(SettingsApplied(self._applied))
+        self._change(Connection.STREAMING)
+
+    @property
+    def _awaits_trigger(self) -> bool:
+        return self._applied.triggered and self._n_triggered == 0
+
+    def _serve_requests(self, waits: bool) -> None:
+        """Fulfil what was asked for; ``waits`` a little for the first request."""
+        while True:
+            try:
+                request = self._requests.get(waits, REQUEST_PAUSE)
+            except Empty:
+                return
+            waits = False
+            try:
+                request()
+            except ConfigError as error:
+                self._on_event(Troubled(error))
+
+    def _configure(self, settings: Settings) -> None:
+        self._camera.stop()
+        try:
+            self._begin(settings)
+        except ConfigError as error:
+            self._on_event(Troubled(error))
+            self._begin(self._settings)
+
+    def _set_exposure(self, exposure_us: float) -> None:
+        applied = self._camera.set_exposure(exposure_us)
+        self._settings = replace(self._settings, exposure_us=applied)
+        self._apply(replace(self._applied, exposure_us=applied))
+
+    def _set_gain(self, gain_db: float) -> None:
+        applied = self._camera.set_gain(gain_db)
+        self._settings = replace(self._settings, gain_db=applied)
+        self._apply(replace(self._applied, gain_db=applied))
+
+    def _apply(self, applied: Settings) -> None:
+        self._applied = applied
+        self._on_event(SettingsApplied(applied))
+
+    def _trigger(self) -> None:
+        self._camera.trigger()
+        self._n_triggered += 1
+        self._hear()
+
+    def _change(self, connection: Connection) -> None:
+        if connection is not self._connection:
+            self._connection = connection
+            self._on_event(ConnectionChanged(connection))
+
+
+def _wake() -> None:
+    """Do nothing: the request that ends a wait for requests."""
+
+
+def _too_slow(frame: Frame) -> FramesSkipped:
+    return FramesSkipped(
+        f"This computer is too slow: image {frame.seq} and some after it were not "
+        "measured. Close other programs, or lower the frame rate."
+    )
