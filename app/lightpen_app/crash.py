@@ -1,0 +1,129 @@
+"""What happens when the program meets a bug of its own: a report, and on it goes.
+
+An exception that nobody caught does not end the program: what was captured is on the
+disk, and the operator is told in one sentence. A crash inside a library, which ends
+the program, leaves its trace in a file that the next report points to.
+"""
+
+import faulthandler
+import platform
+import sys
+import threading
+import traceback
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import TracebackType
+
+from PySide6.QtCore import QObject, Signal, qVersion
+
+PACKAGES = (
+    "lightpen",
+    "PySide6_Essentials",
+    "pyqtgraph",
+    "numpy",
+    "scipy",
+    "opencv-python-headless",
+)
+MAX_REPORTS = 20  # of one run; a bug in a paint event would fill the disk
+NATIVE_FILE = "library-crash.txt"
+
+
+class CrashHook(QObject):
+    """Writes a report of every uncaught exception, of each kind once.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the reports go; it is made when it is needed.
+
+    Signals
+    -------
+    reported(str)
+        Path of the report, or "" if the disk took none. Emitted on any thread;
+        connected objects of the GUI get it on theirs.
+    """
+
+    reported = Signal(str)
+
+    def __init__(self, folder: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._seen: set[str] = set()
+        self._previous = sys.excepthook, threading.excepthook
+
+    def install(self) -> None:
+        """Take over exceptions that nobody caught, on every thread."""
+        self._previous = sys.excepthook, threading.excepthook
+        sys.excepthook = self.report
+        threading.excepthook = self._report_thread
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            # The file stays open: a crashing process cannot open one.
+            self._native = (self._folder / NATIVE_FILE).open("a", encoding="utf-8")
+        except OSError:
+            return  # without a folder there is nothing to write to
+        faulthandler.enable(self._native)
+
+    def remove(self) -> None:
+        """Give the hooks back."""
+        sys.excepthook, threading.excepthook = self._previous
+        if faulthandler.is_enabled() and hasattr(self, "_native"):
+            faulthandler.disable()
+            self._native.close()
+
+    def report(
+        self,
+        kind: type[BaseException],
+        error: BaseException,
+        trace: TracebackType | None,
+    ) -> None:
+        """Write a report, unless the same one was written in this run."""
+        if issubclass(kind, KeyboardInterrupt):
+            sys.__excepthook__(kind, error, trace)
+            return
+        text = "".join(traceback.format_exception(kind, error, trace))
+        with self._lock:
+            if text in self._seen or len(self._seen) >= MAX_REPORTS:
+                return
+            self._seen.add(text)
+            number = len(self._seen)
+        if sys.stderr is not None:
+            sys.stderr.write(text)
+        self.reported.emit(self._write(text, number))
+
+    def _report_thread(self, arguments: threading.ExceptHookArgs) -> None:
+        if arguments.exc_value is not None:
+            self.report(
+                arguments.exc_type, arguments.exc_value, arguments.exc_traceback
+            )
+
+    def _write(self, text: str, number: int) -> str:
+        now = datetime.now().astimezone()
+        path = self._folder / f"crash-{now:%Y%m%d-%H%M%S}-{number}.txt"
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            path.write_text(f"{_circumstances(now)}\n\n{text}", encoding="utf-8")
+        except OSError:
+            return ""
+        return str(path)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what the program is made of, by name."""
+    found = {"Python": platform.python_version(), "Qt": qVersion()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _circumstances(now: datetime) -> str:
+    lines = [f"time: {now.isoformat(timespec='seconds')}"]
+    lines.append(f"system: {platform.platform()}")
+    lines.extend(f"{name}: {number}" for name, number in versions().items())
+    lines.append(f"thread: {threading.current_thread().name}")
+    return "\n".join(lines)

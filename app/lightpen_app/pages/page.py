@@ -1,0 +1,119 @@
+"""What every page of the wizard has: a step's title, its rules and its main action."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QEvent, Signal
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+
+@dataclass(frozen=True)
+class MainAction:
+    """The main button of a page.
+
+    Attributes
+    ----------
+    text : str
+        What it does, a verb first.
+    why_not : str
+        Why it cannot be pressed now; empty when it can. The reason is shown.
+    """
+
+    text: str
+    why_not: str = ""
+
+
+class Page(QWidget):
+    """Base of the pages; what raises NotImplementedError here, each page says.
+
+    The rules behind `is_complete` and `why_closed` live in the core, where they are
+    tested without Qt. A page touches no other page and no window: it emits.
+
+    Attributes
+    ----------
+    key : str
+        Names the step in the settings and its help file: "start", "camera" and so on.
+
+    Signals
+    -------
+    changed()
+        Something that the page says of itself, such as its main action, is different.
+    advance_requested()
+        The step is done; show the next.
+    status_changed(str)
+        A sentence for the status line.
+    notice_raised(str)
+        A sentence that must be read, such as the text of an error; an empty one takes
+        it away, and so does another page.
+    subject_changed(str)
+        What is being calibrated, such as pen and cone.
+    operator_value_changed(OperatorValue)
+        What the operator view shows.
+    """
+
+    key = ""
+    changed = Signal()
+    advance_requested = Signal()
+    status_changed = Signal(str)
+    notice_raised = Signal(str)
+    subject_changed = Signal(str)
+    operator_value_changed = Signal(object)
+
+    def title(self) -> str:
+        """Return the name of the step, one to three words."""
+        raise NotImplementedError
+
+    def lead(self) -> str:
+        """Return what the step is for, one sentence shown below the title."""
+        return ""
+
+    def is_complete(self) -> bool:
+        """Return whether all that the step asks for is there."""
+        raise NotImplementedError
+
+    def why_closed(self) -> str:
+        """Return why the step cannot be entered yet, or nothing."""
+        return ""
+
+    def main_action(self) -> MainAction:
+        """Return what the main button does now."""
+        raise NotImplementedError
+
+    def run_main_action(self) -> None:
+        """Do it; a page that has more to do than to go on overrides this."""
+        self.advance_requested.emit()
+
+    def is_hands_free(self) -> bool:
+        """Return whether the operator is at the cone, away from the keys.
+
+        Then Space, PageUp and PageDown work wherever the focus is.
+        """
+        return False
+
+    def toggle_pause(self) -> None:
+        """Pause or go on, when Space is pressed."""
+
+    def entered(self) -> None:
+        """Begin: the page is now shown."""
+
+    def left(self) -> None:
+        """Stop what only a shown page does; another page or none is shown next."""
+
+    def unsaved(self) -> str:
+        """Return the question to ask before the window closes, or nothing."""
+        return ""
+
+    def shut_down(self) -> None:
+        """Cancel jobs, stop threads, close cameras: the window closes."""
+
+    def retranslate(self) -> None:
+        """Set every text anew, in the language that is now chosen.
+
+        The page calls it once in its constructor; later changes call it by themselves.
+        """
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self.retranslate()

@@ -1,0 +1,267 @@
+"""The look: two palettes, one type scale, one spacing grid, one style sheet.
+
+What is drawn by hand takes its colours from `colors_of` its palette, all else from the
+style sheet in resources; so a change of theme reaches every widget by itself.
+"""
+
+from dataclasses import asdict, dataclass
+from enum import Enum, IntEnum, StrEnum
+from pathlib import Path
+from string import Template
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QFont, QFontDatabase, QPalette
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
+
+import lightpen_resources
+
+RESOURCES = Path(lightpen_resources.__file__).parent
+FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")
+GRID = 8  # px; every margin, gap and height is a multiple of it, or half of it
+CAP_HEIGHT = 0.714  # of the font size, in the bundled font
+
+
+class TextSize(IntEnum):
+    """The type scale, px."""
+
+    SMALL = 13
+    BODY = 15
+    LEAD = 18
+    TITLE = 28
+    DISPLAY = 44
+    HUGE = 72
+
+
+class Appearance(StrEnum):
+    """Which palette the user chose."""
+
+    SYSTEM = "system"
+    LIGHT = "light"
+    DARK = "dark"
+
+
+class Tone(Enum):
+    """What a colour says; it is never the only one to say it."""
+
+    PLAIN = "text"
+    QUIET = "muted"
+    ACTIVE = "accent"
+    GOOD = "good"
+    WARN = "warn"
+    BAD = "bad"
+
+
+@dataclass(frozen=True)
+class Colors:
+    """Named colours of a palette, each as "#rrggbb".
+
+    Attributes
+    ----------
+    window, panel, raised : str
+        Grounds: behind all, of areas, of controls.
+    line, edge : str
+        Quiet divisions; borders that must be seen to use a control.
+    text, muted : str
+        Words; both are read on every ground.
+    accent, on_accent : str
+        What is active, and words on it.
+    good, warn, bad : str
+        States, as words and signs on every ground.
+    on_good, on_warn, on_bad : str
+        Words on areas of these colours.
+    partial : str
+        Filling of what is begun; `text` is read on it.
+    pointer : str
+        Arrow and frame that show where to go; a shape, never words.
+    """
+
+    window: str
+    panel: str
+    raised: str
+    line: str
+    edge: str
+    text: str
+    muted: str
+    accent: str
+    on_accent: str
+    good: str
+    on_good: str
+    warn: str
+    on_warn: str
+    bad: str
+    on_bad: str
+    partial: str
+    pointer: str
+
+    def tone(self, tone: Tone) -> QColor:
+        """Return the colour that says it."""
+        return QColor(getattr(self, tone.value))
+
+    def on_tone(self, tone: Tone) -> QColor:
+        """Return the colour of words on an area of that colour."""
+        name = f"on_{tone.value}"
+        return QColor(getattr(self, name, self.window))
+
+
+DARK = Colors(
+    window="#0f141b",
+    panel="#171e27",
+    raised="#232d39",
+    line="#303c4a",
+    edge="#74869a",
+    text="#eef3f8",
+    muted="#a9b7c6",
+    accent="#62b6f5",
+    on_accent="#07131f",
+    good="#2fc99a",
+    on_good="#04140e",
+    warn="#f6b73c",
+    on_warn="#1a1200",
+    bad="#ff8573",
+    on_bad="#220703",
+    partial="#2c5576",
+    pointer="#f6b73c",
+)
+LIGHT = Colors(
+    window="#f3f5f7",
+    panel="#ffffff",
+    raised="#e7ecf1",
+    line="#d3dbe3",
+    edge="#75828f",
+    text="#15202b",
+    muted="#495867",
+    accent="#00599b",
+    on_accent="#ffffff",
+    good="#006b52",
+    on_good="#ffffff",
+    warn="#856100",
+    on_warn="#ffffff",
+    bad="#a8102a",
+    on_bad="#ffffff",
+    partial="#a9cdea",
+    pointer="#d9480f",
+)
+
+
+def colors_of(palette: QPalette) -> Colors:
+    """Return the colours that go with a widget's palette."""
+    return DARK if palette.color(QPalette.ColorRole.Window).lightness() < 128 else LIGHT
+
+
+def colors_for(appearance: Appearance, scheme: Qt.ColorScheme) -> Colors:
+    """Return the colours for a choice and the scheme of the system."""
+    if appearance is Appearance.SYSTEM:
+        return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
+    return DARK if appearance is Appearance.DARK else LIGHT
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of two colours, 1 to 21, as WCAG 2.2 defines it."""
+    brighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (brighter + 0.05) / (darker + 0.05)
+
+
+def _luminance(color: str) -> float:
+    """Relative luminance of sRGB, 0 to 1."""
+    return sum(
+        weight * _linear(int(color[at : at + 2], 16) / 255)
+        for weight, at in ((0.2126, 1), (0.7152, 3), (0.0722, 5))
+    )
+
+
+def _linear(value: float) -> float:
+    """Return the light of an sRGB value; both 0 to 1."""
+    return (
+        value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
+    )
+
+
+def load_fonts() -> None:
+    """Add the bundled fonts and make them the application's."""
+    for file in sorted((RESOURCES / "fonts").glob("*.ttf")):
+        QFontDatabase.addApplicationFont(str(file))
+    QApplication.setFont(font(TextSize.BODY))
+
+
+def font(size: float, *, bold: bool = False) -> QFont:
+    """Return the program's font at a size in px."""
+    result = QFont()
+    result.setFamilies(list(FAMILIES))
+    result.setPixelSize(max(1, round(size)))
+    result.setBold(bold)
+    return result
+
+
+def letters_for(distance_m: float, dots_per_inch: float) -> int:
+    """Return the font size that is read with ease from a distance, px.
+
+    Capitals of 20 minutes of arc, as ISO 9241-303 recommends.
+    """
+    capital_mm = distance_m * 1000 * 20 / 60 * 3.14159265 / 180
+    return round(capital_mm / 25.4 * dots_per_inch / CAP_HEIGHT)
+
+
+def apply_theme(application: QApplication, colors: Colors) -> None:
+    """Give the whole application these colours and the style sheet."""
+    application.setPalette(_palette(colors))
+    application.setStyleSheet(style_sheet(colors))
+
+
+def style_sheet(colors: Colors) -> str:
+    """Return the style sheet of resources, filled in."""
+    template = Template((RESOURCES / "style" / "lightpen.qss").read_text("utf-8"))
+    sizes = {f"size_{size.name.lower()}": f"{size}px" for size in TextSize}
+    icons = (RESOURCES / "icons").as_posix()
+    theme = "dark" if colors is DARK else "light"
+    return template.substitute(asdict(colors), **sizes, icons=icons, theme=theme)
+
+
+def text_label(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
+    """Return a label that wraps its words, at a place of the type scale."""
+    label = QLabel()
+    label.setWordWrap(True)
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    label.setProperty("scale", size.name.lower())
+    set_tone(label, tone)
+    return label
+
+
+def set_tone(widget: QWidget, tone: Tone) -> None:
+    """Let a widget's words say something else by their colour."""
+    if widget.property("tone") == tone.value:
+        return
+    widget.setProperty("tone", tone.value)
+    widget.style().unpolish(widget)
+    widget.style().polish(widget)
+
+
+def _palette(colors: Colors) -> QPalette:
+    role = QPalette.ColorRole
+    palette = QPalette()
+    for name, color in (
+        (role.Window, colors.window),
+        (role.WindowText, colors.text),
+        (role.Base, colors.panel),
+        (role.AlternateBase, colors.raised),
+        (role.Text, colors.text),
+        (role.PlaceholderText, colors.muted),
+        (role.Button, colors.raised),
+        (role.ButtonText, colors.text),
+        (role.BrightText, colors.bad),
+        (role.Highlight, colors.accent),
+        (role.HighlightedText, colors.on_accent),
+        (role.Accent, colors.accent),
+        (role.Link, colors.accent),
+        (role.LinkVisited, colors.accent),
+        (role.ToolTipBase, colors.raised),
+        (role.ToolTipText, colors.text),
+        (role.Light, colors.raised),
+        (role.Midlight, colors.raised),
+        (role.Mid, colors.line),
+        (role.Dark, colors.edge),
+        (role.Shadow, colors.window),
+    ):
+        palette.setColor(name, QColor(color))
+    for name in (role.WindowText, role.Text, role.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, name, QColor(colors.muted))
+    return palette

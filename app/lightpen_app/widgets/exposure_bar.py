@@ -1,0 +1,141 @@
+"""How brightly the LEDs are exposed: too dark, good, or saturated."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
+from lightpen_app.widgets.signs import Sign, draw_sign
+
+BAR_HEIGHT = 2 * GRID
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """Peak brightness of the LEDs of one image.
+
+    Attributes
+    ----------
+    peaks : tuple of float
+        Of each LED, as a fraction of the full scale, 0 to 1.
+    dark, saturated : float
+        Limits of what measures well.
+    """
+
+    peaks: tuple[float, ...] = ()
+    dark: float = 0.3
+    saturated: float = 0.98
+
+    @property
+    def n_dark(self) -> int:
+        """LEDs below the lower limit."""
+        return sum(peak < self.dark for peak in self.peaks)
+
+    @property
+    def n_saturated(self) -> int:
+        """LEDs at or above the upper limit."""
+        return sum(peak >= self.saturated for peak in self.peaks)
+
+
+class ExposureBar(QWidget):
+    """A scale with one tick per LED, and the verdict in words."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = Exposure()
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._describe()
+
+    def value(self) -> Exposure:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: Exposure) -> None:
+        """Show another image's LEDs."""
+        self._value = value
+        self._describe()
+        self.update()
+
+    def verdict(self) -> str:
+        """Return what the bar says, in words."""
+        value = self._value
+        if not value.peaks:
+            return self.tr("No LED is seen")
+        if value.n_saturated:
+            text = self.tr("Saturated: {0} of {1} LEDs. Shorten the exposure.")
+            return text.format(value.n_saturated, len(value.peaks))
+        if value.n_dark:
+            text = self.tr("Too dark: {0} of {1} LEDs. Lengthen the exposure.")
+            return text.format(value.n_dark, len(value.peaks))
+        return self.tr("Good: {0} LEDs").format(len(value.peaks))
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(320, 9 * GRID)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(160, 9 * GRID)
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._describe()
+            self.update()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        value = self._value
+        colors = colors_of(self.palette())
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        sign, tone = self._mark()
+        head = QRectF(0, 0, self.width(), 3 * GRID)
+        draw_sign(painter, QRectF(0, 4, 2 * GRID, 2 * GRID), sign, colors.tone(tone))
+        painter.setPen(colors.tone(tone))
+        painter.setFont(font(TextSize.BODY, bold=True))
+        words = head.adjusted(3 * GRID, 0, 0, 0)
+        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, self.verdict())
+
+        bar = QRectF(1, 4 * GRID, self.width() - 2, BAR_HEIGHT)
+        painter.setPen(QPen(QColor(colors.line), 1))
+        painter.setBrush(QColor(colors.raised))
+        painter.drawRect(bar)
+        good = bar.adjusted(
+            bar.width() * value.dark, 0, -bar.width() * (1 - value.saturated), 0
+        )
+        painter.setBrush(QColor(colors.partial))
+        painter.drawRect(good)
+        painter.setPen(QPen(QColor(colors.text), 2))
+        for peak in value.peaks:
+            x = bar.left() + bar.width() * min(max(peak, 0.0), 1.0)
+            painter.drawLine(QPointF(x, bar.top() - 3), QPointF(x, bar.bottom() + 3))
+        self._draw_scale(painter, bar, QColor(colors.muted))
+
+    def _describe(self) -> None:
+        self.setAccessibleName(self.tr("Exposure of the LEDs"))
+        self.setAccessibleDescription(self.verdict())
+
+    def _draw_scale(self, painter: QPainter, bar: QRectF, color: QColor) -> None:
+        painter.setPen(color)
+        painter.setFont(font(TextSize.SMALL))
+        top = bar.bottom() + 4
+        height = self.height() - top
+        whole = QRectF(bar.left(), top, bar.width(), height)
+        good_left = whole.adjusted(bar.width() * self._value.dark, 0, 0, 0)
+        left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
+        painter.drawText(whole, left, self.tr("dark"))
+        painter.drawText(good_left, left, self.tr("good"))
+        painter.drawText(whole, right, self.tr("saturated"))
+
+    def _mark(self) -> tuple[Sign, Tone]:
+        value = self._value
+        if not value.peaks:
+            return Sign.EYE, Tone.QUIET
+        if value.n_saturated or value.n_dark:
+            return Sign.WARNING, Tone.WARN
+        return Sign.CHECK, Tone.GOOD

@@ -1,0 +1,108 @@
+"""Text as large as its place allows, up to the size that the distance asks for."""
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen_app.theme import GRID, Tone, colors_of, font
+
+WRAPPED = int(Qt.TextFlag.TextWordWrap)
+
+
+class FittedText(QWidget):
+    """Words that wrap, and shrink only where they would not fit.
+
+    Parameters
+    ----------
+    largest : float
+        Size of the letters where there is room, px.
+    n_lines : int
+        Lines of that size for which the widget asks.
+    """
+
+    def __init__(
+        self,
+        largest: float,
+        n_lines: int = 1,
+        alignment: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._largest = largest
+        self._n_lines = n_lines
+        self._flags = WRAPPED | int(alignment | Qt.AlignmentFlag.AlignVCenter)
+        self._text = ""
+        self._tone = Tone.PLAIN
+        self._bold = True
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+
+    def text(self) -> str:
+        """Return the words."""
+        return self._text
+
+    def set_text(
+        self, text: str, tone: Tone = Tone.PLAIN, *, bold: bool = True
+    ) -> None:
+        """Show other words."""
+        if (text, tone, bold) == (self._text, self._tone, self._bold):
+            return
+        self._text, self._tone, self._bold = text, tone, bold
+        self.setAccessibleName(text)
+        self.update()
+
+    def set_largest(self, largest: float) -> None:
+        """Change the size of the letters where there is room, px."""
+        if largest != self._largest:
+            self._largest = largest
+            self.updateGeometry()
+            self.update()
+
+    def size_px(self) -> float:
+        """Return the size at which the words are drawn now, px."""
+        return fitted_size(
+            self._text,
+            QRectF(self.rect()),
+            self._largest,
+            bold=self._bold,
+            flags=self._flags,
+        )
+
+    @override
+    def sizeHint(self) -> QSize:
+        height = QFontMetricsF(font(self._largest)).height() * self._n_lines
+        return QSize(120, round(height))
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(40, 3 * GRID)
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setFont(font(self.size_px(), bold=self._bold))
+        painter.setPen(colors_of(self.palette()).tone(self._tone))
+        painter.drawText(QRectF(self.rect()), self._flags, self._text)
+
+
+def fitted_size(
+    text: str, box: QRectF, largest: float, *, bold: bool, flags: int = WRAPPED
+) -> float:
+    """Return the largest font size up to a limit at which text fits a box, px."""
+    low, high = 6, max(6, round(largest))
+    while low < high:
+        middle = (low + high + 1) // 2
+        if _fits(text, box, middle, bold=bold, flags=flags):
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def _fits(text: str, box: QRectF, size: int, *, bold: bool, flags: int) -> bool:
+    metrics = QFontMetricsF(font(size, bold=bold))
+    widest_word = max(map(metrics.horizontalAdvance, text.split()), default=0)
+    if widest_word > box.width() and flags & WRAPPED and text.isascii():
+        return False
+    needed = metrics.boundingRect(QRectF(0, 0, box.width(), 1e6), flags, text)
+    return needed.height() <= box.height() and needed.width() <= box.width() + 1

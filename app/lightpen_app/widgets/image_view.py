@@ -1,0 +1,319 @@
+"""The live image with rings about the LEDs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import Image
+from lightpen_app.theme import DARK, GRID, TextSize, Tone, font
+from lightpen_app.widgets.mailbox import Mailbox
+
+MAX_ZOOM = 16.0
+ZOOM_STEP = 1.25
+PAN_STEP = 0.1  # of what is seen
+CLICK_SLACK = 4  # px that a mouse may move while it clicks
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A ring on the image.
+
+    Attributes
+    ----------
+    x, y : float
+        Centre, image px.
+    radius : float
+        Image px; it is drawn no smaller than can be seen.
+    label : str
+        Beside the ring.
+    tone : Tone
+        Its colour; `WARN` and `BAD` are also drawn dashed.
+    """
+
+    x: float
+    y: float
+    radius: float = 8.0
+    label: str = ""
+    tone: Tone = Tone.GOOD
+
+
+def pooled(image: Image, bits: int = 8) -> Image:
+    """Return an image of half the size, each pixel the brightest of four.
+
+    A small LED stays as bright as it was, which averaging would not leave it.
+
+    Parameters
+    ----------
+    image : (H, W) array of uint8 or uint16
+    bits : int
+        Bits in use; more than 8 are shifted down.
+
+    Returns
+    -------
+    (H // 2, W // 2) array of uint8
+    """
+    height, width = (size // 2 * 2 for size in image.shape)
+    rows = np.maximum(image[0:height:2], image[1:height:2])
+    half = np.maximum(rows[:, 0:width:2], rows[:, 1:width:2])
+    if half.dtype == np.uint8:
+        return half
+    return (half >> max(bits - 8, 0)).astype(np.uint8)
+
+
+class ImageView(QWidget):
+    """Shows the newest image whole, or enlarged about a place.
+
+    The wheel, or + and -, enlarge; the mouse, or the arrow keys, move; 0 shows all.
+
+    Signals
+    -------
+    pixel_clicked(float, float)
+        Where on the image, px.
+    """
+
+    pixel_clicked = Signal(float, float)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._buffer: Image | None = None  # keeps the memory of _shown alive
+        self._shown = QImage()
+        self._size = QSize()
+        self._markers: tuple[Marker, ...] = ()
+        self._message = ""
+        self._zoom = 1.0
+        self._center = QPointF(0.5, 0.5)  # of the image, as fractions
+        self._pressed: QPointF | None = None
+        self._dragged = QPointF()
+        self._mailbox = Mailbox(self)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        policy = QSizePolicy.Policy.Expanding
+        self.setSizePolicy(policy, policy)
+        self._describe()
+
+        # Connections
+        self._mailbox.ready.connect(self._on_ready, Qt.ConnectionType.QueuedConnection)
+
+    def post(
+        self, image: Image, markers: Sequence[Marker] = (), *, bits: int = 8
+    ) -> None:
+        """Leave an image from any thread; one not yet shown is skipped.
+
+        The image is pooled at once, on the calling thread, so it may be reused.
+        """
+        height, width = image.shape
+        half = pooled(image, bits)
+        self._mailbox.put((half, QSize(width, height), tuple(markers)))
+
+    def set_image(
+        self, image: Image | None, markers: Sequence[Marker] = (), *, bits: int = 8
+    ) -> None:
+        """Show an (H, W) image at once, or none."""
+        self._mailbox.take()
+        if image is None:
+            self._show(None, QSize(), ())
+            return
+        height, width = image.shape
+        self._show(pooled(image, bits), QSize(width, height), tuple(markers))
+
+    def set_markers(self, markers: Sequence[Marker]) -> None:
+        """Draw other rings on the image that is shown."""
+        self._markers = tuple(markers)
+        self.update()
+
+    def markers(self) -> tuple[Marker, ...]:
+        """Return the rings that are drawn."""
+        return self._markers
+
+    def set_message(self, text: str) -> None:
+        """Say why there is no image; shown in its place."""
+        self._message = text
+        self.setAccessibleDescription(text)
+        self.update()
+
+    def image_size(self) -> QSize:
+        """Return the size of the image shown, px; empty without one."""
+        return self._size
+
+    def pixel_at(self, place: QPointF) -> QPointF:
+        """Return which image point is drawn at a place of the widget."""
+        target, scale = self._target()
+        return (place - target.topLeft()) / scale - QPointF(0.5, 0.5)
+
+    def place_of(self, x: float, y: float) -> QPointF:
+        """Return where on the widget an image point is drawn."""
+        target, scale = self._target()
+        return target.topLeft() + QPointF(x + 0.5, y + 0.5) * scale
+
+    def zoom(self) -> float:
+        """Return the enlargement; 1 shows the whole image."""
+        return self._zoom
+
+    def set_zoom(self, zoom: float, about: QPointF | None = None) -> None:
+        """Enlarge, with a place of the widget staying where it is."""
+        if self._size.isEmpty():
+            return
+        place = QPointF(self.rect().center()) if about is None else about
+        pixel = self.pixel_at(place)
+        self._zoom = min(max(zoom, 1.0), MAX_ZOOM)
+        self._move(place - self.place_of(pixel.x(), pixel.y()))
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(612, 512)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(160, 128)
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._describe()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(DARK.window))
+        if self._shown.isNull():
+            painter.setPen(QColor(DARK.muted))
+            painter.setFont(font(TextSize.LEAD))
+            margin = 3 * GRID
+            box = self.rect().adjusted(margin, margin, -margin, -margin)
+            flags = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
+            painter.drawText(box, flags, self._message)
+            return
+        target, scale = self._target()
+        smooth = 2 * scale < 1  # enlarged, the pixels themselves are of interest
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
+        painter.drawImage(
+            QRectF(target.topLeft(), self._shown.size() * 2 * scale), self._shown
+        )
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for marker in self._markers:
+            self._draw_marker(painter, marker, scale)
+
+    def _draw_marker(self, painter: QPainter, marker: Marker, scale: float) -> None:
+        place = self.place_of(marker.x, marker.y)
+        radius = max(marker.radius * scale, 6.0)
+        pen = QPen(DARK.tone(marker.tone), 2)
+        if marker.tone in (Tone.WARN, Tone.BAD):
+            pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+            pen.setDashPattern([3, 2])
+        painter.setPen(pen)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(place, radius, radius)
+        if marker.label:
+            painter.setFont(font(TextSize.SMALL, bold=True))
+            corner = place + QPointF(radius, -radius) * 0.75 + QPointF(2, 0)
+            painter.setPen(QColor(DARK.window))
+            painter.drawText(corner + QPointF(1, 1), marker.label)
+            painter.setPen(DARK.tone(marker.tone))
+            painter.drawText(corner, marker.label)
+
+    @override
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        steps = event.angleDelta().y() / 120
+        self.set_zoom(self._zoom * ZOOM_STEP**steps, event.position())
+        event.accept()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        step = PAN_STEP * min(self.width(), self.height())
+        moves = {
+            Qt.Key.Key_Left: QPoint(1, 0),
+            Qt.Key.Key_Right: QPoint(-1, 0),
+            Qt.Key.Key_Up: QPoint(0, 1),
+            Qt.Key.Key_Down: QPoint(0, -1),
+        }
+        key = Qt.Key(event.key())
+        if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
+            self.set_zoom(self._zoom * ZOOM_STEP)
+        elif key == Qt.Key.Key_Minus:
+            self.set_zoom(self._zoom / ZOOM_STEP)
+        elif key == Qt.Key.Key_0:
+            self.set_zoom(1.0)
+        elif key in moves:
+            self._move(QPointF(moves[key]) * step)
+        else:
+            super().keyPressEvent(event)
+
+    @override
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self._pressed = self._dragged = event.position()
+
+    @override
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        if self._pressed is not None:
+            self._move(event.position() - self._dragged)
+            self._dragged = event.position()
+
+    @override
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        pressed, self._pressed = self._pressed, None
+        if pressed is None or self._size.isEmpty():
+            return
+        if (event.position() - pressed).manhattanLength() > CLICK_SLACK:
+            return
+        pixel = self.pixel_at(pressed)
+        if QRectF(-0.5, -0.5, self._size.width(), self._size.height()).contains(pixel):
+            self.pixel_clicked.emit(pixel.x(), pixel.y())
+
+    def _describe(self) -> None:
+        self.setAccessibleName(self.tr("Live image"))
+
+    def _on_ready(self) -> None:
+        match self._mailbox.take():
+            case (np.ndarray() as half, QSize() as size, tuple() as markers):
+                self._show(half, size, markers)
+
+    def _show(
+        self, half: Image | None, size: QSize, markers: tuple[Marker, ...]
+    ) -> None:
+        self._buffer = half
+        self._size = size
+        self._markers = markers
+        if half is None:
+            self._shown = QImage()
+        else:
+            height, width = half.shape
+            grey = QImage.Format.Format_Grayscale8
+            self._shown = QImage(half.data, width, height, half.strides[0], grey)
+        self.update()
+
+    def _target(self) -> tuple[QRectF, float]:
+        """Where the whole image lies on the widget, and px of widget per image px."""
+        width, height = max(self._size.width(), 1), max(self._size.height(), 1)
+        scale = self._zoom * min(self.width() / width, self.height() / height)
+        corner = QPointF(
+            self.width() / 2 - self._center.x() * width * scale,
+            self.height() / 2 - self._center.y() * height * scale,
+        )
+        return QRectF(corner.x(), corner.y(), width * scale, height * scale), scale
+
+    def _move(self, by: QPointF) -> None:
+        """Move the image, but not so far that it leaves the widget."""
+        target, _ = self._target()
+        x = self._center.x() - by.x() / target.width()
+        y = self._center.y() - by.y() / target.height()
+        half_x = min(self.width() / target.width() / 2, 0.5)
+        half_y = min(self.height() / target.height() / 2, 0.5)
+        self._center = QPointF(
+            min(max(x, half_x), 1 - half_x), min(max(y, half_y), 1 - half_y)
+        )
+        self.update()

@@ -1,0 +1,210 @@
+"""The view for the operator at the cone: a window of its own, in large letters."""
+
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import QEvent, QRect, Qt, Signal
+from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QScreen
+from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen_app.theme import GRID, letters_for
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.posture_dial import DialValue, PostureDial
+from lightpen_app.widgets.state_banner import State, StateBanner
+
+DISTANCES_M = (1, 2, 3, 4, 6)
+DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
+INSTRUCTION_SHARE, HINT_SHARE = 0.26, 0.12  # of the height, at most
+LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
+USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
+CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not tell its size
+
+
+@dataclass(frozen=True, eq=False)
+class OperatorValue:
+    """What the operator must know now.
+
+    Attributes
+    ----------
+    instruction : str
+        What to do, a few words.
+    hint : str
+        A sentence more.
+    state : State
+    count : str
+        Such as "184 / 300".
+    fraction : float or None
+        How much is done, 0 to 1.
+    dial : DialValue or None
+    """
+
+    instruction: str = ""
+    hint: str = ""
+    state: State = field(default_factory=State)
+    count: str = ""
+    fraction: float | None = None
+    dial: DialValue | None = None
+
+
+class OperatorView(QWidget):
+    """One instruction, the dial, the count and the state.
+
+    The letters are as large as the viewing distance asks for, where they fit; on a
+    large window they are larger.
+
+    Signals
+    -------
+    closed()
+        The view was left; nothing else has ended by that.
+    advance_requested(), back_requested(), pause_requested()
+        Enter or PageDown, PageUp, Space.
+    """
+
+    closed = Signal()
+    advance_requested = Signal()
+    back_requested = Signal()
+    pause_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self._value = OperatorValue()
+        self._distance_m = 3.0
+        self.setAutoFillBackground(True)
+
+        # Widgets
+        self._instruction = FittedText(86, 1)
+        self._hint = FittedText(43, 1)
+        self._dial = PostureDial()
+        self._count = FittedText(120, 1)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, 1000)
+        self._progress.setTextVisible(False)
+        self._banner = StateBanner()
+
+        # Layout
+        side = QVBoxLayout()
+        side.setSpacing(3 * GRID)
+        side.addStretch(1)
+        side.addWidget(self._count)
+        side.addWidget(self._progress)
+        side.addStretch(1)
+        side.addWidget(self._banner)
+        side.addStretch(1)
+        self._layout = layout = QGridLayout(self)
+        layout.setContentsMargins(4 * GRID, 3 * GRID, 4 * GRID, 3 * GRID)
+        layout.setHorizontalSpacing(4 * GRID)
+        layout.setVerticalSpacing(GRID)
+        layout.addWidget(self._instruction, 0, 0, 1, 2)
+        layout.addWidget(self._hint, 1, 0, 1, 2)
+        layout.addWidget(self._dial, 2, 0)
+        layout.addLayout(side, 2, 1)
+        layout.setRowStretch(2, 1)
+        layout.setColumnStretch(0, DIAL_SHARE)
+        layout.setColumnStretch(1, SIDE_SHARE)
+
+        self._retranslate()
+        self._resize_letters()
+
+    def value(self) -> OperatorValue:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: OperatorValue) -> None:
+        """Show something else."""
+        self._value = value
+        self._instruction.set_text(value.instruction)
+        self._hint.set_text(value.hint, bold=False)
+        self._banner.set_value(value.state)
+        self._count.set_text(value.count)
+        self._progress.setVisible(value.fraction is not None)
+        if value.fraction is not None:
+            self._progress.setValue(round(1000 * value.fraction))
+        self._dial.setVisible(value.dial is not None)
+        self._layout.setColumnStretch(0, 0 if value.dial is None else DIAL_SHARE)
+        if value.dial is not None:
+            self._dial.set_value(value.dial)
+
+    def distance_m(self) -> float:
+        """Return the viewing distance, m."""
+        return self._distance_m
+
+    def set_distance_m(self, distance_m: float) -> None:
+        """Size the letters for another viewing distance, m."""
+        self._distance_m = distance_m
+        self._resize_letters()
+
+    def letters(self) -> int:
+        """Return the size of letters that the distance asks for, px."""
+        return letters_for(self._distance_m, _dots_per_inch(self.screen()))
+
+    def instruction_px(self) -> float:
+        """Return the size at which the instruction is drawn, px."""
+        return self._instruction.size_px()
+
+    def open_beside(self, window: QWidget) -> None:
+        """Fill a screen on which the given window is not, if there is one."""
+        other = other_screen(window.screen(), QGuiApplication.screens())
+        self.setScreen(other)
+        self.setGeometry(QRect(other.geometry()))
+        self._resize_letters()
+        self.showFullScreen()
+        self.activateWindow()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._resize_letters()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        match event.key():
+            case Qt.Key.Key_Escape:
+                self.close()
+            case Qt.Key.Key_Return | Qt.Key.Key_Enter | Qt.Key.Key_PageDown:
+                self.advance_requested.emit()
+            case Qt.Key.Key_PageUp:
+                self.back_requested.emit()
+            case Qt.Key.Key_Space:
+                self.pause_requested.emit()
+            case _:
+                super().keyPressEvent(event)
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        super().closeEvent(event)
+        self.closed.emit()
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._retranslate()
+
+    def _resize_letters(self) -> None:
+        letters = max(self.letters(), self.height() * LEAST_SHARE)
+        self._instruction.set_largest(letters * 1.2)
+        self._hint.set_largest(letters * 0.6)
+        self._count.set_largest(letters * 1.2)
+        # Else the dial, which wants to be square, would take the room of the words.
+        for text, share in (
+            (self._instruction, INSTRUCTION_SHARE),
+            (self._hint, HINT_SHARE),
+        ):
+            wanted = text.sizeHint().height()
+            text.setMinimumHeight(min(wanted, round(self.height() * share)))
+        self._banner.set_word_size(letters * 0.8)
+
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Operator view"))
+
+
+def other_screen(present: QScreen, screens: list[QScreen]) -> QScreen:
+    """Return a screen other than the present one, or that one if it is alone."""
+    return next((screen for screen in screens if screen != present), present)
+
+
+def _dots_per_inch(screen: QScreen) -> float:
+    """Return the pixels per inch of a screen, or the usual if it does not tell."""
+    told = screen.physicalDotsPerInch()
+    low, high = CREDIBLE_DPI
+    return told if low <= told <= high else USUAL_DPI

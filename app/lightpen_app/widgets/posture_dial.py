@@ -1,0 +1,364 @@
+"""The postures that a swing holds, seen from above, and the one to take next."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import IntArray
+from lightpen.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen.posture import Posture
+from lightpen_app.theme import GRID, Colors, TextSize, colors_of, font
+from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
+
+MAX_TILT = math.radians(36)  # drawn at the rim
+MAX_TURN = math.radians(75)  # drawn at the ends of the bar
+GAP = math.radians(1.6)  # half the gap between sectors
+RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
+BAR_SHARE = 0.12  # of the side, for the bar of the turn
+SECTOR = 2 * math.pi / N_DIRECTIONS
+
+
+def _zeros() -> IntArray:
+    return np.zeros((2, N_DIRECTIONS), dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class DialValue:
+    """What a dial shows.
+
+    Attributes
+    ----------
+    counts, needed : (2, 8) array of int
+        Images kept and wanted, leaning and leaning far, by direction.
+    n_upright, n_upright_needed : int
+        The same for the upright pen.
+    posture, target : Posture or None
+        Where the pen is, and where it should go.
+    turns : tuple of two floats or None
+        Least and greatest turn kept, rad.
+    turns_needed : tuple of two floats or None
+        What they should reach, rad.
+    heading : float
+        By how much the drawing is turned, counter-clockwise, so that the operator
+        finds left and right as his own: 0 behind the camera, pi facing it; rad.
+    """
+
+    counts: IntArray = field(default_factory=_zeros)
+    needed: IntArray = field(default_factory=_zeros)
+    n_upright: int = 0
+    n_upright_needed: int = 0
+    posture: Posture | None = None
+    target: Posture | None = None
+    turns: tuple[float, float] | None = None
+    turns_needed: tuple[float, float] | None = None
+    heading: float = 0.0
+
+    @property
+    def n_fields(self) -> int:
+        """Fields in which images are wanted."""
+        return int(np.sum(self.needed > 0)) + (self.n_upright_needed > 0)
+
+    @property
+    def n_full(self) -> int:
+        """Of these, the fields that have all."""
+        full = (self.needed > 0) & (self.counts >= self.needed)
+        upright = 0 < self.n_upright_needed <= self.n_upright
+        return int(np.sum(full)) + upright
+
+
+@dataclass(frozen=True)
+class _Field:
+    """One field of the dial: its ring (0 upright) and its sector."""
+
+    ring: int
+    sector: int
+
+
+def field_of(posture: Posture) -> tuple[int, int]:
+    """Return ring (0 upright, 2 leaning far) and sector of a posture."""
+    ring = int(np.digitize(posture.tilt, TILT_RINGS))
+    sector = round(posture.direction / SECTOR) % N_DIRECTIONS if ring else 0
+    return ring, sector
+
+
+def place_of(posture: Posture, heading: float) -> tuple[float, float]:
+    """Return where a posture is drawn: right and up of the middle, rim = 1."""
+    tilts = (0.0, *TILT_RINGS, MAX_TILT)
+    radius = float(np.interp(posture.tilt, tilts, (0.0, *RING_EDGES)))
+    angle = posture.direction + heading
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+class PostureDial(QWidget):
+    """Two rings of eight directions, a middle, and a bar for the turn."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = DialValue()
+        policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+        self._describe()
+
+    def value(self) -> DialValue:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: DialValue) -> None:
+        """Show other postures."""
+        self._value = value
+        self._describe()
+        self.update()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(480, self.heightForWidth(480))
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(240, self.heightForWidth(240))
+
+    @override
+    def heightForWidth(self, width: int) -> int:
+        return round(width * (1 + BAR_SHARE))
+
+    def _describe(self) -> None:
+        self.setAccessibleName(self.tr("Postures"))
+        text = self.tr("{0} of {1} postures are done.")
+        self.setAccessibleDescription(
+            text.format(self._value.n_full, self._value.n_fields)
+        )
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._describe()
+            self.update()
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colors = colors_of(self.palette())
+        side = min(self.width(), self.height() / (1 + BAR_SHARE))
+        left = (self.width() - side) / 2
+        top = (self.height() - side * (1 + BAR_SHARE)) / 2
+        middle = QPointF(left + side / 2, top + side / 2)
+        rim = 0.435 * side
+        self._draw_camera(painter, middle, rim, colors)
+        target = self._value.target
+        marked = _Field(*field_of(target)) if target else None
+        for place in _fields():
+            self._draw_field(painter, middle, rim, place, colors)
+        if marked:
+            outline = _outline(middle, rim, marked, self._value.heading)
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(QPen(QColor(colors.pointer), 0.02 * rim + 2))
+            painter.drawPath(outline)
+        self._draw_posture(painter, middle, rim, colors)
+        bar = QRectF(middle.x() - rim, top + side, 2 * rim, BAR_SHARE * side)
+        self._draw_turn(painter, bar, colors)
+
+    def _images(self, place: _Field) -> tuple[int, int]:
+        """Images kept and wanted in a field."""
+        value = self._value
+        if place.ring == 0:
+            return value.n_upright, value.n_upright_needed
+        index = place.ring - 1, place.sector
+        return int(value.counts[index]), int(value.needed[index])
+
+    def _draw_field(
+        self,
+        painter: QPainter,
+        middle: QPointF,
+        rim: float,
+        place: _Field,
+        colors: Colors,
+    ) -> None:
+        kept, needed = self._images(place)
+        done = kept >= needed > 0
+        outline = _outline(middle, rim, place, self._value.heading)
+        painter.setPen(QPen(QColor(colors.line), 1))
+        painter.setBrush(QColor(colors.good if done else colors.raised))
+        painter.drawPath(outline)
+        if 0 < kept < needed:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colors.partial))
+            share = kept / needed
+            filled = _outline(middle, rim, place, self._value.heading, share)
+            painter.drawPath(filled)
+        x, y = _center(place, self._value.heading)
+        center = middle + QPointF(x, -y) * rim
+        size = (0.13 if place.ring else 0.15) * rim
+        box = QRectF(center.x() - size, center.y() - size, 2 * size, 2 * size)
+        if done:
+            inset = 0.45 * size
+            sign_box = box.adjusted(inset, inset, -inset, -inset)
+            draw_sign(painter, sign_box, Sign.CHECK, QColor(colors.on_good))
+        elif needed > 0:
+            painter.setPen(QColor(colors.text))
+            painter.setFont(font(size, bold=True))
+            center_flag = Qt.AlignmentFlag.AlignCenter
+            painter.drawText(box, center_flag, str(needed - kept))
+
+    def _draw_posture(
+        self, painter: QPainter, middle: QPointF, rim: float, colors: Colors
+    ) -> None:
+        value = self._value
+        if value.posture is None:
+            return
+        x, y = place_of(value.posture, value.heading)
+        here = middle + QPointF(x, -y) * rim
+        halo = QColor(colors.window)
+        if value.target is not None:
+            x, y = place_of(value.target, value.heading)
+            way = middle + QPointF(x, -y) * rim - here
+            length = math.hypot(way.x(), way.y())
+            if length > 0.3 * rim:
+                # It ends before the number of the field to which it points.
+                there = here + way * (1 - 0.14 * rim / length)
+                width = 0.055 * rim
+                draw_arrow(painter, here, there, width, QColor(colors.pointer), halo)
+        painter.setPen(QPen(halo, 0.03 * rim))
+        painter.setBrush(QColor(colors.text))
+        painter.drawEllipse(here, 0.06 * rim, 0.06 * rim)
+
+    def _draw_camera(
+        self, painter: QPainter, middle: QPointF, rim: float, colors: Colors
+    ) -> None:
+        """Draw where the camera stands, so that the dial cannot be misread."""
+        angle = self._value.heading - math.pi / 2
+        towards = QPointF(math.cos(angle), -math.sin(angle))
+        body = 0.055 * rim
+        painter.save()
+        painter.translate(middle + towards * (rim * 1.085))
+        painter.rotate(math.degrees(-angle) + 90)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colors.muted))
+        painter.drawRoundedRect(
+            QRectF(-1.5 * body, -0.5 * body, 3 * body, 1.6 * body), 3, 3
+        )
+        painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
+        painter.restore()
+        size = max(0.075 * rim, TextSize.SMALL)
+        painter.setPen(QColor(colors.muted))
+        painter.setFont(font(size))
+        beside = middle + towards * (rim * 1.085) + QPointF(2 * body + GRID / 2, 0)
+        box = QRectF(beside.x(), beside.y() - size, rim, 2 * size)
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, self.tr("camera"))
+
+    def _draw_turn(self, painter: QPainter, box: QRectF, colors: Colors) -> None:
+        value = self._value
+        if value.turns is None and value.turns_needed is None:
+            return
+        size = max(0.24 * box.height(), TextSize.SMALL)
+        x_of = partial(_turn_x, box)
+        line = QRectF(0, box.top() + 0.12 * box.height(), 0, 0.26 * box.height())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(colors.raised))
+        track = QRectF(box.left(), line.top(), box.width(), line.height())
+        painter.drawRoundedRect(track, line.height() / 2, line.height() / 2)
+        done = _reaches(value.turns, value.turns_needed)
+        if value.turns is not None:
+            low, high = map(x_of, value.turns)
+            painter.setBrush(QColor(colors.good if done else colors.partial))
+            kept = QRectF(low, line.top(), max(high - low, 2), line.height())
+            painter.drawRoundedRect(kept, line.height() / 2, line.height() / 2)
+        painter.setPen(QPen(QColor(colors.text), 2))
+        for turn in value.turns_needed or ():
+            top = QPointF(x_of(turn), line.top() - 0.06 * box.height())
+            painter.drawLine(top, top + QPointF(0, 0.38 * box.height()))
+        self._draw_turn_aim(painter, track, x_of, colors)
+        words = self.tr("turn about the pen's own axis")
+        painter.setPen(QColor(colors.muted))
+        painter.setFont(font(size))
+        below = QRectF(
+            box.left(), line.bottom() + 0.1 * box.height(), box.width(), 2 * size
+        )
+        flags = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
+        painter.drawText(below, flags, words)
+
+    def _draw_turn_aim(
+        self,
+        painter: QPainter,
+        track: QRectF,
+        x_of: "partial[float]",
+        colors: Colors,
+    ) -> None:
+        value = self._value
+        if value.posture is None:
+            return
+        halo = QColor(colors.window)
+        here = QPointF(x_of(value.posture.turn), track.center().y())
+        if value.target is not None:
+            there = QPointF(x_of(value.target.turn), track.center().y())
+            if abs(there.x() - here.x()) > 1.2 * track.height():
+                width = 0.4 * track.height()
+                draw_arrow(painter, here, there, width, QColor(colors.pointer), halo)
+        painter.setPen(QPen(halo, 0.2 * track.height()))
+        painter.setBrush(QColor(colors.text))
+        painter.drawEllipse(here, 0.55 * track.height(), 0.55 * track.height())
+
+
+def _fields() -> Iterator[_Field]:
+    yield _Field(0, 0)
+    for ring in (1, 2):
+        for sector in range(N_DIRECTIONS):
+            yield _Field(ring, sector)
+
+
+def _center(place: _Field, heading: float) -> tuple[float, float]:
+    """Return the middle of a field, right and up of the dial's, rim = 1."""
+    if place.ring == 0:
+        return 0.0, 0.0
+    radius = (RING_EDGES[place.ring - 1] + RING_EDGES[place.ring]) / 2
+    angle = place.sector * SECTOR + heading
+    return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def _outline(
+    middle: QPointF, rim: float, place: _Field, heading: float, share: float = 1.0
+) -> QPainterPath:
+    """Return the border of the inner share of a field."""
+    path = QPainterPath()
+    gap = 0.012 * rim
+    if place.ring == 0:
+        radius = (RING_EDGES[0] * rim - gap) * math.sqrt(share)
+        path.addEllipse(middle, radius, radius)
+        return path
+    inner = RING_EDGES[place.ring - 1] * rim + gap
+    outer = inner + share * (RING_EDGES[place.ring] * rim - gap - inner)
+    start = place.sector * SECTOR + heading - SECTOR / 2 + GAP
+    span = math.degrees(SECTOR - 2 * GAP)
+    first = math.degrees(start)
+    path.arcMoveTo(_square(middle, inner), first)
+    path.arcTo(_square(middle, outer), first, span)
+    path.arcTo(_square(middle, inner), first + span, -span)
+    path.closeSubpath()
+    return path
+
+
+def _square(middle: QPointF, radius: float) -> QRectF:
+    return QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
+
+
+def _turn_x(box: QRectF, turn: float) -> float:
+    """Return where on the bar a turn (rad) lies, px."""
+    share = float(np.clip(turn / MAX_TURN, -1, 1))
+    return box.center().x() + share * box.width() / 2
+
+
+def _reaches(
+    kept: tuple[float, float] | None, needed: tuple[float, float] | None
+) -> bool:
+    if kept is None or needed is None:
+        return False
+    return kept[0] <= needed[0] and kept[1] >= needed[1]
