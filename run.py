@@ -22,6 +22,7 @@ Usage: {run} COMMAND
   demo             simulate a swing of the pen and calibrate the tip from it
   test [ARGS]      run the test suite; ARGS go to pytest
   check            run the linter, the formatter's check and the type checker
+  bench [ARGS]     measure every figure of speed and accuracy; try: {run} bench --help
   lightpen [ARGS]  run the program itself; try: {run} lightpen --help
 
 Each command first sets up whatever it needs."""
@@ -244,6 +245,10 @@ def main(arguments: Sequence[str]) -> int:
         case ["check"]:
             environment.set_up("development")
             return check(environment)
+        case ["bench", *options]:
+            environment.set_up("program")
+            os.chdir(ROOT)
+            become([environment.program("python"), "benchmarks/run.py", *options])
         case ["test", *options]:
             environment.set_up("development")
             os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")

@@ -1,0 +1,160 @@
+"""Many simulated calibrations against the Cramer-Rao bound and their own intervals."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from benchmarks.rows import Row, numbers
+from benchmarks.tips import one_step
+from benchmarks.workers import Workers
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.calibrate import calibrate
+from lightpen.camera import Camera
+from lightpen.formats.observation_files import Centers
+from lightpen.joint import ContactModel, reduce
+from lightpen.observe import observe_centers
+from lightpen.pen import Pen
+from lightpen.pose import fit_poses
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+N_CALIBRATIONS = 1600  # give the ratio to 0.02, the coverage to 0.5 %
+N_IMAGES = 300
+SIGMA = 0.05  # px
+CHUNK = 10  # calibrations a worker does at a time
+STREAM = 2  # of the seeds
+NORMAL_95 = 1.959964
+RATIO_LIMIT = 1.05
+COVERED = (93.0, 97.0)  # per cent
+
+
+@dataclass(frozen=True, eq=False)
+class _Trials:
+    """Errors of K calibrations, (K, 3) each, mm, and what they should be."""
+
+    bound: FloatArray
+    joint: FloatArray
+    joint_stated: FloatArray
+    two_stage: FloatArray
+    two_stage_stated: FloatArray
+    one_step: FloatArray
+    weighted: FloatArray
+
+
+def cramer_rao_rows(workers: Workers) -> list[Row]:
+    """Return the efficiency of the joint estimator and the honesty of its intervals."""
+    chunks = np.array_split(np.arange(N_CALIBRATIONS), N_CALIBRATIONS // CHUNK)
+    found = _joined(workers.map(_calibrations, chunks))
+    joint = _ratio(found.joint, found.bound)
+    error = joint / np.sqrt(2 * N_CALIBRATIONS)
+    covered = _covered(found.joint, found.joint_stated)
+    low, high = COVERED
+    return [
+        Row(
+            f"Rms tip error over the Cramér-Rao bound, x y z; {N_IMAGES} images, "
+            f"{SIGMA} px, {N_CALIBRATIONS} calibrations",
+            f"{numbers(joint, 2)} (standard error {error.max():.2f})",
+            f"<= {RATIO_LIMIT} each",
+            f"two-stage (paper) {numbers(_ratio(found.two_stage, found.bound), 1)} "
+            "with its bias by projected disc centres; "
+            f"algebraic one-step {numbers(_ratio(found.one_step, found.bound), 1)}, "
+            f"weighted {numbers(_ratio(found.weighted, found.bound), 2)}",
+            bool(np.all(joint <= RATIO_LIMIT)),
+        ),
+        Row(
+            "95 % intervals of these cover the truth, x y z",
+            f"{numbers(covered, 1)} %",
+            f"{low:.0f} to {high:.0f} % each",
+            "two-stage (paper) "
+            f"{numbers(_covered(found.two_stage, found.two_stage_stated), 0)}",
+            bool(np.all((covered >= low) & (covered <= high))),
+        ),
+    ]
+
+
+def cramer_rao_bound(
+    camera: Camera, pen: Pen, swing: Swing, sigma: float
+) -> FloatArray:
+    """Return the least covariance of (tip, cone) that any unbiased estimator has.
+
+    The inverse of the joint model's information at the truth, rotations eliminated.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    swing : Swing
+        The true poses.
+    sigma : float
+        Noise of a centre's coordinate, px.
+
+    Returns
+    -------
+    (6, 6) array
+        mm^2.
+    """
+    exact = simulate_centers(
+        camera, pen, swing.rotations, swing.translations, 0.0, np.random.default_rng(0)
+    )
+    model = ContactModel(camera, pen, exact)
+    state = model.at(swing.rotations, swing.tip_pen, swing.cone_cam)
+    information = reduce(state, np.isfinite(exact[..., 0]).astype(float)).S.sum(axis=0)
+    return sigma**2 * np.asarray(np.linalg.inv(information))
+
+
+def _calibrations(seeds: IntArray) -> _Trials:
+    return _joined([_calibration(int(seed)) for seed in seeds])
+
+
+def _calibration(seed: int) -> _Trials:
+    rng = np.random.default_rng([STREAM, seed])
+    camera, pen = paper_camera(), paper_pen()
+    swing = swing_poses(N_IMAGES, rng)
+    pixels = simulate_centers(
+        camera, pen, swing.rotations, swing.translations, SIGMA, rng
+    )
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = observe_centers(centers, camera, pen)
+    calibration = calibrate(camera, pen, seen)
+    poses = fit_poses(camera, pen, pixels, seen.rotations, seen.translations)
+
+    def error(tip_pen: FloatArray) -> FloatArray:
+        return (tip_pen - swing.tip_pen)[None]
+
+    return _Trials(
+        bound=_deviations(cramer_rao_bound(camera, pen, swing, SIGMA)),
+        joint=error(calibration.joint.tip_pen),
+        joint_stated=_deviations(calibration.budget.covariance),
+        two_stage=error(calibration.two_stage.tip_pen),
+        two_stage_stated=_deviations(calibration.two_stage_covariance),
+        one_step=error(one_step(poses, weighted=False).tip_pen),
+        weighted=error(one_step(poses, weighted=True).tip_pen),
+    )
+
+
+def _deviations(covariance: FloatArray) -> FloatArray:
+    return np.sqrt(np.diag(covariance)[None, :3])
+
+
+def _joined(parts: Sequence[_Trials]) -> _Trials:
+    def joined(name: str) -> FloatArray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    return _Trials(*map(joined, _Trials.__dataclass_fields__))
+
+
+def _ratio(errors: FloatArray, deviations: FloatArray) -> FloatArray:
+    """Return the root mean square of errors in units of the bound, per axis."""
+    return np.asarray(np.sqrt(np.mean((errors / deviations) ** 2, axis=0)))
+
+
+def _covered(errors: FloatArray, deviations: FloatArray) -> FloatArray:
+    """Return how many of the 95 % intervals hold the truth, per axis, per cent."""
+    return np.asarray(100 * np.mean(np.abs(errors) < NORMAL_95 * deviations, axis=0))

@@ -1,0 +1,104 @@
+"""Print every figure of speed and accuracy beside its limit and what others reach.
+
+Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
+
+Figures on the image sets need LIGHTPEN_DATA. Takes some three minutes on two
+cores; nothing else should run meanwhile. Exit status 1 if a limit is missed.
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.cramer_rao import cramer_rao_rows
+from benchmarks.hard_scene import hard_scene_rows
+from benchmarks.image_sets import data_folder
+from benchmarks.labelling import labelling_rows
+from benchmarks.machine import description
+from benchmarks.rows import NEEDS_DATA, Row, table
+from benchmarks.speed import speed_rows
+from benchmarks.tips import repeat_rows, tip_rows
+from benchmarks.tracker import tracker_rows
+from benchmarks.whole_program import program_rows
+from benchmarks.workers import Workers, one_core_workers
+
+README = Path(__file__).resolve().parents[1] / "README.md"
+BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
+
+Section = Callable[[Workers, Path | None], list[Row]]
+
+SECTIONS: dict[str, Section] = {
+    "tips": tip_rows,
+    "repeat": repeat_rows,
+    "bound": lambda workers, data: cramer_rao_rows(workers),
+    "hard": lambda workers, data: hard_scene_rows(workers),
+    "labels": lambda workers, data: labelling_rows(workers),
+    "tracker": lambda workers, data: tracker_rows(data),
+    "speed": lambda workers, data: speed_rows(workers),
+    "program": lambda workers, data: program_rows(data),
+}
+
+
+def main() -> int:
+    """Measure, print the table, and return the exit status."""
+    parser = argparse.ArgumentParser(
+        description="Print every figure of speed and accuracy."
+    )
+    parser.add_argument(
+        "sections", nargs="*", metavar="SECTION", help=f"of {', '.join(SECTIONS)}; all"
+    )
+    parser.add_argument(
+        "--update-readme", action="store_true", help="put the table into README.md"
+    )
+    options = parser.parse_args()
+    unknown = set(options.sections) - set(SECTIONS)
+    if unknown:
+        parser.error(f"unknown: {', '.join(sorted(unknown))}")
+    data = data_folder()
+    if options.update_readme and (options.sections or data is None):
+        parser.error("README.md takes the whole table only, which needs LIGHTPEN_DATA.")
+    if data is not None and not (data / "swing-full").is_dir():
+        parser.error(f"LIGHTPEN_DATA names {data}, which holds no folder swing-full.")
+    rows = _measured(options.sections or list(SECTIONS), data)
+    text = f"{description()}\n\n{table(rows)}"
+    print(text)
+    if options.update_readme:
+        _update_readme(text)
+    missed = [row for row in rows if not row.met]
+    n_without_data = sum(row.measured == NEEDS_DATA for row in rows)
+    _say(
+        f"{len(missed)} of {len(rows)} figures miss their limit; {n_without_data} "
+        "need LIGHTPEN_DATA."
+    )
+    return 1 if missed else 0
+
+
+def _measured(sections: list[str], data: Path | None) -> list[Row]:
+    rows = []
+    with one_core_workers() as workers:
+        for name in sections:
+            start = time.perf_counter()
+            rows += SECTIONS[name](workers, data)
+            _say(f"{name}: {time.perf_counter() - start:.0f} s")
+    return rows
+
+
+def _update_readme(text: str) -> None:
+    content = README.read_text(encoding="utf-8")
+    before, begin, rest = content.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not (begin and end):
+        raise ValueError(f"{README} has no lines {BEGIN} and {END}.")
+    README.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

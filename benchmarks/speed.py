@@ -1,0 +1,239 @@
+"""Times on one core: from image to pose, fits, rendering."""
+
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+from benchmarks.labelling import CAMERA, PEN, View, random_view
+from benchmarks.peers import (
+    DEFAULT_BLOB_STEP,
+    blob_centers,
+    blob_detector,
+    nearest,
+    solve_pnp,
+)
+from benchmarks.rows import Row
+from benchmarks.workers import Workers, elapsed_ms, median_ms
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.calibrate import calibrate
+from lightpen.ellipse import centers_from_centroids, ellipse_centers
+from lightpen.formats.observation_files import Centers
+from lightpen.joint import extend_joint, fit_joint
+from lightpen.labelling.labels import Labels, label_spots, track_spots
+from lightpen.observe import observe_centers
+from lightpen.pivot import fit_pivot
+from lightpen.pose import Poses, fit_paper_poses, fit_poses
+from lightpen.rigid import rotation_from_vector
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.shots import Shot, live_shot, render_shot
+from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
+from lightpen.spots import Spots, detect_spots
+from lightpen.two_stage import fit_two_stage
+
+N_IMAGES = 50  # of the camera, at 20 a second
+FRAME_RATE = 20.0
+N_VIEWS = 200  # spots to label
+TURN_ERROR = 0.01  # rad per axis, of a predicted pose: LEDs are some 10 px off
+N_FRAMES = 300
+SIGMA = 0.05  # px
+REPEATS = 15
+RPG = "rpg_monocular_pose_estimator (on other images, not run here) some"
+SCENE = Scene()
+
+LIMITS_MS = {
+    "tracking": 6.0,
+    "start": 25.0,
+    "start labels": 20.0,
+    "tracking labels": 1.0,
+    "joint": 50.0,
+    "extend": 10.0,
+    "render": 1000 / FRAME_RATE,
+}
+
+
+@dataclass(frozen=True)
+class _ImageTimes:
+    """Median times of one image, ms."""
+
+    tracking: float
+    start: float
+    blobs: float
+    default_blobs: float
+    render: float
+
+
+@dataclass(frozen=True)
+class _LabelTimes:
+    """Median times of the labels of one image, ms."""
+
+    start: float
+    tracking: float
+
+
+@dataclass(frozen=True)
+class _FitTimes:
+    """Median times of fits to N_FRAMES images, ms."""
+
+    joint: float
+    calibration: float
+    extend: float
+    two_stage: float
+
+
+def speed_rows(workers: Workers) -> list[Row]:
+    """Return the times that the program takes on one core."""
+    images = workers.call(_image_times)
+    labels = workers.call(_label_times)
+    fits = workers.call(_fit_times)
+    peer = (
+        f"cv2.SimpleBlobDetector and cv2.solvePnP {images.blobs:.1f}, at its default "
+        f"step {images.default_blobs:.1f}"
+    )
+    return [
+        _row("5 MP image to pose, tracking", images.tracking, "tracking", peer),
+        _row("5 MP image to pose, from nothing", images.start, "start", peer),
+        _row(
+            "labels from nothing, 4 LEDs missing and 5 foreign lamps",
+            labels.start,
+            "start labels",
+            f"{RPG} 200",
+        ),
+        _row(
+            "labels of the same when tracking",
+            labels.tracking,
+            "tracking labels",
+            f"{RPG} 1",
+        ),
+        _row(
+            f"joint fit of {N_FRAMES} images",
+            fits.joint,
+            "joint",
+            f"two-stage (paper) {fits.two_stage:.1f}; whole calibration, both "
+            f"estimators and uncertainty, {fits.calibration:.1f}",
+        ),
+        _row("joint fit, one image more", fits.extend, "extend"),
+        _row("simulator, one 5 MP image with noise", images.render, "render"),
+    ]
+
+
+def _row(what: str, time_ms: float, limit: str, others: str = "") -> Row:
+    limit_ms = LIMITS_MS[limit]
+    return Row(
+        what, f"{time_ms:.2f} ms", f"<= {limit_ms:g} ms", others, time_ms <= limit_ms
+    )
+
+
+def _image_times() -> _ImageTimes:
+    shots = [live_shot(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
+    images = [render_shot(SCENE, shot) for shot in shots]
+    blobs, default_blobs = blob_detector(), blob_detector(DEFAULT_BLOB_STEP)
+
+    def start(i: int) -> Poses:
+        spots = detect_spots(images[i])
+        return _pose(spots, label_spots(spots, CAMERA, PEN))
+
+    poses = [start(i) for i in range(N_IMAGES)]
+
+    def track(i: int) -> Poses:
+        R, t = _predicted(poses[i - 2], poses[i - 1])
+        spots = detect_spots(images[i])
+        return _pose(spots, track_spots(spots, CAMERA, PEN, R, t))
+
+    def solve(detector: cv2.SimpleBlobDetector, i: int) -> None:
+        found = blob_centers(detector, images[i])
+        solve_pnp(CAMERA, PEN, nearest(found, _true_centers(shots[i])))
+
+    def render(i: int) -> Image:
+        return render_shot(SCENE, live_shot(SCENE, i, i / FRAME_RATE))
+
+    return _ImageTimes(
+        tracking=_median_over_images(track),
+        start=_median_over_images(start),
+        blobs=_median_over_images(partial(solve, blobs)),
+        default_blobs=_median_over_images(partial(solve, default_blobs)),
+        render=_median_over_images(render),
+    )
+
+
+def _median_over_images(function: Callable[[int], object]) -> float:
+    """Return the median time of a call over the images but the first two, ms."""
+    function(2)
+    times = [elapsed_ms(partial(function, i)) for i in range(2, N_IMAGES)]
+    return statistics.median(times)
+
+
+def _pose(spots: Spots, labels: Labels) -> Poses:
+    seen = labels.whole
+    centers = np.full((1, PEN.n_leds, 2), np.nan)
+    shapes = np.full((1, PEN.n_leds, 2, 2), np.nan)
+    centers[0, seen] = spots.centers[labels.spot[seen]]
+    shapes[0, seen] = spots.shapes[labels.spot[seen]]
+    pixels = centers_from_centroids(CAMERA, centers, shapes)
+    return fit_poses(CAMERA, PEN, pixels, labels.R[None], labels.t[None])
+
+
+def _predicted(earlier: Poses, last: Poses) -> tuple[FloatArray, FloatArray]:
+    """Return the pose of a pen that goes on as it moved between two images."""
+    turn = last.rotations[0] @ earlier.rotations[0].T
+    R = turn @ last.rotations[0]
+    t = 2 * last.translations[0] - earlier.translations[0]
+    return R, t
+
+
+def _true_centers(shot: Shot) -> FloatArray:
+    leds, normals = leds_in_camera(PEN, shot.rotation, shot.translation)
+    return ellipse_centers(CAMERA, leds, normals, PEN.diameter / 2)
+
+
+def _label_times() -> _LabelTimes:
+    rng = np.random.default_rng(3)
+    views = [random_view(rng, n_missing=4, n_lamps=5) for _ in range(N_VIEWS)]
+    turns = rotation_from_vector(rng.normal(0, TURN_ERROR, (N_VIEWS, 3)))
+    middle = PEN.leds.mean(axis=0)
+
+    def start(view: View) -> Labels:
+        return label_spots(view.spots, CAMERA, PEN)
+
+    def track(view: View, turn: FloatArray) -> Labels:
+        R = turn @ view.R
+        t = view.t + (view.R - R) @ middle
+        return track_spots(view.spots, CAMERA, PEN, R, t)
+
+    starting = [elapsed_ms(partial(start, view)) for view in views]
+    tracking = [
+        elapsed_ms(partial(track, view, turn))
+        for view, turn in zip(views, turns, strict=True)
+    ]
+    return _LabelTimes(statistics.median(starting), statistics.median(tracking))
+
+
+def _fit_times() -> _FitTimes:
+    rng = np.random.default_rng(4)
+    swing = swing_poses(N_FRAMES, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, SIGMA, rng
+    )
+    centers = Centers(np.arange(N_FRAMES), pixels, Path("simulated"))
+    seen = observe_centers(centers, CAMERA, PEN)
+    poses = fit_poses(CAMERA, PEN, pixels, seen.rotations, seen.translations)
+    pivot = fit_pivot(poses.rotations, poses.translations, poses.covariances)
+    R, tip, cone = poses.rotations, pivot.tip_pen, pivot.pivot_cam
+    but_one = fit_joint(CAMERA, PEN, pixels[:-1], R[:-1], tip, cone)
+
+    def two_stage() -> None:
+        paper = fit_paper_poses(CAMERA, PEN, pixels, R, poses.translations)
+        fit_two_stage(paper.rotations, paper.translations)
+
+    return _FitTimes(
+        joint=median_ms(lambda: fit_joint(CAMERA, PEN, pixels, R, tip, cone), REPEATS),
+        calibration=median_ms(lambda: calibrate(CAMERA, PEN, seen), REPEATS),
+        extend=median_ms(
+            lambda: extend_joint(CAMERA, PEN, pixels, but_one, R[-1:]), REPEATS
+        ),
+        two_stage=median_ms(two_stage, REPEATS),
+    )
