@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess
-from typing import Any
+from typing import IO, Any
 
 import pytest
 
@@ -52,10 +52,24 @@ def script() -> Callable[..., CompletedProcess[str]]:
     name = "lightpen.exe" if os.name == "nt" else "lightpen"
     program = Path(sys.executable).with_name(name)
 
-    def run(*arguments: str | Path, **options: Any) -> CompletedProcess[str]:
+    def run(
+        *arguments: str | Path,
+        stdout: int | IO[str] = subprocess.PIPE,
+        stderr: int = subprocess.PIPE,
+        encoding: str = "utf-8",
+        environment: dict[str, str] | None = None,
+        before: Callable[[], None] | None = None,
+        timeout: float = 120,
+    ) -> CompletedProcess[str]:
         return subprocess.run(
             [program, *arguments],
-            **{"capture_output": True, "encoding": "utf-8", "timeout": 120} | options,
+            stdout=stdout,
+            stderr=stderr,
+            encoding=encoding,
+            env=None if environment is None else os.environ | environment,
+            preexec_fn=before,
+            timeout=timeout,
+            check=False,
         )
 
     return run

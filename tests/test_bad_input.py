@@ -1,290 +1,1273 @@
-"""Bad input: a sentence and an exit status, never a traceback."""
+"""Input that cannot be used is refused in words, with status 1 or 2, and never used."""
 
-import resource
+import csv
+import io
+import json
+import os
+import re
 import shutil
+import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from lightpen.cli import main
-from lightpen.images import read_image
-
-LIGHTPEN = Path(sys.executable).with_name("lightpen")
+Run = Callable[..., CompletedProcess[str]]
+Scene = Callable[..., Path]
+Truth = Callable[[Path], dict[str, Any]]
 Edit = Callable[[str], str]
+
+needs_posix = pytest.mark.skipif(os.name == "nt", reason="needs POSIX")
+needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="needs Linux")
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A swing that calibrates; tests replace one of its files by a bad one."""
+
+    images: Path
+    camera: Path
+    pen: Path
+    centers: Path
+    true_tip: tuple[float, float, float]
+
+    def arguments(self, **replaced: Path) -> list[str | Path]:
+        """Return those that calibrate from the centers, or from `images` if given."""
+        if "images" in replaced:
+            source: list[str | Path] = [replaced["images"]]
+        else:
+            source = ["--centers", replaced.get("centers", self.centers)]
+        camera = replaced.get("camera", self.camera)
+        pen = replaced.get("pen", self.pen)
+        return ["calibrate", *source, "--camera", camera, "--pen", pen]
+
+    def calibrate(
+        self, run: Run, *options: str | Path, **replaced: Path
+    ) -> CompletedProcess[str]:
+        return run(*self.arguments(**replaced), *options)
 
 
 @pytest.fixture(scope="module")
-def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sets") / "set"
-    assert main(["simulate", str(folder), "--images", "8", "--seed", "3"]) == 0
-    return folder
+def swing(
+    scene: Scene, truth: Truth, tmp_path_factory: pytest.TempPathFactory
+) -> Swing:
+    folder = scene("--images", "40", "--seed", "8")
+    answer = truth(folder)
+    rng = np.random.default_rng(8)
+    rows = ["frame,led,x_px,y_px"]
+    for i, frame in enumerate(answer["frames"], 1):
+        for led in frame["leds"]:
+            x, y = np.array(led["ellipse_center"]) + rng.normal(0, 0.03, 2)
+            rows.append(f"{i},{led['led']},{x:.5f},{y:.5f}")
+    centers = tmp_path_factory.mktemp("swing") / "centers.csv"
+    centers.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return Swing(
+        images=folder / "images",
+        camera=folder / "camera.yaml",
+        pen=folder / "leds.csv",
+        centers=centers,
+        true_tip=tuple(answer["pen"]["tip_in_leds_csv_frame_bestfit"]),
+    )
+
+
+def assert_refused(outcome: CompletedProcess[str], *words: str) -> None:
+    """Assert that a sentence says what is wrong, with all the words in it."""
+    assert outcome.returncode in (1, 2), outcome.stdout
+    assert outcome.stdout == ""
+    assert "Traceback" not in outcome.stderr
+    assert outcome.stderr.count("\n") <= 3, "that is no sentence"
+    assert outcome.stderr.rstrip().endswith(".")
+    for word in words:
+        assert re.search(word, outcome.stderr, re.IGNORECASE), outcome.stderr
+
+
+def assert_tip(
+    outcome: CompletedProcess[str], swing: Swing, tolerance: float = 0.02
+) -> None:
+    """Assert status 0 and the right tip in the text; 0.02 mm suits 0.03 px of noise."""
+    assert outcome.returncode == 0, outcome.stderr
+    line = re.search(r"joint((?:\s+-?\d+\.\d+){3})", outcome.stdout)
+    assert line is not None
+    tip = [float(word) for word in line[1].split()]
+    np.testing.assert_allclose(tip, swing.true_tip, atol=tolerance)
+
+
+def replace(old: str, new: str, count: int = 1) -> Edit:
+    """Return an edit that must find what it replaces."""
+
+    def edit(text: str) -> str:
+        changed = re.sub(old, new, text, count=count, flags=re.DOTALL | re.MULTILINE)
+        assert changed != text, f"{old} is not in the file"
+        return changed
+
+    return edit
+
+
+def cut(share: float) -> Edit:
+    return lambda text: text[: int(share * len(text))]
+
+
+def constant(text: str) -> Edit:
+    return lambda _: text
+
+
+def rows(change: Callable[[list[list[str]]], object]) -> Edit:
+    """Return an edit of the rows of a table without its header, in place."""
+
+    def edit(text: str) -> str:
+        head, *table = csv.reader(io.StringIO(text))
+        change(table)
+        return "\n".join(",".join(row) for row in [head, *table]) + "\n"
+
+    return edit
+
+
+def cells(row: int, column: int, value: str) -> Edit:
+    def change(table: list[list[str]]) -> None:
+        table[row][column] = value
+
+    return rows(change)
+
+
+# Content that is wrong in any file of text
+ANY_TEXT: dict[str, Edit] = {
+    "empty": constant(""),
+    "blank": constant(" \n\n \n"),
+    "prose": constant("Dear colleague,\nplease find the values below: none.\n"),
+    "braces": constant("{" * 3000),
+    "brackets": constant("[" * 100_000),
+    "json null": constant("null"),
+    "json list": constant("[1, 2, 3]"),
+    "json object": constant('{"a": 1}'),
+    "half an object": constant('{"camera_matrix": {"rows": 3'),
+    "nested YAML": constant("- " * 3000 + "a\n"),
+    "recursive YAML": constant("a: &a [*a]\n"),
+    "aliases": constant(
+        "a0: &a0 [x, x]\n"
+        + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 40))
+    ),
+    "xml bomb": constant(
+        '<?xml version="1.0"?><!DOCTYPE z [<!ENTITY a "aaaaaaaaaa">'
+        + "".join(
+            f'<!ENTITY a{i} "{("&a" + (str(i - 1) if i > 1 else "") + ";") * 10}">'
+            for i in range(1, 10)
+        )
+        + "]><opencv_storage>&a9;</opencv_storage>"
+    ),
+}
+
+ANY_BYTES = {
+    "nul bytes": bytes(1000),
+    "random bytes": np.random.default_rng(1).bytes(5000),
+    "a picture": b"\x89PNG\r\n\x1a\n" + bytes(range(256)),
+    "broken UTF-8": b"led,x_mm,y_mm,z_mm\n1,\xff\xfe\xfd,2,3\n",
+    "UTF-16": "led,x_mm,y_mm,z_mm\n1,1,2,3\n".encode("utf-16"),
+}
+
+ROLES = ("camera", "pen", "centers", "poses")
+
+
+def run_with(run: Run, swing: Swing, role: str, file: Path) -> CompletedProcess[str]:
+    if role == "poses":
+        return run("pivot", file)
+    return swing.calibrate(run, **{role: file})
+
+
+def test_the_unspoiled_files_give_the_tip(swing: Swing, lightpen: Run) -> None:
+    assert_tip(swing.calibrate(lightpen), swing)
+
+
+@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("name", ANY_TEXT)
+def test_a_file_of_other_text_is_refused_by_name(
+    name: str, role: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    suffixes = {"camera": (".yaml", ".json", ".xml"), "pen": (".csv", ".json")}
+    for suffix in suffixes.get(role, (".csv",)):
+        file = tmp_path / f"wrong-{role}{suffix}"
+        file.write_text(ANY_TEXT[name]("ignored"), encoding="utf-8")
+        assert_refused(run_with(lightpen, swing, role, file), re.escape(file.name))
+
+
+@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("name", ANY_BYTES)
+def test_a_file_that_is_no_text_is_refused_by_name(
+    name: str, role: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / f"wrong-{role}{'.yaml' if role == 'camera' else '.csv'}"
+    file.write_bytes(ANY_BYTES[name])
+    assert_refused(run_with(lightpen, swing, role, file), re.escape(file.name))
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_missing_file_is_refused_by_name(
+    role: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    outcome = run_with(lightpen, swing, role, tmp_path / "nowhere.yaml")
+    assert_refused(outcome, r"nowhere\.yaml")
+    assert outcome.returncode == 2
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_a_folder_in_place_of_a_file_is_refused_by_name(
+    role: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = tmp_path / "some-folder"
+    folder.mkdir()
+    assert_refused(run_with(lightpen, swing, role, folder), "some-folder")
+
+
+BAD_CAMERAS: dict[str, Edit] = {
+    "cut at a third": cut(0.33),
+    "cut in the matrix": cut(0.45),
+    "cut after the matrix": replace(r"^distortion_coefficients.*", ""),
+    "cut in the distortion": replace(r", 0\.0003.*", ""),
+    "no matrix": replace(r"^camera_matrix.*?\]\n", ""),
+    "no image size": replace(r"^image_(width|height): \d+\n", "", 2),
+    "a word for a number": replace("4638.2", "wide"),
+    "nan": replace(r"4638\.2", ".nan"),
+    "bare nan": replace(r"4638\.2", "nan"),
+    "infinite": replace(r"4638\.2", ".inf"),
+    "overflowing": replace(r"4638\.2", "1e999"),
+    "nan distortion": replace(r"0\.105", ".nan"),
+    "focal length 0": replace(r"4638\.2", "0.0"),
+    "negative focal length": replace(r"4637\.1", "-4637.1"),
+    "two rows": replace("rows: 3", "rows: 2"),
+    "2 x 3 matrix": replace(
+        r"rows: 3.*?\]", "rows: 2\n   cols: 3\n   dt: d\n   data: [1, 0, 3, 0, 1, 3]"
+    ),
+    "a number too few": replace(r"4638\.2, ", ""),
+    "a number too many": replace(r"4638\.2,", "4638.2, 4638.2,"),
+    "transposed matrix": replace(
+        r"data: \[ 4638.*?\]",
+        "data: [4638.2, 0, 0, 0, 4637.1, 0, 1219.6, 1031.3, 1]",
+    ),
+    "last row not 0 0 1": replace(r"0\.0, 0\.0, 1\.0", "0.0, 0.0, 7.0"),
+    "3 distortion coefficients": replace(
+        r"cols: 5(.*)data: \[ -0\.082, 0\.105, 0\.0003, -0\.0002, 0\.0",
+        r"cols: 3\1data: [ -0.082, 0.105, 0.0003",
+    ),
+    "a table": constant("a,b,c\n1,2,3\n"),
+    "another name for the width": replace("image_width", "width_of_it"),
+    "cut in the middle": cut(0.5),
+    "matrix twice": replace(r"(^camera_matrix.*?\]\n)", r"\1\1"),
+    "width twice": replace(r"(^image_width: )(\d+\n)", r"\g<1>\2\g<1>640\n"),
+    "width 0": replace("image_width: 2448", "image_width: 0"),
+    "negative width": replace("image_width: 2448", "image_width: -2448"),
+    "fractional width": replace("image_width: 2448", "image_width: 2448.5"),
+    "width in words": replace("image_width: 2448", "image_width: wide"),
+    "width too large": replace("image_width: 2448", "image_width: 99999999999"),
+    "principal point far outside": replace(r"1219\.6", "99999.0"),
+    "unclosed bracket": replace(r"\]\ndistortion", "\ndistortion"),
+    "tabs": replace("   rows", "\trows"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_CAMERAS)
+def test_a_bad_camera_file_is_refused_by_name(
+    name: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-camera.yaml"
+    text = swing.camera.read_text(encoding="utf-8")
+    file.write_text(BAD_CAMERAS[name](text), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, camera=file)
+    assert_refused(outcome, r"bad-camera\.yaml")
+    assert outcome.returncode == 2
+
+
+def test_a_distortion_that_folds_the_image_is_refused(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-camera.yaml"
+    text = swing.camera.read_text(encoding="utf-8")
+    file.write_text(replace(r"-0\.082", "-8.2e9")(text), encoding="utf-8")
+    for options in ({}, {"images": swing.images}):
+        outcome = swing.calibrate(lightpen, camera=file, **options)
+        assert_refused(outcome, "camera", "distortion")
+
+
+@pytest.mark.parametrize(
+    "tag",
+    [
+        "!!python/object/apply:pathlib.Path.touch",
+        "!!python/object/apply:os.mkdir",
+        "!!python/object/new:os.mkdir",
+    ],
+)
+@pytest.mark.parametrize("head", ["%YAML:1.0\n---\n", "%YAML 1.2\n---\n", ""])
+def test_unsafe_yaml_tags_are_refused_and_never_executed(
+    tag: str, head: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    marker = tmp_path / "executed"
+    argument = (
+        f"!!python/object/apply:pathlib.Path ['{marker}']"
+        if "touch" in tag
+        else f"'{marker}'"
+    )
+    body = swing.camera.read_text(encoding="utf-8").split("---\n", 1)[1]
+    file = tmp_path / "unsafe.yaml"
+    file.write_text(f"{head}{body}note: {tag} [{argument}]\n", encoding="utf-8")
+    outcome = swing.calibrate(lightpen, camera=file)
+    assert not marker.exists()
+    assert_refused(outcome, r"unsafe\.yaml")
+
+
+@pytest.mark.parametrize(
+    ("size", "words"), [(("2048", "2448"), "2048"), (("1224", "1024"), "1224")]
+)
+def test_a_camera_of_another_image_size_is_refused_with_both_sizes(
+    size: tuple[str, str], words: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "other-camera.yaml"
+    text = swing.camera.read_text(encoding="utf-8")
+    text = text.replace("image_width: 2448", f"image_width: {size[0]}")
+    text = text.replace("image_height: 2048", f"image_height: {size[1]}")
+    if size[0] == "1224":
+        text = re.sub(r"4638\.2|4637\.1|1219\.6|1031\.3",
+                      lambda number: str(float(number[0]) / 2), text)  # fmt: skip
+    file.write_text(text, encoding="utf-8")
+    outcome = swing.calibrate(lightpen, camera=file, images=swing.images)
+    assert_refused(outcome, words, "2448")
+
+
+def opencv_storage(swing: Swing, suffix: str, matrix: str, distortion: str) -> str:
+    storage = cv2.FileStorage(
+        "a" + suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
+    )
+    camera, coefficients = camera_numbers(swing)
+    storage.write("image_width", 2448)
+    storage.write("image_height", 2048)
+    storage.write(matrix, camera)
+    storage.write(distortion, coefficients)
+    return str(storage.releaseAndGetString())
+
+
+def camera_numbers(swing: Swing) -> tuple[Any, Any]:
+    storage = cv2.FileStorage(str(swing.camera), cv2.FILE_STORAGE_READ)
+    return (
+        storage.getNode("camera_matrix").mat(),
+        storage.getNode("distortion_coefficients").mat(),
+    )
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".yml", ".xml", ".json"])
+@pytest.mark.parametrize("matrix", ["camera_matrix", "cameraMatrix"])
+@pytest.mark.parametrize("distortion", ["distortion_coefficients", "dist_coeffs"])
+def test_opencv_camera_files_of_any_kind_are_read(
+    suffix: str, matrix: str, distortion: str, swing: Swing, lightpen: Run,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    file = tmp_path / ("camera" + suffix)
+    text = opencv_storage(swing, suffix, matrix, distortion)
+    file.write_text(text, encoding="utf-8")
+    assert_tip(swing.calibrate(lightpen, camera=file), swing)
+    if suffix == ".yaml":
+        file.write_text(text.replace("%YAML:1.0", "%YAML 1.2"), encoding="utf-8")
+        assert_tip(swing.calibrate(lightpen, camera=file), swing)
+
+
+ROS = """\
+image_width: 2448
+image_height: 2048
+camera_name: station
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [4638.2, 0., 1219.6, 0., 4637.1, 1031.3, 0., 0., 1.]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [-0.082, 0.105, 0.0003, -0.0002, 0.]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [1., 0., 0., 0., 1., 0., 0., 0., 1.]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [4600., 0., 1219., 0., 0., 4600., 1031., 0., 0., 0., 1., 0.]
+"""
+
+KALIBR = """\
+cam0:
+  cam_overlaps: []
+  camera_model: pinhole
+  distortion_coeffs: [-0.082, 0.105, 0.0003, -0.0002]
+  distortion_model: radtan
+  intrinsics: [4638.2, 4637.1, 1219.6, 1031.3]
+  resolution: [2448, 2048]
+  rostopic: /station/image
+"""
+
+# jsonencode(toStruct(intrinsics)) of R2022b and later, and of the years before.
+MATLAB_NEW = """\
+{"FocalLength":[4638.2,4637.1],"PrincipalPoint":[1220.6,1032.3],"ImageSize":[2048,2448],
+"RadialDistortion":[-0.082,0.105],"TangentialDistortion":[0.0003,-0.0002],"Skew":0,
+"K":[[4638.2,0,1220.6],[0,4637.1,1032.3],[0,0,1]]}
+"""
+MATLAB_OLD = """\
+{"RadialDistortion":[-0.082,0.105,0],"TangentialDistortion":[0.0003,-0.0002],
+"IntrinsicMatrix":[[4638.2,0,0],[0,4637.1,0],[1220.6,1032.3,1]],"ImageSize":[2048,2448],
+"WorldUnits":"millimeters","EstimateSkew":0,"NumRadialDistortionCoefficients":3,
+"EstimateTangentialDistortion":1,"Version":{"Version":"9.3"}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("ros.yaml", ROS),
+        ("camchain.yaml", KALIBR),
+        ("new.json", MATLAB_NEW),
+        ("old.json", MATLAB_OLD),
+    ],
+)
+def test_camera_files_of_other_programs_give_the_same_tip(
+    name: str, text: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / name
+    file.write_text(text, encoding="utf-8")
+    wanted = swing.calibrate(lightpen)
+    # All of the result but the line of the LED file, to the last digit shown.
+    assert swing.calibrate(lightpen, camera=file).stdout == wanted.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a fisheye of ROS", ROS.replace("plumb_bob", "equidistant")),
+        ("a fisheye of Kalibr", KALIBR.replace("radtan", "equi")),
+        ("an omnidirectional camera", KALIBR.replace("pinhole", "omni")),
+        ("a short list", KALIBR.replace("[4638.2, 4637.1, ", "[")),
+        ("two cameras", KALIBR + KALIBR.replace("cam0", "cam1")),
+        (
+            "a skewed MATLAB camera",
+            MATLAB_NEW.replace("[4638.2,0,1", "[4638.2,50,1").replace(":0,", ":50,"),
+        ),
+        ("a MATLAB camera without size", MATLAB_NEW.replace('"ImageSize"', '"Size"')),
+        ("half a MATLAB file", MATLAB_OLD[:200]),
+        ("a key twice", MATLAB_OLD.replace("{", '{"ImageSize":[1,1],', 1)),
+    ],
+)
+def test_bad_camera_files_of_other_programs_are_refused(
+    name: str, text: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / ("other.json" if text.startswith("{") else "other.yaml")
+    file.write_text(text, encoding="utf-8")
+    assert_refused(swing.calibrate(lightpen, camera=file), r"other\.")
+
+
+def swap(first: int, second: int) -> Edit:
+    """Give each of two LEDs the place of the other."""
+
+    def change(table: list[list[str]]) -> None:
+        one, two = table[first - 1], table[second - 1]
+        one[1:], two[1:] = two[1:], one[1:]
+
+    return rows(change)
+
+
+def scale(*factors: float) -> Edit:
+    """Scale x, y and z."""
+
+    def change(table: list[list[str]]) -> None:
+        for row in table:
+            for column, factor in enumerate(factors, 1):
+                row[column] = repr(float(row[column]) * factor)
+
+    return rows(change)
+
+
+def only(*leds: int) -> Edit:
+    def change(table: list[list[str]]) -> None:
+        table[:] = [row for row in table if int(row[0]) in leds]
+
+    return rows(change)
+
+
+BAD_PENS: dict[str, Edit] = {
+    "header only": only(),
+    "cut in the middle": cut(0.5),
+    "a letter for a digit": replace("60|59", "6O"),
+    "3 LEDs": only(1, 2, 3),
+    "LEDs in a line": scale(0, 1, 0),
+    "LEDs at one place": scale(0, 0, 0),
+    "an LED twice": rows(lambda table: table.append(table[3])),
+    "a number twice": cells(4, 0, "4"),
+    "a place twice": rows(lambda table: table[5].__setitem__(
+        slice(1, 4), table[6][1:4])),
+    "number 0": cells(0, 0, "0"),
+    "number -1": cells(0, 0, "-1"),
+    "number 1.5": cells(0, 0, "1.5"),
+    "number in words": cells(0, 0, "one"),
+    "a gap in the numbers": cells(9, 0, "77"),
+    "a word for a number": cells(3, 2, "high"),
+    "an empty cell": cells(3, 2, ""),
+    "nan": cells(3, 2, "nan"),
+    "infinite": cells(3, 2, "inf"),
+    "overflowing": cells(3, 2, "1e400"),
+    "two decimal points": cells(3, 2, "1.7.9"),
+    "a cell too few": rows(lambda table: table[3].pop()),
+    "a row of one cell": rows(lambda table: table[3].__delitem__(slice(1, None))),
+    "a cell too many": rows(lambda table: table[3].append("8")),
+    "cut": lambda text: text[: text.rindex(",0.0,0.0")],
+    "no z": lambda text: "\n".join(
+        ",".join(line.split(",")[:3]) for line in text.splitlines()),
+    "other headers": replace("led,x_mm,y_mm,z_mm", "a,b,c,d"),
+    "x twice": replace("led,x_mm,y_mm,z_mm", "led,x_mm,x_mm,z_mm"),
+    "mixed units": replace("led,x_mm,y_mm,z_mm", "led,x_mm,y_m,z_mm"),
+    "an unknown unit": replace("led,x_mm,y_mm,z_mm", "led,x_ft,y_ft,z_ft"),
+    "normals of length 0": replace(r",0\.0,0\.0,1\.0,", ",0.0,0.0,0.0,"),
+    "diameter 0": replace(r",10\.0$", ",0.0", 0),
+    "a negative diameter": replace(r",10\.0$", ",-10.0"),
+    "a huge diameter": replace(r",10\.0$", ",10000.0", 0),
+    "metres said to be mm": scale(1e-3, 1e-3, 1e-3),
+    "micrometres said to be mm": scale(1e3, 1e3, 1e3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD_PENS)
+def test_a_bad_pen_file_is_refused_by_name(
+    name: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-pen.csv"
+    text = swing.pen.read_text(encoding="utf-8")
+    file.write_text(BAD_PENS[name](text), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, pen=file)
+    assert_refused(outcome, r"bad-pen\.csv")
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (constant(""), ["empty"]),
+        (replace("60|59", "6O"), ["is not a number"]),
+        (swap(2, 3), ["LEDs 2 and 3"]),
+        (swap(5, 8), ["LEDs 5 and 8"]),
+        (scale(1e-3, 1e-3, 1e-3), ["metres", "--units m"]),
+        (scale(-1, 1, 1), ["mirrored", "in x"]),
+        (rows(lambda table: table.reverse()), ["order"]),
+        (rows(lambda table: table.append(table[-1])), ["LED 10"]),
+    ],
+    ids=["empty", "letter", "back", "columns", "metres", "mirror", "order", "twice"],
+)
+def test_what_is_wrong_with_a_pen_file_is_said(
+    edit: Edit, words: list[str], swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-pen.csv"
+    file.write_text(edit(swing.pen.read_text(encoding="utf-8")), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, pen=file)
+    assert_refused(outcome, r"bad-pen\.csv", *words)
+
+
+@pytest.mark.parametrize(
+    ("name", "edit"),
+    [
+        ("swapped 1 and 4", swap(1, 4)),
+        ("swapped 1 and 2", swap(1, 2)),
+        ("swapped 2 and 3", swap(2, 3)),
+        ("swapped 5 and 8", swap(5, 8)),
+        ("swapped 4 and 5", swap(4, 5)),
+        ("swapped 6 and 9", swap(6, 9)),
+        ("mirrored in x", scale(-1, 1, 1)),
+        ("mirrored in y", scale(1, -1, 1)),
+        ("mirrored in z", scale(1, 1, -1)),
+    ],
+)
+def test_swapped_and_mirrored_leds_are_refused(
+    name: str, edit: Edit, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-pen.csv"
+    file.write_text(edit(swing.pen.read_text(encoding="utf-8")), encoding="utf-8")
+    assert_refused(swing.calibrate(lightpen, pen=file), "LED|pen")
+    assert_refused(swing.calibrate(lightpen, pen=file, images=swing.images), "LED|pen")
+
+
+def test_leds_out_of_order_are_sorted_by_number_or_refused(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-pen.csv"
+    text = swing.pen.read_text(encoding="utf-8")
+    file.write_text(rows(lambda table: table.reverse())(text), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, pen=file)
+    if outcome.returncode == 0:
+        assert_tip(outcome, swing)
+    else:
+        assert_refused(outcome, r"bad-pen\.csv", "order")
+
+
+def test_a_displaced_led_is_named(swing: Swing, lightpen: Run, tmp_path: Path) -> None:
+    file = tmp_path / "bent-pen.csv"
+    text = swing.pen.read_text(encoding="utf-8")
+    y = float(text.splitlines()[6].split(",")[2])
+    file.write_text(cells(5, 2, f"{y + 0.5}")(text), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, pen=file)
+    assert re.search(r"LED 6\b", outcome.stdout + outcome.stderr)
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "options"),
+    [
+        ("metres", lambda text: scale(1e-3, 1e-3, 1e-3)(text).replace("_mm", "_m"), ()),
+        ("semicolons and decimal commas",
+         lambda text: text.replace(",", ";").replace(".", ","), ()),
+        ("tabs", lambda text: text.replace(",", "\t"), ()),
+        ("tabs and decimal commas",
+         lambda text: text.replace(",", "\t").replace(".", ","), ()),
+        ("no header", lambda text: text.split("\n", 1)[1], ("--units", "mm")),
+        ("a byte order mark", lambda text: "\ufeff" + text, ()),
+        ("Windows line ends", lambda text: text.replace("\n", "\r\n"), ()),
+        ("spaces", lambda text: text.replace(",", " , "), ()),
+        ("a blank line at the end", lambda text: text + "\n\n", ()),
+    ],
+)  # fmt: skip
+def test_pen_files_of_other_habits_are_read(
+    name: str, edit: Edit, options: tuple[str, ...], swing: Swing, lightpen: Run,
+    tmp_path: Path,
+) -> None:  # fmt: skip
+    file = tmp_path / "pen.csv"
+    text = "\n".join(
+        ",".join(line.split(",")[:4])
+        for line in swing.pen.read_text(encoding="utf-8").splitlines()
+    )
+    if name != "metres":  # its decimal numbers are written anew
+        assert_tip(swing.calibrate(lightpen, pen=swing.pen), swing)
+    text = edit(text + "\n")
+    file.write_bytes(text.encode())
+    assert_tip(swing.calibrate(lightpen, *options, pen=file), swing)
+
+
+def test_a_pen_file_without_units_is_refused_and_asks_for_them(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-pen.csv"
+    text = swing.pen.read_text(encoding="utf-8")
+    bare = "\n".join(",".join(line.split(",")[:4]) for line in text.splitlines()[1:])
+    for content in (bare, "led,x,y,z\n" + bare):
+        file.write_text(content, encoding="utf-8")
+        assert_refused(swing.calibrate(lightpen, pen=file), r"bad-pen\.csv", "unit")
+
+
+def test_units_that_contradict_the_pen_file_are_refused(
+    swing: Swing, lightpen: Run
+) -> None:
+    assert_refused(swing.calibrate(lightpen, "--units", "m"), "unit| mm|metre")
+
+
+BAD_CENTERS: dict[str, Edit] = {
+    "header only": rows(lambda table: table.clear()),
+    "other columns": replace("frame,led,x_px,y_px", "frame,led,u,v"),
+    "no led column": lambda text: re.sub(r"^([^,]*),[^,]*", r"\1", text, flags=re.M),
+    "an LED twice in a frame": rows(lambda table: table.append(table[3])),
+    "an LED at two places": rows(
+        lambda table: table.append([*table[3][:2], "100.0", "100.0"])),
+    "LED 11": cells(4, 1, "11"),
+    "LED 0": cells(4, 1, "0"),
+    "LED -1": cells(4, 1, "-1"),
+    "LED 1.5": cells(4, 1, "1.5"),
+    "LED 1e9": cells(4, 1, "1000000000"),
+    "a frame in words": cells(4, 0, "first"),
+    "a word for a number": cells(4, 2, "left"),
+    "an empty cell": cells(4, 2, ""),
+    "infinite": cells(4, 2, "inf"),
+    "overflowing": cells(4, 2, "1e400"),
+    "a cell too few": rows(lambda table: table[4].pop()),
+    "a cell too many": rows(lambda table: table[4].append("8")),
+    "cut": lambda text: text[: text.rindex(",") - 3],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD_CENTERS)
+def test_a_bad_centers_file_is_refused_by_name(
+    name: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-centers.csv"
+    text = swing.centers.read_text(encoding="utf-8")
+    file.write_text(BAD_CENTERS[name](text), encoding="utf-8")
+    assert_refused(swing.calibrate(lightpen, centers=file), r"bad-centers\.csv")
+
+
+@pytest.mark.parametrize("x", ["1e300", "-1e9", "99999", "-50.0"])
+def test_a_center_outside_the_image_is_refused_or_not_used(
+    x: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file, out = tmp_path / "bad-centers.csv", tmp_path / "out.json"
+    text = swing.centers.read_text(encoding="utf-8")
+    file.write_text(cells(4, 2, x)(text), encoding="utf-8")
+    outcome = swing.calibrate(lightpen, "--json", out, centers=file)
+    if outcome.returncode:
+        assert_refused(outcome, r"bad-centers\.csv")
+        return
+    assert_tip(outcome, swing)
+    frame = json.loads(out.read_text(encoding="utf-8"))["frames"][0]
+    assert not any(led["used"] for led in frame["leds"] if led["led"] == 5)
+
+
+def test_frame_numbers_need_not_be_consecutive(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "centers.csv"
+    text = swing.centers.read_text(encoding="utf-8")
+    file.write_text(
+        rows(lambda table: [row.__setitem__(0, row[0] + "00000") for row in table])(
+            text
+        ),
+        encoding="utf-8",
+    )
+    assert_tip(swing.calibrate(lightpen, centers=file), swing)
+
+
+@pytest.mark.parametrize("role", ["centers", "poses"])
+def test_a_table_without_header_is_read_as_documented_or_refused(
+    role: str, swing: Swing, poses_text: str, lightpen: Run, tmp_path: Path
+) -> None:
+    text = (
+        swing.centers.read_text(encoding="utf-8") if role == "centers" else poses_text
+    )
+    head, body = text.split("\n", 1)
+    outputs = []
+    for content in (text, body):
+        file = tmp_path / "table.csv"
+        file.write_text(content, encoding="utf-8")
+        outcome = run_with(lightpen, swing, role, file)
+        if outcome.returncode:
+            assert_refused(outcome, r"table\.csv", "header")
+            return
+        outputs.append(outcome.stdout)
+    assert outputs[0] == outputs[1], head
+
+
+def test_centers_of_another_camera_are_refused(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    def halve(table: list[list[str]]) -> None:
+        for row in table:
+            row[2:] = [str(float(cell) / 2) for cell in row[2:]]
+
+    file = tmp_path / "bad-centers.csv"
+    text = swing.centers.read_text(encoding="utf-8")
+    file.write_text(rows(halve)(text), encoding="utf-8")
+    assert_refused(swing.calibrate(lightpen, centers=file))
+
+
+@pytest.fixture(scope="module")
+def poses_text(truth: Truth, scene: Scene) -> str:
+    answer = truth(scene("--images", "40", "--seed", "8"))
+    lines = ["pose,r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm"]
+    for i, frame in enumerate(answer["frames"], 1):
+        numbers = [*np.ravel(frame["R"]), *frame["T"]]
+        lines.append(",".join([str(i), *(f"{number:.10f}" for number in numbers)]))
+    return "\n".join(lines) + "\n"
+
+
+def one_axis(table: list[list[str]]) -> None:
+    """Swing about the x axis of the camera only, the tip at the origin."""
+    for i, row in enumerate(table):
+        c, s = np.cos(0.02 * i), np.sin(0.02 * i)
+        rotation = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        translation = -rotation @ [0, 100, 0]
+        row[1:] = [repr(float(n)) for n in (*rotation.ravel(), *translation)]
+
+
+def negate(*columns: int) -> Callable[[list[list[str]]], None]:
+    def change(table: list[list[str]]) -> None:
+        for row in table:
+            for column in columns:
+                row[column] = repr(-float(row[column]))
+
+    return change
+
+
+BAD_POSES: dict[str, Edit] = {
+    "header only": rows(lambda table: table.clear()),
+    "other columns": replace("tx_mm", "x"),
+    "a column twice": replace("r12", "r11"),
+    "two poses": rows(lambda table: table.__delitem__(slice(2, None))),
+    "a pose twice": rows(lambda table: table.append(table[3])),
+    "a number twice": cells(4, 0, "4"),
+    "no rotation": cells(4, 1, "2.0"),
+    "rotation of zeros": rows(
+        lambda table: table[4].__setitem__(slice(1, 10), ["0"] * 9)),
+    "mirrored": rows(negate(1, 4, 7)),
+    "a word for a number": cells(4, 11, "far"),
+    "an empty cell": cells(4, 11, ""),
+    "nan": cells(4, 11, "nan"),
+    "infinite": cells(4, 11, "inf"),
+    "overflowing": cells(4, 11, "1e400"),
+    "a cell too few": rows(lambda table: table[4].pop()),
+    "a cell too many": rows(lambda table: table[4].append("8")),
+    "cut": lambda text: text[: text.rindex(",") - 3],
+    "degrees for a matrix": replace(r"^1,[^,]*", "1,90.0"),
+}  # fmt: skip
+
+
+def test_the_unspoiled_poses_give_the_tip(
+    poses_text: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "poses.csv"
+    file.write_text(poses_text, encoding="utf-8")
+    outcome = lightpen("pivot", file)
+    assert outcome.returncode == 0, outcome.stderr
+
+
+@pytest.mark.parametrize("name", BAD_POSES)
+def test_a_bad_poses_file_is_refused_by_name(
+    name: str, poses_text: str, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "bad-poses.csv"
+    file.write_text(BAD_POSES[name](poses_text), encoding="utf-8")
+    outcome = lightpen("pivot", file)
+    if name == "two poses":  # readable, yet no tip
+        assert_refused(outcome, r"\b(2|two)\b.*poses|poses.*\b(2|two)\b")
+    else:
+        assert_refused(outcome, r"bad-poses\.csv")
+        assert outcome.returncode == 2
+
+
+@pytest.mark.parametrize("options", [(), ("--least-squares",)])
+def test_poses_about_one_axis_are_refused_and_the_axis_named(
+    options: tuple[str, ...], poses_text: str, lightpen: Run, tmp_path: Path
+) -> None:
+    file = tmp_path / "poses.csv"
+    file.write_text(rows(one_axis)(poses_text), encoding="utf-8")
+    outcome = lightpen("pivot", file, *options)
+    assert_refused(outcome, "axis|direction")
+    assert outcome.returncode == 1
+
+
+@pytest.mark.parametrize("options", [(), ("--least-squares",)])
+def test_equal_poses_are_refused(
+    options: tuple[str, ...], poses_text: str, lightpen: Run, tmp_path: Path
+) -> None:
+    def equal(table: list[list[str]]) -> None:
+        for row in table:
+            row[1:] = table[0][1:]
+
+    file = tmp_path / "poses.csv"
+    file.write_text(rows(equal)(poses_text), encoding="utf-8")
+    outcome = lightpen("pivot", file, *options)
+    assert_refused(outcome, "tilt|turn|lean|move|alike")
+    assert outcome.returncode == 1
 
 
 @pytest.fixture
-def folder(original: Path, tmp_path: Path) -> Path:
-    """Return a set of one's own to spoil."""
-    return shutil.copytree(original, tmp_path / "set")
+def images(swing: Swing, tmp_path: Path) -> Path:
+    """Return a folder with the images of the swing, to spoil."""
+    folder = tmp_path / "images"
+    shutil.copytree(swing.images, folder)
+    return folder
 
 
-def files_of(folder: Path) -> list[str]:
-    return ["--camera", str(folder / "camera.yaml"), "--pen", str(folder / "leds.csv")]
+def read(path: Path) -> Any:
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
 
 
-def refusal(folder: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str]:
-    """Return exit status and message of a calibration that must fail."""
-    capsys.readouterr()
-    status = main(["calibrate", str(folder / "images"), *files_of(folder)])
-    message = capsys.readouterr().err
-    assert status in (1, 2)
-    assert message.startswith("lightpen: ")
-    assert message.rstrip().endswith(".")
-    assert "Traceback" not in message
-    return status, message
+def write(path: Path, image: Any) -> None:
+    path.write_bytes(cv2.imencode(path.suffix, image)[1].tobytes())
 
 
-def scaled(text: str, factor: float) -> str:
-    lines = text.splitlines()
-    rows = [line.split(",") for line in lines[1:]]
-    changed = [
-        [row[0], *(repr(float(v) * factor) for v in row[1:4]), *row[4:]] for row in rows
-    ]
-    return "\n".join([lines[0], *(",".join(row) for row in changed)]) + "\n"
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("empty", lambda _: b""),
+        ("half", lambda content: content[: len(content) // 2]),
+        ("without its end", lambda content: content[:-3000]),
+        ("head only", lambda content: content[:40]),
+        ("text", lambda _: b"this is no image"),
+        ("flipped bytes", lambda content: content[:9000] + bytes(
+            byte ^ 0x5A for byte in content[9000:20000]) + content[20000:]),
+    ],
+)  # fmt: skip
+def test_a_corrupt_image_is_dropped_and_named_and_the_rest_used(
+    name: str, spoil: Callable[[bytes], bytes], swing: Swing, images: Path,
+    script: Run, tmp_path: Path,
+) -> None:  # fmt: skip
+    corrupt, file = images / "frame_0020.png", tmp_path / "out.json"
+    corrupt.write_bytes(spoil(corrupt.read_bytes()))
+    outcome = swing.calibrate(script, "--json", file, images=images)
+    assert_tip(outcome, swing)
+    assert outcome.stderr == ""  # no complaints of the image library
+    assert "frame_0020.png" in outcome.stdout
+    frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
+    assert [frame["file"] for frame in frames if not frame["used"]] == [corrupt.name]
+    assert frames[19]["reason"]
 
 
-def swapped(first: int, second: int) -> Edit:
-    """Return an edit that gives two LEDs each other's coordinates."""
-
-    def edit(text: str) -> str:
-        lines = text.splitlines()
-        a, b = (lines[k].split(",", 1) for k in (first, second))
-        lines[first], lines[second] = f"{a[0]},{b[1]}", f"{b[0]},{a[1]}"
-        return "\n".join(lines) + "\n"
-
-    return edit
-
-
-def mirrored(column: int) -> Edit:
-    def edit(text: str) -> str:
-        lines = text.splitlines()
-        for k in range(1, len(lines)):
-            row = lines[k].split(",")
-            row[column] = repr(-float(row[column]))
-            lines[k] = ",".join(row)
-        return "\n".join(lines) + "\n"
-
-    return edit
-
-
-PEN_EDITS: dict[str, tuple[Edit, str]] = {
-    "empty": (lambda text: "", "empty"),
-    "header only": (lambda text: text.splitlines()[0] + "\n", "no "),
-    "cut off": (lambda text: text[: len(text) // 2], "leds.csv"),
-    "a letter": (lambda text: text.replace("60", "6O", 1), "is not a number"),
-    "not a number": (lambda text: text.replace("-30", "nan", 1), "leds.csv"),
-    "a row twice": (lambda text: text + text.splitlines()[-1] + "\n", "10"),
-    "out of order": (
-        lambda text: "\n".join(text.splitlines()[:3][:1] + text.splitlines()[:0:-1]),
-        "order",
-    ),
-    "swapped on the back": (swapped(2, 3), "2"),
-    "swapped between columns": (swapped(5, 8), "5"),
-    "in metres": (lambda text: scaled(text, 0.001), "metres"),
-    "mirrored in x": (mirrored(1), "mirror"),
-    "mirrored in z": (mirrored(3), "leds.csv"),
-    "a binary file": (lambda text: "\x00\x01\x02" * 100, "leds.csv"),
-}
-
-
-@pytest.mark.parametrize("case", PEN_EDITS)
-def test_a_bad_pen_file_is_refused(
-    folder: Path, case: str, capsys: pytest.CaptureFixture[str]
+def test_a_folder_of_nothing_but_corrupt_images_is_refused(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    edit, word = PEN_EDITS[case]
-    pen = folder / "leds.csv"
-    pen.write_text(edit(pen.read_text()))
-
-    _, message = refusal(folder, capsys)
-
-    assert word in message
+    for path in images.iterdir():
+        path.write_bytes(path.read_bytes()[:5000])
+    outcome = swing.calibrate(lightpen, images=images)
+    assert_refused(outcome, "image", "read|corrupt|damaged|truncated|decode")
+    assert "spots" not in outcome.stderr  # nobody has seen any
 
 
-CAMERA_EDITS: dict[str, tuple[Edit, str]] = {
-    "empty": (lambda text: "", "empty"),
-    "cut off": (lambda text: text[: len(text) // 2], "camera.yaml"),
-    "a letter": (lambda text: text.replace("4638", "46E8x"), "camera.yaml"),
-    "no size": (lambda text: text.replace("image_width", "width_of_it"), "width"),
-    "a size twice": (lambda text: text + "image_width: 2448\n", "second time"),
-    "unsafe": (
-        lambda text: text + 'x: !!python/object/apply:os.system ["touch boo"]\n',
-        "camera.yaml",
-    ),
-    "of another size": (
-        lambda text: text.replace("2448", "1224").replace("2048", "1024"),
-        "1224 x 1024",
-    ),
-    "not finite": (lambda text: text.replace("4638.2", ".inf"), "camera.yaml"),
-    "a table": (lambda text: "a,b,c\n1,2,3\n", "camera.yaml"),
-}
-
-
-@pytest.mark.parametrize("case", CAMERA_EDITS)
-def test_a_bad_camera_file_is_refused(
-    folder: Path,
-    case: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+def test_an_image_of_another_size_is_refused_or_dropped_by_name(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    monkeypatch.chdir(folder)
-    edit, word = CAMERA_EDITS[case]
-    camera = folder / "camera.yaml"
-    before = camera.read_text()
-    camera.write_text(edit(before))
-    assert camera.read_text() != before
-
-    _, message = refusal(folder, capsys)
-
-    assert word in message
-    assert not (folder / "boo").exists()
+    odd = images / "frame_0020.png"
+    write(odd, read(odd)[:1024, :1224])
+    outcome = swing.calibrate(lightpen, images=images)
+    assert "frame_0020.png" in outcome.stdout + outcome.stderr
+    if outcome.returncode:
+        assert_refused(outcome, "1224")
+    else:
+        assert_tip(outcome, swing)
+        assert "39 of 40 used" in outcome.stdout
 
 
-@pytest.mark.parametrize("name", ["camera.yaml", "leds.csv", "images"])
-def test_what_is_missing_is_named(
-    folder: Path, name: str, capsys: pytest.CaptureFixture[str]
+def test_cropped_colour_and_deep_images_in_one_folder_are_told_apart(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    (folder / name).rename(folder / "elsewhere")
+    first, second, third, *_ = sorted(images.iterdir())
+    write(first, read(first)[:1000])
+    write(second, cv2.cvtColor(read(second), cv2.COLOR_GRAY2BGR))
+    write(third, read(third).astype(np.uint16) * np.uint16(257))
+    outcome = swing.calibrate(lightpen, images=images)
+    assert_tip(outcome, swing)
+    assert "39 of 40 used" in outcome.stdout
+    assert "1 wrong size: frame_0001.png" in outcome.stdout
 
-    status, message = refusal(folder, capsys)
 
-    assert status == 2
-    assert name in message
-
-
-@pytest.mark.parametrize("name", ["camera.yaml", "leds.csv"])
-def test_a_huge_file_is_refused_before_it_is_read(
-    folder: Path, name: str, capsys: pytest.CaptureFixture[str]
+def test_the_first_image_does_not_set_the_size_of_the_others(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    with (folder / name).open("wb") as stream:
-        stream.truncate(20_000_000_000)
+    odd = images / "frame_0001.png"
+    write(odd, read(odd)[:1024, :1224])
+    outcome = swing.calibrate(lightpen, images=images)
+    if outcome.returncode:
+        assert_refused(outcome, "1224")
+    else:
+        assert_tip(outcome, swing)
 
-    status, message = refusal(folder, capsys)
 
-    assert status == 2
-    assert "MB" in message or "bytes" in message
-
-
-def test_an_empty_folder_is_refused(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+def test_a_turned_image_is_refused_or_dropped(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    for image in (folder / "images").iterdir():
-        image.unlink()
-
-    status, message = refusal(folder, capsys)
-
-    assert status == 2
-    assert "no images" in message
+    for path in images.iterdir():
+        write(path, np.rot90(read(path)).copy())
+    assert_refused(swing.calibrate(lightpen, images=images), "2048", "2448")
 
 
-def test_images_of_another_pen_are_refused(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("suffix", [".png", ".tiff", ".bmp"])
+def test_colour_images_give_the_tip_or_are_refused(
+    suffix: str, swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    other = tmp_path / "other"
-    assert main(["simulate", str(other), "--images", "2", "--pen", "eight"]) == 0
-    shutil.copy(other / "leds.csv", folder / "leds.csv")
+    for path in sorted(images.iterdir()):
+        write(path.with_suffix(suffix), cv2.cvtColor(read(path), cv2.COLOR_GRAY2BGR))
+        if suffix != ".png":
+            path.unlink()
+    outcome = swing.calibrate(lightpen, images=images)
+    if outcome.returncode:
+        assert_refused(outcome, "colou?r|channel")
+    else:
+        assert_tip(outcome, swing)
 
-    status, message = refusal(folder, capsys)
 
-    assert status == 1
-    assert "do not fit the pen file" in message
-
-
-def test_an_image_of_another_size_and_a_colour_image_do_no_harm(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+def test_colour_images_with_transparency_give_the_tip_or_are_refused(
+    swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    images = sorted((folder / "images").iterdir())
-    grey = read_image(images[1])
-    for path, image in (
-        (images[0], grey[:1000]),
-        (images[1], cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)),
-        (images[2], grey.astype(np.uint16) * 257),
-    ):
-        path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
-    options = [
-        "--camera",
-        str(folder / "camera.yaml"),
-        "--pen",
-        str(folder / "leds.csv"),
-    ]
-
-    assert main(["calibrate", str(folder / "images"), *options]) == 0
-
-    printed = capsys.readouterr().out
-    assert "7 of 8 used" in printed
-    assert "1 wrong size: frame_0001.png" in printed
+    for path in images.iterdir():
+        write(path, cv2.cvtColor(read(path), cv2.COLOR_GRAY2BGRA))
+    outcome = swing.calibrate(lightpen, images=images)
+    if outcome.returncode:
+        assert_refused(outcome, "colou?r|channel")
+    else:
+        assert_tip(outcome, swing)
 
 
-CENTERS_EDITS: dict[str, tuple[Edit, int]] = {
-    "empty": (lambda text: "", 2),
-    "a letter": (lambda text: text.replace("1,2,", "1,2,x", 1), 2),
-    "an LED twice": (lambda text: text + text.splitlines()[-1] + "\n", 2),
-    "LED 11": (lambda text: text.replace("1,10,", "1,11,", 1), 2),
-    "cut off": (lambda text: text[: len(text) - 12], 2),
-    "few images": (lambda text: "\n".join(text.splitlines()[:41]), 1),
-}
-
-
-@pytest.mark.parametrize("case", CENTERS_EDITS)
-def test_bad_centres_are_refused(
-    shared_data: Path,
-    tmp_path: Path,
-    case: str,
-    capsys: pytest.CaptureFixture[str],
+@pytest.mark.parametrize("factor", [16, 257])
+def test_16_bit_images_give_the_tip(
+    factor: int, swing: Swing, images: Path, lightpen: Run
 ) -> None:
-    edit, expected = CENTERS_EDITS[case]
-    repeat = shared_data / "repeat"
-    centers = tmp_path / "centers.csv"
-    centers.write_text(edit((repeat / "calib_01.csv").read_text()))
-    capsys.readouterr()
-
-    status = main(["calibrate", "--centers", str(centers), *files_of(repeat)])
-
-    message = capsys.readouterr().err
-    assert status == expected
-    assert message.startswith("lightpen: ")
+    for path in images.iterdir():
+        write(path, read(path).astype(np.uint16) * np.uint16(factor))
+    assert_tip(swing.calibrate(lightpen, images=images), swing)
 
 
-def test_wrong_usage_ends_with_status_two(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in ([], ["calibrate"], ["calibrate", "x", "--camera", "c"], ["fly"]):
-        with pytest.raises(SystemExit) as caught:
-            main(arguments)
-        assert caught.value.code == 2
-    files = ["--camera", "c", "--pen", "p"]
-    assert main(["calibrate", *files]) == 2
-    assert main(["calibrate", "x", "--centers", "y", *files]) == 2
-    assert "either IMAGES or --centers" in capsys.readouterr().err
+def test_images_of_mixed_depth_give_the_tip_or_are_refused(
+    swing: Swing, images: Path, lightpen: Run
+) -> None:
+    for path in sorted(images.iterdir())[::2]:
+        write(path, read(path).astype(np.uint16) * np.uint16(257))
+    outcome = swing.calibrate(lightpen, images=images)
+    if outcome.returncode:
+        assert_refused(outcome, "bit|depth")
+    else:
+        assert_tip(outcome, swing)
 
 
-def test_a_full_disk_leaves_the_old_record_whole(folder: Path, tmp_path: Path) -> None:
-    record = tmp_path / "tip.json"
-    record.write_text("the old record")
+def test_an_empty_folder_is_refused_by_name(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = tmp_path / "nothing-here"
+    folder.mkdir()
+    assert_refused(swing.calibrate(lightpen, images=folder), "nothing-here", "image")
 
-    def small_files() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 
-    arguments = ["calibrate", str(folder / "images"), *files_of(folder)]
-    done = subprocess.run(
-        [LIGHTPEN, *arguments, "--json", record],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=small_files,
+def test_a_folder_without_images_is_refused_by_name(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = tmp_path / "nothing-here"
+    (folder / "raw").mkdir(parents=True)
+    (folder / "notes.txt").write_text("no images")
+    assert_refused(swing.calibrate(lightpen, images=folder), "nothing-here", "image")
+
+
+@pytest.mark.parametrize("name", ["nowhere", "nowhere/*.png", "nowhere.avi"])
+def test_images_that_do_not_exist_are_refused_by_name(
+    name: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    outcome = swing.calibrate(lightpen, images=tmp_path / name)
+    assert_refused(outcome, "nowhere")
+    assert outcome.returncode == 2
+
+
+def test_other_files_beside_the_images_do_no_harm(
+    swing: Swing, images: Path, lightpen: Run
+) -> None:
+    (images / "notes.txt").write_text("a windy day")
+    (images / "Thumbs.db").write_bytes(bytes(100))
+    (images / ".hidden").write_text("")
+    (images / "old").mkdir()
+    outcome = swing.calibrate(lightpen, images=images)
+    assert_tip(outcome, swing)
+    assert "40 of 40 used" in outcome.stdout
+
+
+@pytest.mark.parametrize("content", [b"", b"no video", bytes(100_000)])
+def test_a_file_that_is_no_video_is_refused_by_name(
+    content: bytes, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    video = tmp_path / "swing.avi"
+    video.write_bytes(content)
+    assert_refused(swing.calibrate(lightpen, images=video), r"swing\.avi")
+
+
+def test_a_cut_video_is_refused_or_its_whole_images_are_used(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    video = tmp_path / "swing.avi"
+    codec = cv2.VideoWriter.fourcc(*"FFV1")
+    writer = cv2.VideoWriter(str(video), codec, 20.0, (2448, 2048), isColor=False)
+    if not writer.isOpened():
+        pytest.skip("OpenCV has no lossless video here")
+    for path in sorted(swing.images.iterdir()):
+        writer.write(read(path))
+    writer.release()
+    video.write_bytes(video.read_bytes()[: int(0.7 * video.stat().st_size)])
+    outcome = swing.calibrate(lightpen, images=video)
+    if outcome.returncode:
+        assert_refused(outcome, r"swing\.avi")
+    else:
+        assert_tip(outcome, swing)
+
+
+def png_of_zeros(width: int, height: int) -> bytes:
+    """Return a small PNG file of a grey image that is huge in memory."""
+
+    def chunk(kind: bytes, content: bytes) -> bytes:
+        check = struct.pack(">I", zlib.crc32(kind + content))
+        return struct.pack(">I", len(content)) + kind + content + check
+
+    packer = zlib.compressobj(1)
+    line = bytes(100 * (width + 1))
+    pixels = b"".join(packer.compress(line) for _ in range(height // 100))
+    header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + chunk(b"IDAT", pixels + packer.flush())
+        + chunk(b"IEND", b"")
     )
 
-    assert done.returncode == 2
-    assert "tip.json cannot be written" in done.stderr
-    assert record.read_text() == "the old record"
-    assert list(tmp_path.glob("*tip*")) == [record]
+
+def peak_megabytes(arguments: list[str | Path]) -> tuple[CompletedProcess[str], int]:
+    """Run the program and measure the memory of its process alone."""
+    code = (
+        "import re, sys\n"
+        "from lightpen.cli import main\n"
+        "status = main(sys.argv[1:])\n"
+        "text = open('/proc/self/status').read()\n"
+        "print(re.search(r'VmHWM:\\s+(\\d+)', text)[1], end='', file=sys.stderr)\n"
+        "sys.exit(status)\n"
+    )
+    outcome = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        capture_output=True, encoding="utf-8", timeout=120, check=False,
+    )  # fmt: skip
+    message, _, peak = outcome.stderr.rpartition("\n")
+    outcome.stderr = message
+    return outcome, int(peak) // 1000
+
+
+@needs_linux
+@pytest.mark.parametrize("role", [*ROLES, "images"])
+def test_a_huge_file_is_refused_before_it_fills_the_memory(
+    role: str, swing: Swing, images: Path, tmp_path: Path
+) -> None:
+    suffix = {"camera": ".yaml", "images": ".png"}.get(role, ".csv")
+    file = (images if role == "images" else tmp_path) / f"huge{suffix}"
+    with file.open("wb") as sparse:
+        sparse.truncate(3_000_000_000)
+    if role == "poses":
+        arguments: list[str | Path] = ["pivot", file]
+    else:
+        arguments = swing.arguments(**{role: images if role == "images" else file})
+    outcome, peak = peak_megabytes(arguments)
+    assert peak < 600
+    if role == "images":
+        assert file.name in outcome.stdout + outcome.stderr
+    else:
+        assert_refused(outcome, re.escape(file.name), r"\d+ (MB|bytes)")
+        assert outcome.returncode == 2
+
+
+@needs_linux
+def test_a_huge_image_in_a_small_file_does_not_fill_the_memory(
+    swing: Swing, images: Path
+) -> None:
+    file = images / "frame_0020.png"
+    file.write_bytes(png_of_zeros(40_000, 20_000))
+    outcome, peak = peak_megabytes(swing.arguments(images=images))
+    assert "Traceback" not in outcome.stderr
+    assert file.name in outcome.stdout + outcome.stderr
+    assert peak < 600  # 800 if it is read
+
+
+@needs_linux
+@pytest.mark.parametrize("role", ROLES)
+def test_an_endless_file_is_refused(role: str, swing: Swing, script: Run) -> None:
+    import resource
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (6_000_000_000, 6_000_000_000))
+
+    def run(*arguments: str | Path) -> CompletedProcess[str]:
+        return script(*arguments, before=limit, timeout=30)
+
+    assert_refused(run_with(run, swing, role, Path("/dev/zero")), "/dev/zero")
+
+
+def with_disk_of(size: int, script: Run) -> Run:
+    """Return a run of the program that can write no file above a size in bytes."""
+    import resource
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+    return lambda *arguments: script(*arguments, before=limit)
+
+
+@needs_posix
+@pytest.mark.parametrize("size", [0, 1000, 8192])
+def test_a_full_disk_leaves_the_old_record_whole(
+    size: int, swing: Swing, script: Run, tmp_path: Path
+) -> None:
+    folder = tmp_path / "records"
+    folder.mkdir()
+    file = folder / "calibration.json"
+    file.write_text("the old record", encoding="utf-8")
+    outcome = swing.calibrate(with_disk_of(size, script), "--json", file)
+    assert outcome.returncode == 2
+    assert "Traceback" not in outcome.stderr
+    assert "calibration.json" in outcome.stderr
+    assert outcome.stderr.rstrip().endswith(".")
+    assert file.read_text(encoding="utf-8") == "the old record"
+    assert list(folder.iterdir()) == [file], "a torso is left behind"
+
+
+@needs_posix
+def test_a_full_disk_leaves_the_old_pivot_record_whole(
+    poses_text: str, script: Run, tmp_path: Path
+) -> None:
+    poses, file = tmp_path / "poses.csv", tmp_path / "pivot.json"
+    poses.write_text(poses_text, encoding="utf-8")
+    file.write_text("the old record", encoding="utf-8")
+    outcome = with_disk_of(500, script)("pivot", poses, "--json", file)
+    assert outcome.returncode == 2
+    assert "pivot.json" in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+    assert file.read_text(encoding="utf-8") == "the old record"
+
+
+@needs_posix
+def test_a_full_disk_stops_a_simulation_with_a_sentence(
+    script: Run, tmp_path: Path
+) -> None:
+    run = with_disk_of(20_000, script)
+    outcome = run("simulate", tmp_path / "set", "--images", "3")
+    assert_refused(outcome, "set")
+    assert outcome.returncode == 2
+
+
+@needs_linux
+@pytest.mark.parametrize("command", ["calibrate", "pivot", "simulate"])
+def test_output_that_cannot_be_written_ends_with_a_sentence(
+    command: str, swing: Swing, poses_text: str, script: Run, tmp_path: Path
+) -> None:
+    poses = tmp_path / "poses.csv"
+    poses.write_text(poses_text, encoding="utf-8")
+    with Path("/dev/full").open("w") as full:
+
+        def run(*arguments: str | Path) -> CompletedProcess[str]:
+            return script(*arguments, stdout=full)
+
+        if command == "calibrate":
+            outcome = swing.calibrate(run)
+        elif command == "pivot":
+            outcome = run("pivot", poses)
+        else:
+            outcome = run("simulate", tmp_path / "set", "--images", "2")
+    assert outcome.returncode == 2
+    assert "Traceback" not in outcome.stderr
+    assert "Exception ignored" not in outcome.stderr
+    assert outcome.stderr.rstrip().endswith(".")
+
+
+@pytest.mark.parametrize("name", ["no-such-folder/out.json", "folder"])
+def test_a_record_that_cannot_be_written_is_refused_by_name(
+    name: str, swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "folder").mkdir()
+    outcome = swing.calibrate(lightpen, "--json", tmp_path / name)
+    assert outcome.returncode == 2
+    assert "Traceback" not in outcome.stderr
+    assert Path(name).name in outcome.stderr
+
+
+def test_no_record_is_written_where_there_is_no_tip(
+    swing: Swing, lightpen: Run, tmp_path: Path
+) -> None:
+    centers, file = tmp_path / "centers.csv", tmp_path / "calibration.json"
+    text = swing.centers.read_text(encoding="utf-8")
+    centers.write_text("\n".join(text.splitlines()[:21]), encoding="utf-8")
+    file.write_text("the old record", encoding="utf-8")
+    outcome = swing.calibrate(lightpen, "--json", file, centers=centers)
+    assert_refused(outcome, "image")
+    assert outcome.returncode == 1
+    assert file.read_text(encoding="utf-8") == "the old record"
+
+
+@needs_linux
+def test_a_name_that_is_no_utf_8_is_written_and_shown(
+    swing: Swing, images: Path, script: Run, tmp_path: Path
+) -> None:
+    first = images / "frame_0001.png"
+    first.rename(os.fsdecode(os.fsencode(images) + b"/frame_0001_\xff.png"))
+    odd = images / os.fsdecode(b"corrupt_\xfe.png")
+    odd.write_bytes(b"no image")
+    file = tmp_path / "out.json"
+    outcome = swing.calibrate(script, "--json", file, images=images)
+    assert_tip(outcome, swing)
+    assert len(json.loads(file.read_bytes())["frames"]) == 41

@@ -17,7 +17,7 @@ Record = Callable[..., dict[str, Any]]
 Scene = Callable[..., Path]
 Truth = Callable[[Path], dict[str, Any]]
 
-HARD_SEEDS = ("1", "2", "3", "4", "5")
+HARD_SEEDS = ("1", "2", "3", "4", "24")
 OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")
 
 # Frames that tell nothing right about the tip. The simulator's flags are truth.
@@ -64,21 +64,18 @@ def assert_refused(outcome: CompletedProcess[str], words: str) -> None:
     assert outcome.stderr.rstrip().endswith(".")
 
 
-# What goes wrong at a station
-
-
 @pytest.fixture(params=HARD_SEEDS)
 def hard(request: pytest.FixtureRequest, scene: Scene) -> Path:
-    return scene("--scene", "hard", "--images", "50", "--seed", request.param)
+    return scene("--scene", "hard", "--images", "60", "--seed", request.param)
 
 
 def test_a_hard_scene_holds_what_it_must(scene: Scene, truth: Truth) -> None:
     flags = {
         flag
         for seed in HARD_SEEDS
-        for frame in truth(
-            scene("--scene", "hard", "--images", "50", "--seed", seed)
-        )["frames"]
+        for frame in truth(scene("--scene", "hard", "--images", "60", "--seed", seed))[
+            "frames"
+        ]
         for flag in frame["flags"]
     }
     assert flags >= USELESS | {"clutter", "fingers", "missing", "saturated"}
@@ -94,6 +91,42 @@ def test_a_hard_scene_gives_the_tip_to_8_um(
     hard: Path, record: Record, truth: Truth
 ) -> None:
     assert tip_error_um(record(hard), truth(hard)) <= 8.0
+
+
+def test_a_hard_scene_gives_an_uncertainty_that_covers_the_error(
+    hard: Path, record: Record, truth: Truth
+) -> None:
+    fields = record(hard)
+    covariance = np.array(fields["covariance"])
+    scale = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(scale, scale)
+    np.testing.assert_allclose(correlation, correlation.T, atol=1e-6)
+    assert np.linalg.eigvalsh(correlation).min() > 0
+    # 4 standard deviations: a larger error in one of 15 coordinates is no accident.
+    true_tip = truth(hard)["pen"]["tip_in_leds_csv_frame_bestfit"]
+    error = np.array(fields["tip_pen_mm"]) - true_tip
+    assert np.all(np.abs(error) <= 2 * np.array(fields["expanded_uncertainty_mm"]))
+
+
+def test_noise_hardly_changes_the_covariance_of_a_hard_scene(
+    scene: Scene, record: Record, tmp_path: Path
+) -> None:
+    folder = scene("--scene", "hard", "--images", "60", "--seed", "24")
+    fields = record(folder)
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        file = tmp_path / f"centers_{seed}.csv"
+        rows = ["frame,led,x_px,y_px"]
+        for i, frame in enumerate(fields["frames"], 1):
+            for led in frame["leds"]:
+                x, y = rng.normal([led["x_px"], led["y_px"]], 1e-4)
+                rows.append(f"{i},{led['led']},{x},{y}")
+        file.write_text("\n".join(rows) + "\n", encoding="utf-8")
+        covariance = np.array(record(folder, "--centers", str(file))["covariance"])
+        scale = np.sqrt(np.abs(np.diag(covariance)))
+        correlation = covariance / np.outer(scale, scale)
+        np.testing.assert_allclose(correlation, correlation.T, atol=1e-6)
+        assert np.linalg.eigvalsh(correlation).min() > 0
 
 
 def test_useless_images_of_a_hard_scene_are_dropped_with_their_reason(
@@ -128,11 +161,11 @@ def test_good_images_of_a_hard_scene_are_used(
 def test_hard_images_in_any_order_give_the_same_labels(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--scene", "hard", "--images", "50", "--seed", "3")
+    folder = scene("--scene", "hard", "--images", "60", "--seed", "3")
     mixed = tmp_path / "images"
     mixed.mkdir()
     answer = truth(folder)
-    order = np.random.default_rng(3).permutation(50)
+    order = np.random.default_rng(3).permutation(60)
     for i, j in enumerate(order):
         name = f"frame_{i + 1:04d}.png"
         shutil.copy(folder / answer["frames"][j]["file"], mixed / name)
@@ -167,17 +200,12 @@ def test_images_without_any_pen_are_refused(
     assert_refused(outcome, "image")
 
 
-# The image formats
-
-
 @pytest.mark.parametrize("bits", ["8", "12", "16"])
 def test_images_of_any_depth_give_the_tip_to_8_um(
     bits: str, scene: Scene, record: Record, truth: Truth
 ) -> None:
     folder = scene("--bits", bits, "--images", "40", "--seed", "8")
-    image = cv2.imread(
-        str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED
-    )
+    image = cv2.imread(str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED)
     assert image is not None
     assert image.dtype == (np.uint8 if bits == "8" else np.uint16)
     assert image.max() < 2 ** int(bits)
@@ -186,17 +214,14 @@ def test_images_of_any_depth_give_the_tip_to_8_um(
     assert wrong_leds(record(folder), truth(folder)) == []
 
 
-# Degenerate swings
-
-
 def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
     scene: Scene, lightpen: Run
 ) -> None:
     for seed in ("1", "2", "3"):
         folder = scene("--swing", "one-axis", "--images", "40", "--seed", seed)
         outcome = calibrate_set(lightpen, folder)
-        assert_refused(outcome, r"(axis|direction).*(tilt|lean|swing|swung|turn)"
-                                r"|(tilt|lean|swing|swung|turn).*(axis|direction)")  # fmt: skip
+        assert_refused(outcome, "axis|direction")
+        assert_refused(outcome, "tilt|lean|turn")
 
 
 def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
@@ -250,9 +275,6 @@ def test_one_image_again_and_again_is_refused(
     assert_refused(outcome, "tilt|lean|alike|same")
 
 
-# Other pens
-
-
 @pytest.mark.parametrize("seed", ["1", "2"])
 @pytest.mark.parametrize("pen", OTHER_PENS)
 def test_another_layout_gives_its_tip_or_is_refused(
@@ -284,9 +306,7 @@ def test_clutter_and_missing_leds_never_mislabel_another_layout(
     assert wrong_leds(fields, truth(folder)) == []
 
 
-def test_one_other_layout_at_least_is_calibrated(
-    scene: Scene, lightpen: Run
-) -> None:
+def test_one_other_layout_at_least_is_calibrated(scene: Scene, lightpen: Run) -> None:
     statuses = {
         pen: calibrate_set(
             lightpen, scene("--pen", pen, "--images", "40", "--seed", "1")
@@ -296,7 +316,8 @@ def test_one_other_layout_at_least_is_calibrated(
     assert statuses == {"eight": 0, "fanned": 0}
 
 
-@pytest.mark.parametrize("pen", OTHER_PENS)
+# The fanned pen has its LEDs where the common one has them.
+@pytest.mark.parametrize("pen", ["six", "eight", "near-symmetric"])
 def test_the_file_of_another_pen_is_refused(
     pen: str, scene: Scene, lightpen: Run
 ) -> None:
@@ -306,4 +327,17 @@ def test_the_file_of_another_pen_is_refused(
         "calibrate", images / "images",
         "--camera", images / "camera.yaml", "--pen", other / "leds.csv",
     )  # fmt: skip
-    assert_refused(outcome, "pen")
+    assert_refused(outcome, "do not fit the pen file")
+
+
+@pytest.mark.parametrize("pen", ["six", "eight", "near-symmetric"])
+def test_the_file_of_another_pen_is_refused_for_independent_images(
+    pen: str, scene: Scene, lightpen: Run, shared_data: Path
+) -> None:
+    images = shared_data / "swing-clean"
+    other = scene("--pen", pen, "--images", "40", "--seed", "1")
+    outcome = lightpen(
+        "calibrate", images / "images",
+        "--camera", images / "camera.yaml", "--pen", other / "leds.csv",
+    )  # fmt: skip
+    assert_refused(outcome, "do not fit the pen file")

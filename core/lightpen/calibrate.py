@@ -34,7 +34,8 @@ class Calibration:
     """A calibrated tip, with all that is known about it.
 
     The arrays over images hold all N images of the observations; the fits hold the
-    M images that were used, in the same order.
+    M images that entered them, in the same order. An image of which the joint fit
+    could use no LED is among these M and not among the used ones.
 
     Attributes
     ----------
@@ -112,7 +113,7 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         observations.rotations[posed],
         observations.translations[posed],
     )
-    _require_fit(all_poses)
+    _require_fit(all_poses.sigma)
     fitting = _fitting(all_poses)
     reasons[posed[~fitting]] = Reason.MISFIT
     _require_images(posed[fitting], reasons, observations.advice)
@@ -136,6 +137,8 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         fit_joint(camera, pen, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam),
     )
     joint = geometry.joint
+    _require_fit(joint.sigma)
+    reasons[chosen[~joint.used.any(axis=1)]] = Reason.MISFIT
     paper_poses = fit_paper_poses(
         camera, pen, pixels, poses.rotations, poses.translations
     )
@@ -153,7 +156,7 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
     return Calibration(
         observations=observations,
         reasons=tuple(reasons),
-        used=np.isin(np.arange(n_images), chosen),
+        used=reasons == Reason.NONE,
         tips_cam=tips_cam,
         rms=rms,
         leds_used=leds_used,
@@ -177,10 +180,10 @@ def _smeared(observations: Observations) -> BoolArray:
     return np.asarray(np.nan_to_num(widths) > SMEARED * usual)
 
 
-def _require_fit(poses: Poses) -> None:
-    if poses.sigma > MAX_SIGMA:
+def _require_fit(sigma: float) -> None:
+    if sigma > MAX_SIGMA:
         raise CalibrationError(
-            f"The LED positions do not fit the images: {poses.sigma:.1f} px, "
+            f"The LED positions do not fit the images: {sigma:.1f} px, "
             f"{USUAL_SIGMA} px or less is usual. Check that the pen file is of this "
             "pen with its LEDs in order, and the camera file of this camera."
         )

@@ -33,6 +33,7 @@ from lightpen.report import (
     Inputs,
     calibration_json,
     calibration_text,
+    encoded,
     pivot_json,
     pivot_text,
 )
@@ -56,17 +57,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run: Callable[[argparse.Namespace], None] = options.run
     try:
         run(options)
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except CalibrationError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return NO_TIP
     except LightpenError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return BAD_INPUT
-    except BrokenPipeError:  # the reader of our output has left
+    except OSError as error:  # files have errors of their own: this is our output
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if isinstance(error, BrokenPipeError):  # its reader has seen enough
+            return DONE
+        print(
+            f"lightpen: The result cannot be printed: {error.strerror}. Free some "
+            "space, or print it elsewhere.",
+            file=sys.stderr,
+        )
+        return BAD_INPUT
     except KeyboardInterrupt:
-        print("lightpen: stopped; nothing was written.", file=sys.stderr)
+        print("lightpen: stopped.", file=sys.stderr)
         return BAD_INPUT
     return DONE
 
@@ -185,6 +195,7 @@ def _add_pen_options(parser: argparse.ArgumentParser) -> None:
 def _calibrate(options: argparse.Namespace) -> None:
     if bool(options.images) == (options.centers is not None):
         raise UsageError("Give either IMAGES or --centers FILE.csv.")
+    _require_other_file(options.json, options.camera, options.pen, options.centers)
     camera = read_camera(options.camera)
     nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
     pen = read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
@@ -207,7 +218,7 @@ def _calibrate(options: argparse.Namespace) -> None:
             nominal_tip=pen.nominal_tip,
         )
         record = calibration_json(calibration, inputs, options.method)
-        write_whole(options.json, record.encode())
+        write_whole(options.json, encoded(record))
 
 
 def _simulate(options: argparse.Namespace) -> None:
@@ -234,6 +245,7 @@ def _simulate(options: argparse.Namespace) -> None:
 
 
 def _pivot(options: argparse.Namespace) -> None:
+    _require_other_file(options.json, options.poses)
     poses = read_poses(options.poses)
     fit = fit_pivot(
         poses.rotations,
@@ -244,13 +256,25 @@ def _pivot(options: argparse.Namespace) -> None:
     print(pivot_text(fit))
     if options.json is not None:
         record = pivot_json(fit, _hashed(options.poses), options.least_squares)
-        write_whole(options.json, record.encode())
+        write_whole(options.json, encoded(record))
 
 
 def _pen(options: argparse.Namespace) -> None:
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
     print(f"{raw.n_leds} LEDs in the pen frame are in {options.out}.")
+
+
+def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
+    """Refuse to write the record over one of the files that it is made from."""
+    if record is None:
+        return
+    for path in inputs:
+        if path is not None and path.resolve() == record.resolve():
+            raise UsageError(
+                f"--json {record} would replace the input file of that name. Give the "
+                "record another name."
+            )
 
 
 def _hashed(path: Path) -> InputFile:

@@ -20,7 +20,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.camera import Camera
-from lightpen.joint import ContactModel, JointFit, Linearised, fit_joint
+from lightpen.joint import (
+    TURN_RIDGE,
+    ContactModel,
+    JointFit,
+    Linearised,
+    fit_joint,
+    symmetric_inverse,
+)
 from lightpen.pen import Pen
 from lightpen.pose import normal_equations
 from lightpen.rigid import skew
@@ -44,14 +51,14 @@ class GeometryFit:
     led_sigma : float
         Standard deviation of one LED coordinate of the file, mm; 0 where the images
         show no LED errors.
-    covariance : (6, 6) array
-        Of (tip_pen, cone_cam) from image noise and LED geometry, mm^2.
+    led_covariance : (6, 6) array
+        What the LED geometry adds to the covariance of (tip_pen, cone_cam), mm^2.
     """
 
     joint: JointFit
     corrections: FloatArray
     led_sigma: float
-    covariance: FloatArray
+    led_covariance: FloatArray
 
 
 def fit_geometry(
@@ -73,7 +80,7 @@ def fit_geometry(
     GeometryFit
     """
     corrections = np.zeros_like(pen.leds)
-    led_sigma, covariance = 0.0, joint.covariance
+    led_sigma, led_covariance = 0.0, np.zeros((6, 6))
     modes = _rigid_modes(pen.leds)
     frame_lock: FloatArray = modes @ modes.T / FRAME_LOCK**2
     for _ in range(PASSES):
@@ -93,8 +100,8 @@ def fit_geometry(
         joint = fit_joint(
             camera, corrected, pixels, joint.rotations, joint.tip_pen, joint.cone_cam
         )
-        covariance = system.tip_covariance(prior)
-    return GeometryFit(joint, corrections, led_sigma, covariance)
+        led_covariance = system.led_covariance(prior)
+    return GeometryFit(joint, corrections, led_sigma, led_covariance)
 
 
 def _rigid_modes(leds: FloatArray) -> FloatArray:
@@ -129,7 +136,7 @@ class _LedSystem:
         each = each.reshape(n_images, n_leds, 12, 12)
         each_right = each_right.reshape(n_images, n_leds, 12)
         H, g = each.sum(axis=1), each_right.sum(axis=1)
-        inverse = np.linalg.inv(H[:, :3, :3] + 1e-6 * np.eye(3))
+        inverse = np.linalg.inv(H[:, :3, :3] + TURN_RIDGE / joint.sigma**2 * np.eye(3))
         # Rows of every other unknown against the turn of each image.
         to_turn = np.concatenate(
             [H[:, 3:9, :3], each[:, :, 9:, :3].reshape(n_images, -1, 3)], axis=1
@@ -157,10 +164,11 @@ class _LedSystem:
             right=b[6:] - gain @ b[:6],
         )
 
-    def tip_covariance(self, prior: FloatArray) -> FloatArray:
-        """Return the covariance (6, 6) of tip and cone under a prior on the LEDs."""
+    def led_covariance(self, prior: FloatArray) -> FloatArray:
+        """Return what LEDs under a prior add to the covariance of tip and cone."""
         folded = self.coupling @ np.linalg.solve(self.leds + prior, self.coupling.T)
-        return np.asarray(np.linalg.inv(self.tip - folded))
+        with_leds = symmetric_inverse(self.tip - 0.5 * (folded + folded.T))
+        return with_leds - symmetric_inverse(self.tip)
 
 
 def _prior_sigma(S: FloatArray, right: FloatArray) -> float:

@@ -37,6 +37,7 @@ from lightpen.pose import (
 from lightpen.rigid import rotation_from_vector
 
 LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
+MIN_LEDS = 3  # in an image; fewer leave its rotation free
 SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
 CONVERGED = 1e-7  # mm
 MAX_STEPS = 50
@@ -59,7 +60,7 @@ class JointFit:
     residuals : (N, L, 2) array
         Observed minus modelled ellipse centres, px; NaN where an LED was not seen.
     used : (N, L) array of bool
-        LEDs within the gate.
+        LEDs within the gate; none of an image that has fewer than three.
     sigma : float
         Standard deviation of one image coordinate, px.
     information : (N, 6, 6) array
@@ -80,7 +81,7 @@ class JointFit:
     @property
     def covariance(self) -> FloatArray:
         """Covariance of (tip_pen, cone_cam) from image noise alone, (6, 6), mm^2."""
-        return np.asarray(np.linalg.inv(self.information.sum(axis=0)))
+        return symmetric_inverse(self.information.sum(axis=0))
 
     @property
     def rms(self) -> float:
@@ -256,6 +257,12 @@ def reduce(state: Linearised, weights: FloatArray) -> _Reduced:
     )
 
 
+def symmetric_inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a symmetric matrix, symmetric to the last digit."""
+    inverse = np.linalg.inv(matrix)
+    return np.asarray(0.5 * (inverse + inverse.T))
+
+
 def _descend(
     model: ContactModel, state: Linearised, used: BoolArray | None, tolerance: float
 ) -> Linearised:
@@ -285,12 +292,13 @@ def _descend(
 def _gate(residuals: FloatArray) -> BoolArray:
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     within = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * robust_sigma(residuals, 3)
-    return np.asarray(within)
+    enough = within.sum(axis=1, keepdims=True) >= MIN_LEDS
+    return np.asarray(within & enough)
 
 
 def _fit_from(state: Linearised, used: BoolArray) -> JointFit:
     squares = np.einsum("nli,nli->nl", state.residuals, state.residuals)
-    n_free = 2 * int(used.sum()) - 3 * len(used) - 6
+    n_free = 2 * int(used.sum()) - 3 * int(used.any(axis=1).sum()) - 6
     sigma = max(float(np.sqrt(squares[used].sum() / max(n_free, 1))), NOISE_FLOOR)
     reduced = reduce(state, used.astype(float))
     return JointFit(

@@ -274,7 +274,7 @@ def _assemble(
         edge_widths=edge_widths,
         reasons=reasons,
         details=tuple(s.detail for s in sightings),
-        advice="" if mostly_labelled else diagnose(spots, camera, pen),
+        advice="" if mostly_labelled or not spots else diagnose(spots, camera, pen),
     )
 
 

@@ -157,6 +157,15 @@ def pivot_json(fit: PivotFit, poses: InputFile, least_squares: bool) -> str:
     return _with_rows(head, "frames", rows)
 
 
+def encoded(record: str) -> bytes:
+    """Return a record as UTF-8.
+
+    The bytes of a file name that is no text in this system's encoding become JSON
+    escapes.
+    """
+    return record.encode("utf-8", "backslashreplace")
+
+
 def calibration_text(
     calibration: Calibration, method: str, nominal_tip: FloatArray | None
 ) -> str:
@@ -230,7 +239,7 @@ def _quality_lines(calibration: Calibration, chosen: Result) -> list[str]:
         _numbers("  U (k = 2)", halves.expanded_uncertainty),
     ]
     lines += [
-        _numbers(f"U from {name}", COVERAGE_FACTOR * np.sqrt(np.abs(np.diag(part)[:3])))
+        _numbers(f"U from {name}", COVERAGE_FACTOR * np.sqrt(np.diag(part)[:3]))
         for name, part in parts.items()
         if np.any(part)
     ]
@@ -310,7 +319,7 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
     budget = calibration.budget
 
     def std(covariance: FloatArray | None) -> FloatArray | None:
-        return None if covariance is None else np.sqrt(np.abs(np.diag(covariance)[:3]))
+        return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
 
     return {
         "noise_mm": std(budget.noise),

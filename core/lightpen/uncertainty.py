@@ -134,7 +134,7 @@ def combine(
             ratio if blocks_count else 1.0,
             (1 + rho) / (1 - rho) if rho_counts else 1.0,
         ),
-        leds=geometry.covariance - noise,
+        leds=geometry.led_covariance,
         camera=_camera_part(camera, pen, pixels, geometry),
     )
 

@@ -65,7 +65,8 @@ def test_the_tip_no_longer_takes_on_led_errors_and_its_covariance_is_honest() ->
         truth = tip_in_frame_of(measured)
         plain_errors.append(plain.tip_pen - truth)
         errors.append(geometry.joint.tip_pen - truth)
-        predicted.append(np.diag(geometry.covariance)[:3])
+        total = geometry.joint.covariance + geometry.led_covariance
+        predicted.append(np.diag(total)[:3])
     ratio = np.sqrt(np.mean(np.square(errors), axis=0) / np.mean(predicted, axis=0))
 
     # Only the pen's scale, which moves the tip along y, cannot be told from images.

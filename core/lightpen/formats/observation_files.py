@@ -139,11 +139,15 @@ def read_poses(path: Path) -> Poses:
     ------
     FileError
         The file cannot be read, or has matrices that are no rotations or covariances,
-        or cells that are not numbers. The text names the line.
+        poses given twice, or cells that are not numbers. The text names the line.
     """
     table = read_table(path, "pose file", OBSERVATION_FILE_LIMIT)
     columns, covariance_columns = _pose_columns(table)
     numbers = table.numbers(columns)
+    if "pose" in table.header:
+        _check_repeated(table, table.numbers([table.header.index("pose")])[:, 0])
+    elif not table.header and columns[0] == 1:
+        _check_repeated(table, table.numbers([0])[:, 0])
     translations = numbers[:, 9:]
     far = np.abs(translations).max(axis=1) > LARGEST_TRANSLATION
     if np.any(far):
@@ -215,6 +219,19 @@ def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
         )
     places = list(range(skipped, table.n_columns))
     return places[:12], places[12:]
+
+
+def _check_repeated(table: Table, poses: FloatArray) -> None:
+    """Refuse a pose number that an earlier row has."""
+    _, first, which = np.unique(poses, return_index=True, return_inverse=True)
+    repeated = first[which] != np.arange(len(poses))
+    if np.any(repeated):
+        row = int(np.argmax(repeated))
+        raise table.error(
+            row,
+            f"pose {poses[row]:g} is given on line {table.lines[first[which[row]]]} "
+            "already. Remove what was copied twice.",
+        )
 
 
 def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
