@@ -26,8 +26,16 @@ from benchmarks.workers import Workers, one_core_workers
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.hand import Operator
-from lightpen.posture import Posture, angles_between, rotations_of
-from lightpen.sighting import Sighting, sight_centers
+from lightpen.session.posture import Posture, angles_between, rotations_of
+from lightpen.session.sighting import Sighting, sight_centers
+from lightpen.session.swing import feed
+from lightpen.session.swing_state import (
+    Phase,
+    SwingLimits,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -35,14 +43,6 @@ from lightpen.simulator.swings import (
     paper_pen,
     simulate_centers,
     swing_poses,
-)
-from lightpen.swing import feed
-from lightpen.swing_state import (
-    Phase,
-    SwingLimits,
-    SwingSetup,
-    SwingState,
-    start_swing,
 )
 
 SEEDS = tuple(range(20))

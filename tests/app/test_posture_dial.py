@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import IntArray
 from lightpen.coverage import measure_coverage
-from lightpen.posture import Posture, posture_of, rotations_of
+from lightpen.session.posture import Posture, posture_of, rotations_of
 from lightpen.simulator.sample_pens import eight_led_pen
 from lightpen_app.theme import DARK
 from lightpen_app.widgets.posture_dial import (

@@ -11,17 +11,17 @@ import pytest
 from lightpen.calibrate import Calibration, calibrate
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.capture import capture_image, resume_swing
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.pen_files import write_pen
 from lightpen.observe import Reason, observe_images
-from lightpen.record import FileCopy, Header, open_record, source
-from lightpen.recording import RecordWriter
 from lightpen.report import InputFile, Inputs, calibration_json
+from lightpen.session.capture import capture_image, resume_swing
+from lightpen.session.record import FileCopy, Header, open_record, source
+from lightpen.session.recording import RecordWriter
+from lightpen.session.swing_state import Phase, SwingSetup, SwingState, start_swing
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
-from lightpen.swing_state import Phase, SwingSetup, SwingState, start_swing
 
 PERIOD = 0.05  # s
 

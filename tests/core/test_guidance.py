@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.guidance import (
+from lightpen.joint import fit_joint
+from lightpen.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.session.guidance import (
     TILTS,
     TURNS,
     Outlook,
@@ -18,9 +20,7 @@ from lightpen.guidance import (
     usable_leds,
     visible_fields,
 )
-from lightpen.joint import fit_joint
-from lightpen.posture import Posture, angles_between, rotations_of
-from lightpen.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.session.posture import Posture, angles_between, rotations_of
 from lightpen.simulator.postures import random_postures
 from lightpen.simulator.swings import (
     PAPER_CONE,

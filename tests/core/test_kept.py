@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from lightpen.kept import (
+from lightpen.session.kept import (
     Kept,
     distance_unit,
     keep,
@@ -13,7 +13,7 @@ from lightpen.kept import (
     none_kept,
     without_slipped,
 )
-from lightpen.sighting import sight_centers
+from lightpen.session.sighting import sight_centers
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.coverage import measure_coverage
-from lightpen.posture import Posture, angles_between, posture_of, rotations_of
 from lightpen.rigid import rotation_from_vector
+from lightpen.session.posture import Posture, angles_between, posture_of, rotations_of
 from lightpen.simulator.postures import random_postures
 from lightpen.simulator.swings import paper_pen
 

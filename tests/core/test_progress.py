@@ -4,11 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpen.kept import kept_before
-from lightpen.messages import Code
-from lightpen.posture import rotations_of
-from lightpen.progress import measure_shortfall, missing, next_target, oriented
-from lightpen.sighting import sight_centers
+from lightpen.session.kept import kept_before
+from lightpen.session.messages import Code
+from lightpen.session.posture import rotations_of
+from lightpen.session.progress import measure_shortfall, missing, next_target, oriented
+from lightpen.session.sighting import sight_centers
+from lightpen.session.swing_state import (
+    SwingLimits,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     Swing,
@@ -18,7 +24,6 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing_state import SwingLimits, SwingSetup, SwingState, start_swing
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -16,8 +16,14 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.pen_files import write_pen
 from lightpen.images import decode_image
-from lightpen.record import FileCopy, Header, found_interrupted, open_record, source
-from lightpen.recording import RecordWriter, encode_png
+from lightpen.session.record import (
+    FileCopy,
+    Header,
+    found_interrupted,
+    open_record,
+    source,
+)
+from lightpen.session.recording import RecordWriter, encode_png
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 N_KILLS = 20
@@ -25,8 +31,8 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from lightpen.record import open_record
-from lightpen.recording import RecordWriter
+from lightpen.session.record import open_record
+from lightpen.session.recording import RecordWriter
 
 with RecordWriter.resume(open_record(Path(sys.argv[1]))) as writer:
     while True:
@@ -253,8 +259,8 @@ import resource, signal, sys
 from pathlib import Path
 import numpy as np
 from lightpen.errors import FileError
-from lightpen.record import open_record
-from lightpen.recording import RecordWriter
+from lightpen.session.record import open_record
+from lightpen.session.recording import RecordWriter
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))
@@ -305,7 +311,7 @@ def test_a_write_that_fails_once_leaves_a_journal_to_go_on_with(
             raise OSError(28, "No space left on device")
 
         with monkeypatch.context() as patch:
-            patch.setattr("lightpen.recording.os.fsync", fail)
+            patch.setattr("lightpen.session.recording.os.fsync", fail)
             with pytest.raises(FileError, match="No space left"):
                 writer.conclude("pass")
         assert append(writer) == 2

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.resting import (
+from lightpen.session.resting import (
     in_place,
     offset,
     rests_in_place,
     seat_of,
     steady_seat,
 )
-from lightpen.sighting import sight_centers
+from lightpen.session.sighting import sight_centers
+from lightpen.session.swing_state import Glimpse, SwingSetup, SwingState, start_swing
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -22,7 +23,6 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_from_postures,
 )
-from lightpen.swing_state import Glimpse, SwingSetup, SwingState, start_swing
 
 CAMERA, PEN = paper_camera(), paper_pen()
 STILL = np.zeros((21, 3))

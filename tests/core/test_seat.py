@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpen.pose import Poses, fit_poses
-from lightpen.seat import fit_seat, tip_distances, tip_offsets
+from lightpen.session.seat import fit_seat, tip_distances, tip_offsets
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     PAPER_CONE,

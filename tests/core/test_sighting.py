@@ -8,7 +8,7 @@ import pytest
 from lightpen.arrays import Image
 from lightpen.observe import Reason
 from lightpen.pose import fit_poses
-from lightpen.sighting import look, sight_centers
+from lightpen.session.sighting import look, sight_centers
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.shots import Shot, live_shot, render_shot
 

@@ -7,20 +7,13 @@ import pytest
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.hand import Operator
-from lightpen.messages import Code, Message
 from lightpen.observe import Reason
 from lightpen.pen import Pen
-from lightpen.posture import angles_between
-from lightpen.progress import missing
-from lightpen.sighting import Sighting, sight_centers
-from lightpen.simulator.swings import (
-    PAPER_CONE,
-    PAPER_TIP,
-    paper_camera,
-    paper_pen,
-    simulate_centers,
-)
-from lightpen.swing import (
+from lightpen.session.messages import Code, Message
+from lightpen.session.posture import angles_between
+from lightpen.session.progress import missing
+from lightpen.session.sighting import Sighting, sight_centers
+from lightpen.session.swing import (
     Fed,
     capture_more,
     conclude,
@@ -29,7 +22,7 @@ from lightpen.swing import (
     pause,
     resume,
 )
-from lightpen.swing_state import (
+from lightpen.session.swing_state import (
     Event,
     Happening,
     Pause,
@@ -37,6 +30,13 @@ from lightpen.swing_state import (
     SwingLimits,
     SwingSetup,
     start_swing,
+)
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
 )
 
 PERIOD = 0.05  # s

@@ -3,8 +3,8 @@
 import numpy as np
 
 from lightpen.coverage import measure_coverage
+from lightpen.session.swing_state import dial_counts
 from lightpen.simulator.swings import swing_poses
-from lightpen.swing_state import dial_counts
 
 
 def test_the_dial_counts_every_posture_once_where_the_coverage_has_it() -> None:

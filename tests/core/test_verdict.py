@@ -9,8 +9,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
-from lightpen.messages import Code
 from lightpen.observe import observe_centers
+from lightpen.session.messages import Code
+from lightpen.session.swing_state import SwingLimits
+from lightpen.session.verdict import Grade, judge
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     Swing,
@@ -20,9 +22,7 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.swing_state import SwingLimits
 from lightpen.uncertainty import Halves
-from lightpen.verdict import Grade, judge
 
 CAMERA, PEN = paper_camera(), paper_pen()
 

@@ -13,7 +13,7 @@ from typing_extensions import override
 
 from lightpen.arrays import IntArray
 from lightpen.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.posture import Posture
+from lightpen.session.posture import Posture
 from lightpen_app.theme import GRID, Colors, TextSize, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
 

@@ -5,7 +5,7 @@
                                                 v
                                              SOLVING -> VERDICT
 
-`lightpen.swing` has the rules.
+`lightpen.session.swing` has the rules.
 """
 
 from collections import Counter
@@ -18,13 +18,13 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.camera import Camera
 from lightpen.coverage import N_DIRECTIONS, measure_coverage
-from lightpen.kept import Kept, none_kept
-from lightpen.messages import Code, Message
 from lightpen.observe import Reason
 from lightpen.pen import Pen
-from lightpen.posture import Posture
-from lightpen.seat import Seat
-from lightpen.sighting import Sighting
+from lightpen.session.kept import Kept, none_kept
+from lightpen.session.messages import Code, Message
+from lightpen.session.posture import Posture
+from lightpen.session.seat import Seat
+from lightpen.session.sighting import Sighting
 
 
 class Phase(StrEnum):

@@ -3,13 +3,13 @@
 import numpy as np
 
 from lightpen.arrays import Image
-from lightpen.kept import kept_before
 from lightpen.observe import Reason
-from lightpen.record import Record
-from lightpen.recording import RecordWriter
-from lightpen.sighting import look
-from lightpen.swing import Fed, feed, start_again
-from lightpen.swing_state import Happening, SwingSetup, SwingState
+from lightpen.session.kept import kept_before
+from lightpen.session.record import Record
+from lightpen.session.recording import RecordWriter
+from lightpen.session.sighting import look
+from lightpen.session.swing import Fed, feed, start_again
+from lightpen.session.swing_state import Happening, SwingSetup, SwingState
 
 
 def capture_image(

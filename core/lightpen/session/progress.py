@@ -7,12 +7,12 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.coverage import N_DIRECTIONS
-from lightpen.guidance import Outlook, next_posture, visible_fields
-from lightpen.messages import Code, Message
-from lightpen.posture import Posture, angles_between, posture_of, rotations_of
-from lightpen.seat import Seat
-from lightpen.sighting import Sighting
-from lightpen.swing_state import SwingSetup, SwingState
+from lightpen.session.guidance import Outlook, next_posture, visible_fields
+from lightpen.session.messages import Code, Message
+from lightpen.session.posture import Posture, angles_between, posture_of, rotations_of
+from lightpen.session.seat import Seat
+from lightpen.session.sighting import Sighting
+from lightpen.session.swing_state import SwingSetup, SwingState
 
 LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
 REACHED = np.radians(5.0)  # of a target

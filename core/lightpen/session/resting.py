@@ -6,11 +6,11 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.coverage import MIN_SPREAD, posture_spread
-from lightpen.kept import distance_unit
 from lightpen.pen import Pen
 from lightpen.pivot import GATE
-from lightpen.seat import Seat, fit_seat, tip_distances, tip_offsets
-from lightpen.swing_state import Glimpse, SwingState
+from lightpen.session.kept import distance_unit
+from lightpen.session.seat import Seat, fit_seat, tip_distances, tip_offsets
+from lightpen.session.swing_state import Glimpse, SwingState
 
 BATCH = 1.0  # s, of images in which the tip must rest
 FULL = 0.8  # of a batch, that its images must span

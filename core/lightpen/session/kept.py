@@ -12,8 +12,8 @@ from lightpen.joint import JointFit, fit_joint
 from lightpen.pen import Pen
 from lightpen.pivot import GATE, MEDIAN_CHI
 from lightpen.pose import fit_poses
-from lightpen.seat import Seat, fit_seat, tip_distances
-from lightpen.sighting import Sighting
+from lightpen.session.seat import Seat, fit_seat, tip_distances
+from lightpen.session.sighting import Sighting
 from lightpen.uncertainty import COVERAGE_FACTOR
 
 MIN_JOINT = 8  # images of the first joint fit

@@ -6,8 +6,8 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.calibrate import USUAL_SIGMA, Calibration
-from lightpen.messages import Code, Message
-from lightpen.swing_state import SwingLimits, dial_counts
+from lightpen.session.messages import Code, Message
+from lightpen.session.swing_state import SwingLimits, dial_counts
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 MANY_DROPPED = 0.2  # of the images

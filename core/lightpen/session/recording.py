@@ -1,4 +1,4 @@
-"""Writing the record of a swing, as `lightpen.record` describes it."""
+"""Writing the record of a swing, as `lightpen.session.record` describes it."""
 
 import json
 import os
@@ -15,7 +15,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
 from lightpen.files import printable, write_whole
-from lightpen.record import (
+from lightpen.session.record import (
     FORMAT,
     HEADER,
     IMAGES,

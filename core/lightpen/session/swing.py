@@ -16,16 +16,22 @@ from math import ceil
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.guidance import MIN_LEDS
-from lightpen.kept import Kept, keep, none_kept, without_slipped
-from lightpen.messages import Code, Message
 from lightpen.observe import Reason
-from lightpen.posture import angles_between, posture_of
-from lightpen.progress import guided, measure_shortfall, oriented
-from lightpen.resting import BATCH, in_place, offset, rests_in_place, steady_seat
-from lightpen.seat import Seat
-from lightpen.sighting import Sighting
-from lightpen.swing_state import (
+from lightpen.session.guidance import MIN_LEDS
+from lightpen.session.kept import Kept, keep, none_kept, without_slipped
+from lightpen.session.messages import Code, Message
+from lightpen.session.posture import angles_between, posture_of
+from lightpen.session.progress import guided, measure_shortfall, oriented
+from lightpen.session.resting import (
+    BATCH,
+    in_place,
+    offset,
+    rests_in_place,
+    steady_seat,
+)
+from lightpen.session.seat import Seat
+from lightpen.session.sighting import Sighting
+from lightpen.session.swing_state import (
     Event,
     Glimpse,
     Happening,
@@ -130,7 +136,7 @@ def start_again(
     ----------
     setup : SwingSetup
     kept : Kept
-        See `lightpen.kept.kept_before`.
+        See `lightpen.session.kept.kept_before`.
     next_number : int
         Of the next image in the swing's record.
     time : float

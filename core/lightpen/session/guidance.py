@@ -19,8 +19,8 @@ from lightpen.camera import Camera
 from lightpen.coverage import N_DIRECTIONS
 from lightpen.joint import ContactModel, reduce
 from lightpen.pen import Pen
-from lightpen.posture import Posture, angles_between, posture_of, rotations_of
 from lightpen.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.session.posture import Posture, angles_between, posture_of, rotations_of
 
 TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of the dial
 TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
