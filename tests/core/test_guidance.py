@@ -1,11 +1,9 @@
 """Guidance: the next posture is the one that helps most."""
 
-import time
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
-import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.joint import fit_joint
@@ -21,7 +19,6 @@ from lightpen.session.guidance import (
     visible_fields,
 )
 from lightpen.session.posture import Posture, angles_between, rotations_of
-from lightpen.simulator.postures import random_postures
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -171,16 +168,3 @@ def test_the_arrow_says_how_far_and_to_which_side() -> None:
     across = arrow(PEN, rotation(20, 0), Posture(np.radians(20), np.pi / 2, 0.0))
     np.testing.assert_allclose(across.lean, np.radians(20) * np.sqrt(2))
     np.testing.assert_allclose(across.bearing, 3 * np.pi / 4)
-
-
-@pytest.mark.parametrize("n_kept", [1, 300])
-def test_the_choice_is_quick(n_kept: int) -> None:
-    postures = random_postures(n_kept, np.random.default_rng(3))
-    known = outlook(postures.rotations)
-    present = rotation(5, 40)
-    times = []
-    for _ in range(20):
-        start = time.perf_counter()
-        next_posture(known, present)
-        times.append(time.perf_counter() - start)
-    assert min(times) < 0.005

@@ -2,7 +2,6 @@
 
 import contextlib
 import random
-import time
 from pathlib import Path
 
 import numpy as np
@@ -292,19 +291,6 @@ def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
                 assert read_centers(path, 3).pixels.shape[1:] == (3, 2)
             with contextlib.suppress(LightpenError):
                 assert np.all(np.isfinite(read_poses(path).rotations))
-
-
-def test_a_calibration_of_three_thousand_centres_is_read_in_ten_ms(
-    tmp_path: Path,
-) -> None:
-    lines = [f"{n // 10},{n % 10 + 1},1231.92549,{n}.54598" for n in range(3000)]
-    path = saved(tmp_path, HEADER, *lines)
-    durations = []
-    for _ in range(5):
-        start = time.perf_counter()
-        read_centers(path, 10)
-        durations.append(time.perf_counter() - start)
-    assert min(durations) < 0.010  # 0.004 s on a slow core
 
 
 def test_the_shared_poses_are_kept_as_they_are(shared_data: Path) -> None:

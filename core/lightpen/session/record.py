@@ -12,10 +12,10 @@ A record is a folder:
 ==================== ===================================================================
 
 `lightpen.session.recording` puts an image on the disk before its line, and its line
-before it acknowledges the image. A torn last line, or an image without a line, is what a crash
-leaves: it was not acknowledged and is passed over. Everything needed to calibrate again
-is in the images and the two files; the centres in the journal spare reading the images
-when an interrupted swing goes on.
+before it acknowledges the image. A torn last line, or an image without a line, is what
+a crash leaves: it was not acknowledged and is passed over. Everything needed to
+calibrate again is in the images and the two files; the centres in the journal spare
+reading the images when an interrupted swing goes on.
 """
 
 import json
