@@ -5,6 +5,8 @@ residuals turn with the pen. The errors are taken as normal with one common stan
 deviation, which is found by maximum likelihood (empirical Bayes [1]_). Where they are
 significant, the LEDs become unknowns with that prior: the tip no longer takes on their
 errors, and its covariance holds what the images cannot tell, above all the pen's scale.
+Where they are not, the LEDs stay as they are, and the covariance holds the likeliest
+errors all the same.
 
 The tip is given in the frame in which the file's LEDs fit the true ones best. Moves of
 the pen as a whole are no errors in that frame, and the prior keeps them at zero.
@@ -50,7 +52,7 @@ class GeometryFit:
         Added to the LEDs of the file, pen frame, mm; zero where not significant.
     led_sigma : float
         Standard deviation of one LED coordinate of the file, mm; 0 where the images
-        show no LED errors.
+        show no significant errors.
     led_covariance : (6, 6) array
         What the LED geometry adds to the covariance of (tip_pen, cone_cam), mm^2.
     """
@@ -89,8 +91,10 @@ def fit_geometry(
         state = model.at(joint.rotations, joint.tip_pen, joint.cone_cam)
         system = _LedSystem.build(state, joint)
         right = system.right + system.S @ corrections.ravel()
-        led_sigma = _prior_sigma(system.S, right)
-        if led_sigma == 0:
+        led_sigma, significant = _prior_sigma(system.S, right)
+        if not significant:
+            led_covariance = system.uncorrected_covariance(led_sigma, modes)
+            led_sigma = 0.0
             break
         prior: FloatArray = frame_lock + np.eye(len(right)) / led_sigma**2
         corrections = np.asarray(
@@ -164,6 +168,12 @@ class _LedSystem:
             right=b[6:] - gain @ b[:6],
         )
 
+    def uncorrected_covariance(self, led_sigma: float, modes: FloatArray) -> FloatArray:
+        """Return what LED errors add to the covariance where none is corrected."""
+        gain = np.linalg.solve(self.tip, self.coupling)
+        seen = gain - gain @ modes @ modes.T
+        return led_sigma**2 * seen @ seen.T
+
     def led_covariance(self, prior: FloatArray) -> FloatArray:
         """Return what LEDs under a prior add to the covariance of tip and cone."""
         folded = self.coupling @ np.linalg.solve(self.leds + prior, self.coupling.T)
@@ -171,8 +181,8 @@ class _LedSystem:
         return with_leds - symmetric_inverse(self.tip)
 
 
-def _prior_sigma(S: FloatArray, right: FloatArray) -> float:
-    """Return the standard deviation of the LED coordinates, 0 if not significant.
+def _prior_sigma(S: FloatArray, right: FloatArray) -> tuple[float, bool]:
+    """Return the likeliest standard deviation of the LED coordinates; significance.
 
     In the eigenvectors of S the right sides are independent and normal, with variance
     ``value^2 sigma^2 + value``.
@@ -184,4 +194,4 @@ def _prior_sigma(S: FloatArray, right: FloatArray) -> float:
     excess = values * sigmas[:, None] ** 2 + 1
     costs = np.sum(np.log(excess) + projected**2 / (values * excess), axis=1)
     best = int(np.argmin(costs))
-    return float(sigmas[best]) if costs[0] - costs[best] > SIGNIFICANT else 0.0
+    return float(sigmas[best]), bool(costs[0] - costs[best] > SIGNIFICANT)

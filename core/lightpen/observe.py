@@ -128,7 +128,7 @@ def observe_images(
     Raises
     ------
     FileError
-        Most images are of another size than the camera file.
+        No image can be read, or most are of another size than the camera file.
     CalibrationError
         The images are of the mirror image of the pen.
     """
@@ -171,6 +171,9 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     rotations = np.full((len(pixels), 3, 3), np.nan)
     translations = np.full((len(pixels), 3), np.nan)
     rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])
+    reasons = np.full(len(pixels), Reason.NONE, dtype=object)
+    reasons[np.isnan(translations[:, 0])] = Reason.MISFIT
+    reasons[~enough] = Reason.TOO_FEW_LEDS
     return Observations(
         names=tuple(f"frame {frame}" for frame in centers.frames),
         pixels=pixels,
@@ -178,7 +181,7 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
         rotations=rotations,
         translations=translations,
         edge_widths=np.full(len(pixels), np.nan),
-        reasons=tuple(Reason.NONE if e else Reason.TOO_FEW_LEDS for e in enough),
+        reasons=tuple(reasons.tolist()),
         details=("",) * len(pixels),
     )
 
@@ -218,6 +221,10 @@ def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]
 
 
 def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
+    if all(s.reason is Reason.UNREADABLE for s in sightings):
+        raise FileError(
+            f"None of the {len(sightings)} images can be read. {sightings[0].detail}"
+        )
     wrong = [s.detail for s in sightings if s.reason is Reason.WRONG_SIZE]
     n_readable = sum(s.reason is not Reason.UNREADABLE for s in sightings)
     if 2 * len(wrong) > n_readable:
@@ -274,8 +281,19 @@ def _assemble(
         edge_widths=edge_widths,
         reasons=reasons,
         details=tuple(s.detail for s in sightings),
-        advice="" if mostly_labelled or not spots else diagnose(spots, camera, pen),
+        advice="" if mostly_labelled else _advice(reasons, spots, camera, pen),
     )
+
+
+def _advice(
+    reasons: tuple[Reason, ...], spots: list[Spots], camera: Camera, pen: Pen
+) -> str:
+    if 2 * reasons.count(Reason.AMBIGUOUS) > len(reasons):
+        return (
+            "The LEDs of this pen look the same when it is turned or mirrored, so they "
+            "cannot be told apart. Move an LED, or give the LED centres with --centers."
+        )
+    return diagnose(spots, camera, pen)
 
 
 def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:

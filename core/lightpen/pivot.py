@@ -21,6 +21,8 @@ from lightpen.rigid import skew
 MIN_POSES = 6  # the paper starts from six images
 N_SAMPLES = 300  # of four poses: 40 % outliers leave 1e-18 of drawing no clean one
 SAMPLE_SIZE = 4
+FEW = 12  # poses, of which four fix the others too poorly to judge them
+SHARE_OF_FEW = 0.75  # of so few poses that make a sample
 GATE = 5.1  # square root of chi-square, 3 degrees of freedom, at 1e-5
 LOOSE_GATE = 8.0  # where covariances are not given: real trackers have heavy tails
 MEDIAN_CHI = 1.538  # square root of the median of that chi-square
@@ -239,9 +241,10 @@ def _best_sample(equations: _Equations) -> FloatArray:
     """Return the solution of the sample whose median distance is least."""
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip
+    size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
     order = np.argsort(rng.random((N_SAMPLES, n_poses)), axis=1)
     members = np.zeros((N_SAMPLES, n_poses), dtype=bool)
-    np.put_along_axis(members, order[:, :SAMPLE_SIZE], True, axis=1)
+    np.put_along_axis(members, order[:, :size], True, axis=1)
     solutions = equations.solve(members)
     tips = np.einsum("nij,sj->sni", equations.rotations, solutions[:, :3])
     residuals = tips + equations.translations - solutions[:, None, 3:]

@@ -34,6 +34,7 @@ MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
 MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
+RIDGE = 1e-12
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
 
@@ -174,7 +175,7 @@ def start_poses(
     -------
     rotations : (N, 3, 3) array
     translations : (N, 3) array
-        cam_from_pen, mm.
+        cam_from_pen, mm; NaN where no pose puts the LEDs before the camera.
 
     References
     ----------
@@ -182,16 +183,22 @@ def start_poses(
        to the perspective-n-point problem", ECCV 2020 (OpenCV's SQPNP).
     """
     _require_seen(pixels)
-    rotations = np.empty((len(pixels), 3, 3))
-    translations = np.empty((len(pixels), 3))
+    rotations = np.full((len(pixels), 3, 3), np.nan)
+    translations = np.full((len(pixels), 3), np.nan)
     for i, points in enumerate(pixels):
         seen = np.isfinite(points[:, 0])
         normalised = camera.unproject(points[seen])
-        _, vector, translation = cv2.solvePnP(
-            pen.leds[seen], normalised, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
-        )
-        rotations[i] = rotation_from_vector(np.asarray(vector[:, 0], dtype=np.float64))
-        translations[i] = translation[:, 0]
+        try:
+            solved, vector, translation = cv2.solvePnP(
+                pen.leds[seen], normalised, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
+            )
+        except cv2.error:  # points that coincide
+            continue
+        if solved and translation[2, 0] > 0:
+            rotations[i] = rotation_from_vector(
+                np.asarray(vector, dtype=np.float64)[:, 0]
+            )
+            translations[i] = translation[:, 0]
     return rotations, translations
 
 
@@ -351,7 +358,7 @@ def _refine(
         residuals, J = problem.residuals_with_jacobian(R, t)
         weights = _image_weights(residuals) if robust else seen.astype(float)
         H, g = normal_equations(J, residuals, weights)
-        step = np.asarray(np.linalg.solve(H, g[..., None])[..., 0], dtype=np.float64)
+        step = np.einsum("nij,nj->ni", _inverse(H), g)
         size = np.maximum(
             np.linalg.norm(step[:, :3], axis=1),
             np.linalg.norm(step[:, 3:], axis=1) / np.linalg.norm(t, axis=1),
@@ -366,10 +373,20 @@ def _refine(
     weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
     H, _ = normal_equations(J, residuals, weights)
     variances = np.maximum(sigma, _own_sigma(residuals, weights, sigma)) ** 2
-    covariances = np.asarray(
-        variances[:, None, None] * np.linalg.inv(H), dtype=np.float64
-    )
+    covariances: FloatArray = variances[:, None, None] * _inverse(H)
     return Poses(R, t, covariances, residuals, weights, sigma)
+
+
+def _inverse(H: FloatArray) -> FloatArray:
+    """Return the inverses of normal matrices (N, 6, 6), scaled to a unit diagonal.
+
+    A trace of ridge keeps an image of wrong LEDs, which may fix no pose at all, from
+    stopping the others.
+    """
+    scale = np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), RIDGE))
+    scales = scale[:, :, None] * scale[:, None, :]
+    inverse: FloatArray = np.linalg.inv(H / scales + RIDGE * np.eye(6)) / scales
+    return inverse
 
 
 def normal_equations(

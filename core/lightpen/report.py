@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.calibrate import Calibration
+from lightpen.calibrate import USUAL_SIGMA, Calibration
 from lightpen.coverage import DIRECTION_NAMES
 from lightpen.pivot import PivotFit
 from lightpen.uncertainty import COVERAGE_FACTOR
 
 METHODS = ("joint", "two-stage")
+LARGE_SIGMA = 0.15  # px, of one image coordinate
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> s
             "dropped": dict(_dropped(calibration)),
         },
         "methods": _methods(calibration),
+        "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
@@ -175,7 +177,10 @@ def calibration_text(
     lines = [_heading("Tip in the pen frame, mm", "xyz")]
     for name in (method, *(other for other in METHODS if other != method)):
         lines.append(_numbers(name, results[name].tip_pen))
-        lines.append(_numbers("  U (k = 2)", results[name].expanded_uncertainty[:3]))
+        part = ", of image noise" if name == "two-stage" else ""
+        lines.append(
+            _numbers(f"  U (k = 2){part}", results[name].expanded_uncertainty[:3])
+        )
     if nominal_tip is not None:
         lines.append(_numbers("nominal", nominal_tip))
         lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
@@ -183,7 +188,30 @@ def calibration_text(
     lines.append(_numbers(method, chosen.cone_cam))
     lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
     lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
+    lines += ["", *warnings_of(calibration)] if warnings_of(calibration) else []
     return "\n".join(lines)
+
+
+def warnings_of(calibration: Calibration) -> list[str]:
+    """Return what the user should look into, one sentence or two each."""
+    leds, sigma = calibration.leds, calibration.joint.sigma
+    warnings = [
+        f"LED {led} was found in no image. A finger may cover it, it may be off, or "
+        "its place in the pen file may be wrong."
+        for led in np.flatnonzero(leds.n_seen == 0) + 1
+    ]
+    warnings += [
+        f"LED {led} sits {np.linalg.norm(leds.displacement[led - 1]):.3f} mm off its "
+        "place in the pen file. Check the file, or measure the pen again."
+        for led in leds.displaced
+    ]
+    if sigma > LARGE_SIGMA:
+        warnings.append(
+            f"The residuals are large: {sigma:.2f} px, {USUAL_SIGMA} px or less is "
+            "usual. Check that the camera file is of this camera, lens and focus, and "
+            "the pen file of this pen: the uncertainty does not cover a wrong file."
+        )
+    return warnings
 
 
 def pivot_text(fit: PivotFit) -> str:
@@ -223,7 +251,7 @@ def _image_lines(calibration: Calibration) -> list[str]:
 
 def _quality_lines(calibration: Calibration, chosen: Result) -> list[str]:
     budget, halves = calibration.budget, calibration.halves
-    joint, leds = calibration.joint, calibration.leds
+    joint = calibration.joint
     parts = {
         "noise": budget.correlation_factor * budget.noise,
         "LED geometry": budget.leds,
@@ -259,11 +287,6 @@ def _quality_lines(calibration: Calibration, chosen: Result) -> list[str]:
             f"LED file     off by {calibration.geometry.led_sigma:.4f} mm (standard "
             "deviation of a coordinate), corrected as far as the images tell"
         )
-    lines += [
-        f"  LED {led} sits {np.linalg.norm(leds.displacement[led - 1]):.3f} mm off its "
-        "place in the LED file. Check the file, or measure the pen again."
-        for led in leds.displaced
-    ]
     return lines
 
 

@@ -141,6 +141,11 @@ def detect_spots(
     if len(discs) < MIN_SPOTS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
+    if len(discs) < MIN_SPOTS or next(budget, None) is None:
+        flat = _survey(_flattened(image), mask, stride)
+        flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
+        if len(flat_discs) > len(discs):
+            scene, discs = flat, flat_discs
     if full_scale is None:
         full_scale = 255 if image.dtype == np.uint8 else 4095
         full_scale = full_scale if scene.peak <= full_scale else 65535
@@ -203,6 +208,22 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
             center = (round(x), round(y))
             cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
     return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
+
+
+def _flattened(image: Image) -> Image:
+    """Return the image without its uneven background.
+
+    That is the median of the neighbourhood in a coarse grid, in which a disc is a few
+    points at the most. What reads full scale stays, to be told as saturated.
+    """
+    step = max(min(image.shape) // NOISE_SAMPLES, 1)
+    coarse = cv2.medianBlur(np.ascontiguousarray(image[::step, ::step]), 5)
+    size = (image.shape[1], image.shape[0])
+    background = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
+    uneven = np.asarray(background) - coarse.min()
+    flat: Image = np.asarray(cv2.subtract(image, uneven)).view(image.dtype)
+    np.copyto(flat, image, where=image == np.iinfo(image.dtype).max)
+    return flat
 
 
 def _thinned(image: Image, stride: int) -> MatLike:

@@ -232,6 +232,23 @@ def test_leds_in_front_of_a_bright_window_are_found_and_the_window_is_not() -> N
     assert center_rms(spots, lamps) < 0.02
 
 
+@pytest.mark.parametrize("background", ["gradient", "glow", "wall"])
+def test_leds_before_an_uneven_background_are_found(background: str) -> None:
+    lamps = grid_of_lamps()
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]] / max(SHAPE)
+    behind = {
+        "gradient": 40 * x,
+        "glow": 40 * np.exp(-((x - 0.5) ** 2 + (y - 0.4) ** 2) / 0.1),
+        "wall": 30.0 * (x > 0.3),
+    }[background]
+    light = render(lamps)
+    rng = np.random.default_rng(0)
+    noisy = light + behind + rng.normal(0, 1.5, SHAPE)
+    spots = detect_spots(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
+
+    assert len(nearest(spots, lamps)) == len(lamps)
+
+
 def test_streaks_are_not_spots() -> None:
     lamps = grid_of_lamps()
     light = render(lamps)

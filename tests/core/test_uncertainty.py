@@ -135,6 +135,18 @@ def test_the_cameras_covariance_moves_the_tip_as_a_changed_camera_does() -> None
     np.testing.assert_allclose(np.diag(part), np.diag(moved), rtol=0.05)
 
 
+def test_the_uncertainty_is_the_sum_of_its_parts() -> None:
+    known = replace(CAMERA, covariance=np.diag([1.0, 1, 1, 1, 1e-8, 1e-6, 0, 0, 0]))
+    pixels, geometry = fit(0.05 * noise(8))
+    leds = replace(geometry, led_covariance=1e-6 * np.eye(6))
+    budget = combine(known, PEN, pixels, leds)
+
+    total = budget.correlation_factor * budget.noise + budget.camera + 1e-6 * np.eye(6)
+    assert budget.camera[4, 4] > 1e-8
+    np.testing.assert_allclose(budget.covariance, total)
+    np.testing.assert_allclose(budget.expanded_uncertainty, 2 * np.sqrt(np.diag(total)))
+
+
 def test_a_camera_without_covariance_adds_nothing() -> None:
     assert not combine(CAMERA, PEN, *fit(0.01 * noise(3))).camera.any()
 

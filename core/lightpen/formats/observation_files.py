@@ -26,6 +26,7 @@ LARGEST_TRANSLATION = 1e6  # mm
 LARGEST_COVARIANCE = 1e12  # rad^2, rad mm or mm^2
 ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is not a rotation in a few digits
 ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
+SINGULAR = 1e-14  # least over largest variance of a pose, in rad and mm
 SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative
 
 _CENTERS = (("frame",), ("led",), ("x_px", "x"), ("y_px", "y"))
@@ -277,4 +278,12 @@ def _check_covariances(table: Table, covariances: FloatArray) -> None:
             int(np.argmax(wrong)),
             "c11 to c66 are not a covariance: they must be symmetric, with "
             "correlations from -1 to 1. Correct or remove these columns.",
+        )
+    values = np.linalg.eigvalsh(covariances)
+    singular = values[:, 0] <= SINGULAR * values[:, -1]
+    if np.any(singular):
+        raise table.error(
+            int(np.argmax(singular)),
+            "the covariance c11 to c66 leaves a direction without any uncertainty, "
+            "which no measurement does. Correct or remove these columns.",
         )
