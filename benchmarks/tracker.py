@@ -6,7 +6,7 @@ import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.observation_files import Poses, read_poses
+from lightpen.formats.observation_files import PoseTable, read_poses
 from lightpen.pivot import fit_pivot
 
 # scikit-surgerycalibration, algebraic one-step, in its tests
@@ -52,7 +52,7 @@ def tracker_rows(data: Path | None) -> list[Row]:
     ]
 
 
-def _shifts(poses: Poses, rng: np.random.Generator) -> FloatArray:
+def _shifts(poses: PoseTable, rng: np.random.Generator) -> FloatArray:
     """Return how far outliers move the tip of the rest, robust and plain, mm."""
     n = len(poses.rotations)
     hit = rng.permutation(n) < round(OUTLIERS * n)

@@ -126,16 +126,7 @@ class Camera:
         """Return the pixels of undistorted normalised points, both (..., 2)."""
         x, y = normalised[..., 0], normalised[..., 1]
         r2 = x * x + y * y
-        p1, p2 = self.distortion[2:4]
-        gain = _radial_gain(self.distortion, r2)
-        pixels = np.empty_like(normalised)
-        pixels[..., 0] = (
-            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
-        )
-        pixels[..., 1] = (
-            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
-        )
-        return pixels
+        return self._distorted_pixels(x, y, r2, _radial_gain(self.distortion, r2))
 
     def pixels_with_jacobian(self, normalised: FloatArray) -> PointMap:
         """Return the pixels of undistorted normalised points, and the derivative.
@@ -155,13 +146,7 @@ class Camera:
         p1, p2 = self.distortion[2:4]
         gain = _radial_gain(self.distortion, r2)
         slope = 2 * _radial_slope(self.distortion, r2, gain)
-        pixels = np.empty_like(normalised)
-        pixels[..., 0] = (
-            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
-        )
-        pixels[..., 1] = (
-            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
-        )
+        pixels = self._distorted_pixels(x, y, r2, gain)
         J = np.empty((*normalised.shape, 2))
         cross = x * y * slope + 2 * (p1 * x + p2 * y)
         J[..., 0, 0] = self.fx * (gain + x * x * slope + 2 * p1 * y + 6 * p2 * x)
@@ -169,6 +154,19 @@ class Camera:
         J[..., 1, 0] = self.fy * cross
         J[..., 1, 1] = self.fy * (gain + y * y * slope + 6 * p1 * y + 2 * p2 * x)
         return PointMap(pixels, J)
+
+    def _distorted_pixels(
+        self, x: FloatArray, y: FloatArray, r2: FloatArray, gain: FloatArray
+    ) -> FloatArray:
+        p1, p2 = self.distortion[2:4]
+        pixels = np.empty((*x.shape, 2))
+        pixels[..., 0] = (
+            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
+        )
+        pixels[..., 1] = (
+            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
+        )
+        return pixels
 
     def intrinsics_jacobian(self, normalised: FloatArray) -> FloatArray:
         """Return the derivative of the pixels by the intrinsics.

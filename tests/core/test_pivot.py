@@ -8,7 +8,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.coverage import require_spread
 from lightpen.errors import CalibrationError
-from lightpen.formats.observation_files import Poses, read_poses
+from lightpen.formats.observation_files import PoseTable, read_poses
 from lightpen.pivot import fit_pivot, tip_covariances
 from lightpen.rigid import rotation_from_vector
 from lightpen.simulator.swings import swing_poses
@@ -28,7 +28,7 @@ def pivoting_poses(
 
 
 @pytest.fixture
-def tracker_poses(shared_data: Path) -> Poses:
+def tracker_poses(shared_data: Path) -> PoseTable:
     """Return real poses of a tracked pointer swung on its tip."""
     return read_poses(shared_data / "pivot-poses" / "optical-tracker.csv")
 
@@ -42,7 +42,7 @@ def test_exact_poses_give_the_exact_tip(robust: bool) -> None:
     assert fit.used.all()
 
 
-def test_plain_least_squares_gives_the_published_tip(tracker_poses: Poses) -> None:
+def test_plain_least_squares_gives_the_published_tip(tracker_poses: PoseTable) -> None:
     fit = fit_pivot(tracker_poses.rotations, tracker_poses.translations, robust=False)
 
     np.testing.assert_allclose(fit.tip_pen, [-14.476, 395.143, -7.558], atol=6e-4)
@@ -51,7 +51,7 @@ def test_plain_least_squares_gives_the_published_tip(tracker_poses: Poses) -> No
 
 
 def test_gross_outliers_leave_the_tip_where_the_rest_puts_it(
-    tracker_poses: Poses,
+    tracker_poses: PoseTable,
 ) -> None:
     rng = np.random.default_rng(1)
     R, t = tracker_poses.rotations, tracker_poses.translations

@@ -1,6 +1,6 @@
 """LED centres and poses that were found elsewhere, as tables.
 
-LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
+LED centres have the columns ``frame,led,x_px,y_px``. PoseTable have the row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
 and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
 translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. Further
@@ -57,8 +57,8 @@ class Centers:
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
-    """Poses of a pen, cam_from_pen.
+class PoseTable:
+    """PoseTable of a pen, cam_from_pen.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ def write_centers(centers: Centers, path: Path) -> None:
     write_whole(path, f"frame,led,x_px,y_px\n{text}".encode())
 
 
-def read_poses(path: Path) -> Poses:
+def read_poses(path: Path) -> PoseTable:
     """Read poses; see the module for the layout.
 
     Rotations given in few digits are replaced by the nearest rotations; those that are
@@ -162,7 +162,7 @@ def read_poses(path: Path) -> Poses:
         covariances = table.numbers(covariance_columns).reshape(-1, 6, 6)
         _check_covariances(table, covariances)
     rotations = _checked_rotations(table, numbers[:, :9].reshape(-1, 3, 3))
-    return Poses(rotations, translations, covariances, path)
+    return PoseTable(rotations, translations, covariances, path)
 
 
 def _check_centers(
