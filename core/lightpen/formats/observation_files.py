@@ -1,6 +1,6 @@
 """LED centres and poses that were found elsewhere, as tables.
 
-LED centres have the columns ``frame,led,x_px,y_px``. PoseTable have the row-major rotation
+LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
 and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
 translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. Further
@@ -58,7 +58,7 @@ class Centers:
 
 @dataclass(frozen=True, eq=False)
 class PoseTable:
-    """PoseTable of a pen, cam_from_pen.
+    """Poses of a pen, cam_from_pen.
 
     Attributes
     ----------
