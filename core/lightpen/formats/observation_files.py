@@ -3,9 +3,9 @@
 LED centres have the columns ``frame,led,x_px,y_px``. Poses have the row-major rotation
 ``r11,r12,r13,r21,...,r33`` and the translation ``tx_mm,ty_mm,tz_mm`` of cam_from_pen,
 and optionally the covariance ``c11,c12,...,c66`` of the small rotation vector w and the
-translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. Further
-columns, such as the number of the pose, are not read. Without a header the columns
-stand in this order, the number of the pose being optional.
+translation t, in this order, rad and mm: the true rotation is ``exp([w]x) R``. A column
+``pose`` with the number of each is optional; further columns are not read. Without a
+header the columns stand in this order, with the number first if there is one.
 """
 
 from dataclasses import dataclass
