@@ -237,12 +237,11 @@ def _simulate(options: argparse.Namespace) -> None:
         pen=SAMPLE_PENS[options.pen](),
     )
     with _progress("Rendering") as report:
-        write_scene(scene, options.out, report)
-    x, y, z = scene.tip_pen
+        x, y, z = write_scene(scene, options.out, report)
     print(
         f"{scene.n_images} images, camera.yaml, leds.csv and the true answer "
-        f"(truth.json) are in {options.out}. The true tip is at {x:.4f} {y:.4f} "
-        f"{z:.4f} mm; the LED file is off by {1000 * scene.led_noise:g} um."
+        f"(truth.json) are in {options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} "
+        "mm in the frame of leds.csv."
     )
 
 

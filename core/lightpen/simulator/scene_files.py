@@ -40,7 +40,7 @@ NOTES = (
 
 def write_scene(
     scene: Scene, folder: Path, report: Callable[[float], None] | None = None
-) -> None:
+) -> FloatArray:
     """Write a simulated set: ``camera.yaml``, ``leds.csv``, ``images``, ``truth.json``.
 
     Parameters
@@ -50,6 +50,12 @@ def write_scene(
         Created if it is missing. Images of the same names are replaced.
     report : callable, optional
         Called with the fraction done; what it raises stops the writing.
+
+    Returns
+    -------
+    (3,) array
+        The true tip in the frame in which the LEDs of ``leds.csv`` fit the true ones
+        best, mm.
 
     Raises
     ------
@@ -74,6 +80,12 @@ def write_scene(
                 report(done / len(names))
     truth = {"set": folder.name, **scene_truth(plan)}
     write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
+    return _tip_in_file_frame(plan)
+
+
+def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
+    R, t = fit_rigid(plan.scene.pen.leds, plan.measured_pen.leds)
+    return np.asarray(R @ plan.scene.tip_pen + t)
 
 
 def scene_truth(plan: ScenePlan) -> Json:
@@ -159,8 +171,7 @@ def _png(image: Image) -> bytes:
 def _pen_truth(plan: ScenePlan) -> Json:
     scene = plan.scene
     measured = plan.measured_pen.leds
-    R, t = fit_rigid(scene.pen.leds, measured)
-    tip_measured = R @ scene.tip_pen + t
+    tip_measured = _tip_in_file_frame(plan)
     return {
         "tip": scene.tip_pen.tolist(),
         "leds": scene.pen.leds.tolist(),
