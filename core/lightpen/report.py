@@ -18,7 +18,6 @@ from lightpen.pivot import PivotFit
 from lightpen.uncertainty import COVERAGE_FACTOR
 
 METHODS = ("joint", "two-stage")
-LARGE_SIGMA = 0.15  # px, of one image coordinate
 
 
 @dataclass(frozen=True)
@@ -205,7 +204,7 @@ def warnings_of(calibration: Calibration) -> list[str]:
         "place in the pen file. Check the file, or measure the pen again."
         for led in leds.displaced
     ]
-    if sigma > LARGE_SIGMA:
+    if sigma > USUAL_SIGMA:
         warnings.append(
             f"The residuals are large: {sigma:.2f} px, {USUAL_SIGMA} px or less is "
             "usual. Check that the camera file is of this camera, lens and focus, and "

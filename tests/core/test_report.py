@@ -19,6 +19,7 @@ from lightpen.report import (
     calibration_text,
     pivot_json,
     pivot_text,
+    warnings_of,
 )
 from lightpen.simulator.swings import (
     paper_camera,
@@ -125,6 +126,28 @@ def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> No
     assert "px rms" in rows["Residuals"]
     assert "mm rms" in rows["Residuals"]
     assert "U =" in rows["Weakest"]
+
+
+def test_an_led_that_was_never_found_is_warned_of() -> None:
+    (sentence,) = record()["warnings"]
+
+    assert sentence.startswith("LED 10 was found in no image.")
+    assert sentence in calibration_text(calibration(), "joint", None)
+
+
+def test_large_residuals_are_warned_of() -> None:
+    rng = np.random.default_rng(2)
+    swing = swing_poses(20, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.3, rng
+    )
+    centers = Centers(np.arange(20) + 1, pixels, Path("centers.csv"))
+    noisy = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+    (sentence,) = warnings_of(noisy)
+
+    assert "residuals are large" in sentence
+    assert "camera file" in sentence
 
 
 def test_a_pivot_calibration_is_recorded_and_shown() -> None:
