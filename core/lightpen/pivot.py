@@ -182,10 +182,8 @@ class _Equations:
     def normal_equations(
         self, used: BoolArray, tip_pen: FloatArray | None
     ) -> tuple[FloatArray, FloatArray]:
-        n_poses = len(self.rotations)
-        A = np.concatenate(
-            [self.rotations, np.broadcast_to(-np.eye(3), (n_poses, 3, 3))], axis=2
-        )
+        A = contact_matrix(self.rotations)
+        # Shifted by the mean translation, which keeps the numbers small.
         center = self.translations.mean(axis=0)
         b = center - self.translations
         WA = A
@@ -194,7 +192,6 @@ class _Equations:
             WA = np.linalg.inv(covariances) @ A
         H_each = np.swapaxes(WA, 1, 2) @ A
         g_each = np.einsum("nki,nk->ni", WA, b)
-        # Shifted by the mean translation, which keeps the numbers small.
         H = np.einsum("sn,nij->sij", used.astype(float), H_each)
         g = np.einsum("sn,ni->si", used.astype(float), g_each)
         shift = np.concatenate([np.zeros(3), center])
@@ -213,6 +210,12 @@ class _Equations:
         whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
         squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
         return np.sqrt(squares)
+
+
+def contact_matrix(rotations: FloatArray) -> FloatArray:
+    """Return [R_i, -I], (N, 3, 6): the equations of tip and pivot are A x = -t_i."""
+    minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
+    return np.concatenate([rotations, minus_identity], axis=2)
 
 
 def tip_covariances(

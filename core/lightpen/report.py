@@ -187,7 +187,9 @@ def calibration_text(
     lines.append(_numbers(method, chosen.cone_cam))
     lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
     lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
-    lines += ["", *warnings_of(calibration)] if warnings_of(calibration) else []
+    warnings = warnings_of(calibration)
+    if warnings:
+        lines += ["", *warnings]
     return "\n".join(lines)
 
 

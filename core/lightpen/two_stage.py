@@ -21,7 +21,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.coverage import require_spread
 from lightpen.errors import CalibrationError
-from lightpen.pivot import tip_covariances
+from lightpen.pivot import contact_matrix, tip_covariances
 
 N_START = 6  # images of the linear start
 STEP_TOLERANCE = 1e-9  # mm, of |alpha dX|
@@ -89,7 +89,7 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
             "Capture more images."
         )
     require_spread(rotations)
-    M = _contact_matrix(rotations)
+    M = contact_matrix(rotations)
     X = _linear_start(M, translations)
     iterates, step_lengths, increments = [X], [], []
     deviations = M @ X + translations
@@ -140,16 +140,10 @@ def propagated_covariance(
     (6, 6) array
         Of (tip_pen, cone_cam), mm^2.
     """
-    M = _contact_matrix(rotations)
+    M = contact_matrix(rotations)
     inverse = np.linalg.inv(np.einsum("nki,nkj->ij", M, M))
     each = np.swapaxes(M, 1, 2) @ tip_covariances(rotations, covariances, tip_pen) @ M
     return np.asarray(inverse @ each.sum(axis=0) @ inverse)
-
-
-def _contact_matrix(rotations: FloatArray) -> FloatArray:
-    """Return [R_i, -I] of eq. (2), (N, 3, 6)."""
-    minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
-    return np.concatenate([rotations, minus_identity], axis=2)
 
 
 def _linear_start(M: FloatArray, translations: FloatArray) -> FloatArray:
