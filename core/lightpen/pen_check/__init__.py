@@ -1,0 +1,1 @@
+"""The LED file of a pen: its frame, its edits, and whether the images agree."""

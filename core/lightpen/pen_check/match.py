@@ -1,0 +1,374 @@
+"""Whether the pen file fits the pen before the camera, and if not, which LED is wrong.
+
+LEDs are alike, so an image shows where they are, not which is which: two LEDs that are
+exchanged in the file as a whole fit the images, and only the definition of the pen
+frame tells them apart, see `lightpen.pen_check.frame`. An LED far off its place has
+no spot where the file has it; the spots left over, seen from several sides, tell where
+it is instead.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.calibrate import USUAL_SIGMA
+from lightpen.camera import Camera
+from lightpen.ellipse import centers_from_centroids
+from lightpen.labelling.diagnosis import diagnose, diagnose_mirror
+from lightpen.labelling.labels import MODERATE, Labels, Verdict, label_images
+from lightpen.pen import Pen
+from lightpen.pen_check.shifts import Shift, find_shifts, triple
+from lightpen.pen_check.strangers import find_strangers
+from lightpen.pose import MIN_LEDS, Poses, disc_residuals, fit_poses, robust_sigma
+from lightpen.spots import Flaw, Spots
+
+MAX_VIEWS = 30
+MOVED = 0.006  # of the extent of the spots, by which views differ
+N_COMPARED = 20  # spots of each, at most, as every image is compared with all views
+BESIDE = 12.0  # px from its place, where an LED's spot is looked for
+SAME = 0.3  # mm, within which two coordinates are the same
+SURE = 0.05  # mm, standard deviation of a shift that is told with its direction
+SURE_SHARE = 0.1  # of its length, likewise
+
+
+class What(StrEnum):
+    """What is wrong; what `Finding` holds is given beside."""
+
+    ADVICE = "advice"  # text
+    EXCHANGED = "exchanged"  # two LEDs; text: coordinates, "y", or "x/y" for either
+    SHIFTED = "shifted"  # LED, by
+    SHIFTED_EITHER = "shifted either"  # two LEDs, of which one is; by
+    UNSEEN = "unseen"  # LED
+    STRANGER = "stranger"  # by: its place in the pen frame
+    MISFIT = "misfit"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong.
+
+    Attributes
+    ----------
+    what : What
+    leds : tuple of int
+        Numbers from 1.
+    by : tuple of three float
+        Pen frame, mm.
+    is_sure : bool
+        Whether the views differ enough to tell `by`.
+    text : str
+    """
+
+    what: What
+    leds: tuple[int, ...] = ()
+    by: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    is_sure: bool = True
+    text: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PenMatch:
+    """How a pen fits some views of it.
+
+    Attributes
+    ----------
+    n_views, n_labelled : int
+        Views, and those in which the pen was found.
+    n_seen : (L,) array of int
+        Views in which each LED was found.
+    rms : (L,) array
+        Root mean square distance of each LED from where the file puts it, px; NaN if
+        it is not seen.
+    sigma : float
+        Standard deviation of one image coordinate, px; NaN where no pen was found.
+    findings : tuple of Finding
+        What is wrong, the worst first.
+    """
+
+    n_views: int
+    n_labelled: int
+    n_seen: IntArray
+    rms: FloatArray
+    sigma: float
+    findings: tuple[Finding, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Whether the pen was found and nothing is wrong."""
+        return self.n_labelled > 0 and not self.findings
+
+
+def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
+    """Return views with that of another image, the newest last.
+
+    It takes the place of a view that is alike, and of the oldest if there are too many;
+    smeared images and those with too few spots are passed over.
+    """
+    is_smeared = 2 * np.count_nonzero(spots.flaws & Flaw.BLURRED) > len(spots)
+    if len(spots) < MIN_LEDS or is_smeared:
+        return views
+    others = [view for view in views if _differ(view, spots)]
+    return (*others, spots)[-MAX_VIEWS:]
+
+
+def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
+    """Compare a pen with views of it.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+        One that `lightpen.pen.check_leds` passes.
+    views : sequence of Spots
+    """
+    labels = label_images(views, camera, pen, MODERATE)
+    found = [
+        i
+        for i, each in enumerate(labels)
+        if each.reason is Verdict.LABELLED and each.whole.sum() >= MIN_LEDS
+    ]
+    if not found or 2 * len(found) < len(views):
+        sentence = diagnose(views, camera, pen) if views else ""
+        return _without_pen(pen, len(views), sentence)
+    spots = [views[i] for i in found]
+    seen = _Seen.of(camera, pen, spots, [labels[i] for i in found])
+    if len(seen.missing) > 1:
+        sentence = diagnose_mirror(spots, camera, pen)
+        if sentence:
+            return _without_pen(pen, len(views), sentence)
+    located = _located(camera, pen, seen)
+    residuals = _residuals(camera, pen, located, seen.poses)
+    sigma = robust_sigma(residuals, 6)
+    findings = _findings(pen, located)
+    if not findings and sigma > USUAL_SIGMA:
+        findings = (Finding(What.MISFIT),)
+    return PenMatch(
+        n_views=len(views),
+        n_labelled=len(found),
+        n_seen=np.isfinite(located.pixels[..., 0]).sum(axis=0),
+        rms=_rms(residuals),
+        sigma=sigma,
+        findings=findings,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """The LEDs of a pen in N views where it was found."""
+
+    spots: list[Spots]
+    taken: IntArray  # (N, L), spot of each LED, -1 without one
+    pixels: FloatArray  # (N, L, 2), ellipse centres of the whole spots
+    poses: Poses
+
+    @classmethod
+    def of(
+        cls, camera: Camera, pen: Pen, spots: list[Spots], labels: list[Labels]
+    ) -> "_Seen":
+        taken = np.stack([label.spot for label in labels])
+        whole = np.stack([label.whole for label in labels])
+        R = np.stack([label.R for label in labels])
+        t = np.stack([label.t for label in labels])
+        pixels = _centers(camera, spots, np.where(whole, taken, -1))
+        beside = _beside(camera, pen, spots, taken, R, t)
+        taken = np.where(beside >= 0, beside, taken)
+        # Poses do without LEDs beside their places, the shifts are told with them.
+        poses = fit_poses(camera, pen, pixels, R, t)
+        added = _centers(camera, spots, beside)
+        pixels = np.where((beside >= 0)[..., None], added, pixels)
+        return cls(spots, taken, pixels, poses)
+
+    @property
+    def missing(self) -> IntArray:
+        """LEDs, from 0, that have no spot in most views."""
+        return np.flatnonzero(2 * (self.taken >= 0).sum(axis=0) < len(self.spots))
+
+    @property
+    def left_over(self) -> list[FloatArray]:
+        """Spots that are no LED, (K, 2) px in each view."""
+        return [
+            np.delete(each.centers, taken[taken >= 0], axis=0)
+            for each, taken in zip(self.spots, self.taken, strict=True)
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Located:
+    """Where the LEDs sit on the pen."""
+
+    pixels: FloatArray  # (N, L, 2)
+    shifts: dict[int, Shift]  # by LED number
+    unseen: list[int]  # LED numbers
+    strangers: FloatArray  # (P, 3), points on the pen that are no LED of the file
+
+    def leds(self, pen: Pen) -> FloatArray:
+        """Return the places of all LEDs, (L, 3)."""
+        leds = pen.leds.copy()
+        for shift in self.shifts.values():
+            leds[shift.led - 1] += shift.by
+        return leds
+
+
+def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
+    """Find LEDs far off their places among the spots left over, then small shifts."""
+    missing, poses = seen.missing, seen.poses
+    strangers = find_strangers(camera, poses, seen.left_over)
+    owners = _owners(pen.leds[missing], strangers.points)
+    leds, pixels = pen.leds.copy(), seen.pixels.copy()
+    for led, owner in zip(missing, owners, strict=True):
+        if owner >= 0:
+            leds[led] = strangers.points[owner]
+            pixels[:, led] = strangers.pixels[:, owner]
+    guess = replace(pen, leds=leds)
+    found = find_shifts(camera, guess, pixels, poses.rotations, poses.translations)
+    shifts = {shift.led: shift for shift in found}
+    for led in np.flatnonzero((leds != pen.leds).any(axis=1)).tolist():
+        fine = shifts.get(led + 1, Shift(led + 1, (0.0, 0.0, 0.0), 0.0))
+        by = triple(leds[led] - pen.leds[led] + fine.by)
+        shifts[led + 1] = replace(fine, by=by)
+    unseen = {int(led) + 1 for led, at in zip(missing, owners, strict=True) if at < 0}
+    owned = [owner for owner in owners if owner >= 0]
+    return _Located(
+        pixels,
+        shifts,
+        sorted(unseen - set(shifts)),
+        np.delete(strangers.points, owned, axis=0),
+    )
+
+
+def _without_pen(pen: Pen, n_views: int, sentence: str) -> PenMatch:
+    return PenMatch(
+        n_views=n_views,
+        n_labelled=0,
+        n_seen=np.zeros(pen.n_leds, dtype=np.int64),
+        rms=np.full(pen.n_leds, np.nan),
+        sigma=float("nan"),
+        findings=(Finding(What.ADVICE, text=sentence),) if sentence else (),
+    )
+
+
+def _differ(view: Spots, other: Spots) -> bool:
+    """Whether most spots of two views lie at other places."""
+    some = other.centers[:: 1 + len(other) // N_COMPARED]
+    gaps = np.linalg.norm(view.centers[:, None] - some, axis=2)
+    extent = float(np.ptp(other.centers, axis=0).max())
+    return float(np.median(gaps.min(axis=0))) > MOVED * extent
+
+
+def _centers(camera: Camera, spots: Sequence[Spots], spot: IntArray) -> FloatArray:
+    """Return ellipse centres (N, L, 2) of the spots (N, L) of N views, px or NaN."""
+    pixels = np.full((*spot.shape, 2), np.nan)
+    for i, each in enumerate(spots):
+        has = spot[i] >= 0
+        chosen = spot[i, has]
+        if len(chosen):
+            pixels[i, has] = centers_from_centroids(
+                camera, each.centers[chosen], each.shapes[chosen]
+            )
+    return pixels
+
+
+def _beside(
+    camera: Camera,
+    pen: Pen,
+    spots: Sequence[Spots],
+    taken: IntArray,
+    R: FloatArray,
+    t: FloatArray,
+) -> IntArray:
+    """Return the spot left over near the place of each LED that has none, (N, L)."""
+    beside = np.full_like(taken, -1)
+    there = camera.project(pen.leds @ np.swapaxes(R, 1, 2) + t[:, None])
+    for i, each in enumerate(spots):
+        left_over = np.setdiff1d(np.arange(len(each)), taken[i])
+        for led in np.flatnonzero(taken[i] < 0) if len(left_over) else ():
+            gaps = np.linalg.norm(each.centers[left_over] - there[i, led], axis=1)
+            if gaps.min() < BESIDE:
+                beside[i, led] = left_over[gaps.argmin()]
+    return beside
+
+
+def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
+    """Return which of the points each missing LED is, or -1.
+
+    As few coordinates as possible of the file are wrong then; of equals, the nearest.
+    """
+    n_leds, n_points = len(leds), len(points)
+    if not n_leds or not n_points:
+        return [-1] * n_leds
+    gaps = np.abs(leds[:, None] - points)
+    costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
+    owners = [-1] * n_leds
+    for led, point in zip(*linear_sum_assignment(costs), strict=True):
+        owners[led] = int(point)
+    return owners
+
+
+def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:
+    """Return residuals against the file, by poses fitted to the LEDs where they are."""
+    there = replace(pen, leds=located.leds(pen))
+    pixels = located.pixels
+    poses = fit_poses(camera, there, pixels, start.rotations, start.translations)
+    R_t = np.swapaxes(poses.rotations, 1, 2)
+    lever = pen.leds @ R_t
+    return disc_residuals(
+        camera,
+        lever,
+        lever + poses.translations[:, None],
+        pen.normals @ R_t,
+        pen.diameter / 2,
+        pixels,
+    )[0]
+
+
+def _rms(residuals: FloatArray) -> FloatArray:
+    squares = np.nansum(residuals**2, axis=(0, 2))
+    n_seen = np.isfinite(residuals[..., 0]).sum(axis=0)
+    rms: FloatArray = np.sqrt(squares / np.maximum(n_seen, 1))
+    return np.where(n_seen > 0, rms, np.nan)
+
+
+def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
+    shifts = located.shifts
+    left = dict(sorted(shifts.items(), key=lambda item: -item[1].length))
+    findings = []
+    for one, other in combinations(sorted(shifts), 2):
+        axes = _exchanged(pen.leds, shifts[one], shifts[other])
+        if axes and one in left and other in left:
+            findings.append(Finding(What.EXCHANGED, (one, other), text=axes))
+            del left[one], left[other]
+    for shift in left.values():
+        is_sure = shift.sigma < max(SURE, SURE_SHARE * shift.length)
+        leds = (shift.led, shift.rival) if shift.rival else (shift.led,)
+        what = What.SHIFTED_EITHER if shift.rival else What.SHIFTED
+        findings.append(Finding(what, leds, shift.by, is_sure))
+    findings += [Finding(What.UNSEEN, (led,)) for led in located.unseen]
+    findings += [
+        Finding(What.STRANGER, by=triple(point)) for point in located.strangers
+    ]
+    return tuple(findings)
+
+
+def _exchanged(leds: FloatArray, one: Shift, other: Shift) -> str:
+    """Return the coordinates that two LEDs have of each other, such as "y".
+
+    Of two LEDs that differ in two coordinates, exchanging either gives the same two
+    places: "x/y".
+    """
+    first, second = leds[one.led - 1], leds[other.led - 1]
+    differ = np.abs(first - second) > SAME
+    swapped = np.abs(first + one.by - second) < SAME
+    swapped &= np.abs(second + other.by - first) < SAME
+    stay = (np.abs(one.by) < SAME) & (np.abs(other.by) < SAME)
+    chosen = swapped & differ
+    if not np.all(swapped | stay) or not np.any(chosen):
+        return ""
+    either = 2 * chosen.sum() == differ.sum()
+    told = differ if either else chosen
+    names = [name for name, is_it in zip("xyz", told, strict=True) if is_it]
+    return ("/" if either else ", ").join(names)

@@ -1,0 +1,78 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.pen_check.shifts import find_shifts
+from lightpen.simulator.sample_pens import six_led_pen
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = paper_pen()
+
+
+def views(
+    leds: FloatArray, n_views: int = 12, sigma: float = 0.05
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return centres, px, and poses of a pen whose LEDs really are there."""
+    rng = np.random.default_rng(2)
+    swing = swing_poses(n_views, rng)
+    pen = replace(PEN, leds=leds)
+    R, t = swing.rotations, swing.translations
+    return simulate_centers(CAMERA, pen, R, t, sigma, rng), R, t
+
+
+def test_the_shift_agrees_with_its_standard_deviation() -> None:
+    leds = PEN.leds.copy()
+    by = np.array([0.2, -0.3, 0.15])
+    leds[4] += by
+
+    (shift,) = find_shifts(CAMERA, PEN, *views(leds))
+
+    assert shift.led == 5
+    assert np.linalg.norm(shift.by - by) < 4 * shift.sigma
+    assert shift.sigma < 0.05
+
+
+def test_the_deviation_falls_with_more_views() -> None:
+    leds = PEN.leds.copy()
+    leds[4] += [0.5, 0.0, 0.0]
+
+    sigmas = [find_shifts(CAMERA, PEN, *views(leds, n))[0].sigma for n in (10, 40)]
+
+    assert sigmas[0] / sigmas[1] == pytest.approx(2, rel=0.35)  # postures differ
+
+
+def test_leds_in_place_are_left_alone() -> None:
+    assert find_shifts(CAMERA, PEN, *views(PEN.leds)) == ()
+
+
+def test_a_shift_that_two_leds_would_explain_is_told_with_both() -> None:
+    # One view of six LEDs: two equations more than unknowns without one LED.
+    pen = six_led_pen()
+    rng = np.random.default_rng(1)
+    swing = swing_poses(1, rng, pen=pen)
+    R, t = swing.rotations, swing.translations
+    pixels = simulate_centers(CAMERA, pen, R, t, 0.02, rng)
+    pixels[:, 1] += [[1.0, 0.4]]
+
+    shifts = find_shifts(CAMERA, pen, pixels, R, t)
+
+    assert all(shift.rival for shift in shifts)
+
+
+def test_leds_that_are_not_seen_do_not_count() -> None:
+    leds = PEN.leds.copy()
+    leds[4] += [0.5, 0.0, 0.0]
+    pixels, R, t = views(leds)
+    pixels[:, 0] = np.nan
+
+    (shift,) = find_shifts(CAMERA, PEN, pixels, R, t)
+
+    assert shift.led == 5
