@@ -5,7 +5,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
@@ -122,6 +122,22 @@ def record(
 
 
 @pytest.fixture(scope="session")
+def swung(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Return a function that records a swing of small images and leaves it unfinished.
+
+    Each record is made once; copy it before you change it.
+    """
+
+    @cache
+    def recorded(n_images: int = 20, mask: Sequence[Sequence[float]] = ()) -> Path:
+        folder = tmp_path_factory.mktemp("swung") / "swing"
+        _record_swing(folder, n_images, mask)
+        return folder
+
+    return recorded
+
+
+@pytest.fixture(scope="session")
 def truth() -> Callable[[Path], dict[str, Any]]:
     """Return a function that reads the true answer of a set."""
 
@@ -131,6 +147,51 @@ def truth() -> Callable[[Path], dict[str, Any]]:
         return fields
 
     return read
+
+
+def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) -> None:
+    """Record a guided swing of the simulated pen, seen with a quarter of the pixels."""
+    import numpy as np
+
+    from lightpen.cameras.clock import SkippingClock
+    from lightpen.cameras.simulated import SimulatedCamera
+    from lightpen.session.capture import capture_image
+    from lightpen.session.following import Follower
+    from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
+    from lightpen.session.recording import RecordWriter
+    from lightpen.session.sighting import look
+    from lightpen.session.swing_state import SwingLimits, start_swing
+    from lightpen.simulator.scene_files import write_sample_files
+    from lightpen.simulator.scenes import Scene
+    from lightpen.simulator.swings import paper_camera
+
+    scene = Scene(camera=paper_camera(binning=2))
+    files = write_sample_files(scene, folder.parent / "files")
+    preparation = Preparation(
+        names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
+        camera_file=CameraFile.read(files.camera),
+        pen_file=PenFile.read(files.pen),
+        mask=np.array(mask, dtype=np.float64).reshape(-1, 3),
+        limits=SwingLimits(max_uncertainty=1e-6, min_images=n_images),
+    )
+    clock = SkippingClock()
+    live = SimulatedCamera(scene, clock)
+    live.open()
+    live.start()
+    live.operator.seat()
+    follower = Follower(live.operator)
+    setup = preparation.swing_setup()
+    state = start_swing(setup)
+    with RecordWriter.create(folder, preparation.header()) as writer:
+        while state.n_kept < n_images:
+            frame = live.read(1.0)
+            sighting = look(frame.image, setup.camera, setup.pen, setup.mask)
+            state = capture_image(
+                *(setup, state, writer, frame.image, sighting),
+                *(clock.now_ns() * 1e-9, frame.device_ts_ns),
+            ).state
+            follower.follow(state)
+    live.close()
 
 
 def _refuse_constant(name: str) -> None:

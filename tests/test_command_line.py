@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lightpen.cli import main
+
 Run = Callable[..., CompletedProcess[str]]
 Record = Callable[..., dict[str, Any]]
 Scene = Callable[..., Path]
@@ -734,3 +736,27 @@ def test_simulating_onto_a_file_is_refused(lightpen: Run, tmp_path: Path) -> Non
     assert outcome.returncode == 2
     assert "thesis.docx" in outcome.stderr
     assert file.read_text() == "precious"
+
+
+# The window and the output
+
+
+def test_what_the_window_cannot_read_is_not_taken_for_output_that_fails() -> None:
+    def show_window(plays_demo: bool) -> int:
+        raise FileNotFoundError("a font")
+
+    with pytest.raises(FileNotFoundError, match="a font"):
+        main([], show_window)
+
+
+def test_output_that_fails_is_told_even_without_a_standard_output(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("lightpen.cli.write_pen", fail)
+    monkeypatch.setattr("lightpen.cli.read_raw_pen", lambda *_: None)
+    monkeypatch.setattr("sys.stdout", None)
+
+    assert main(["pen", "in.csv", "out.csv"]) == 2

@@ -125,7 +125,8 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
     gated = posed[fitting][~pivot.used]
     distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
     smeared = _smeared(observations)[gated] & (distances < MAX_SMEAR)
-    reasons[gated] = np.where(smeared, Reason.BLURRED, Reason.SLIPPED)
+    reasons[gated[smeared]] = Reason.BLURRED
+    reasons[gated[~smeared]] = Reason.SLIPPED
     kept = np.flatnonzero(fitting)[pivot.used]
     chosen, poses = posed[kept], all_poses.of(kept)
 

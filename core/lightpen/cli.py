@@ -9,18 +9,21 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import wraps
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
+from typing import TypeAlias
 
 import cv2
 import numpy as np
 
-from lightpen.calibrate import calibrate
+from lightpen.arrays import FloatArray
+from lightpen.calibrate import Calibration, calibrate
 from lightpen.errors import CalibrationError, LightpenError, UsageError
-from lightpen.files import sha256, write_whole
+from lightpen.files import write_whole
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
@@ -29,67 +32,82 @@ from lightpen.observe import observe_centers, observe_images
 from lightpen.pivot import fit_pivot
 from lightpen.report import (
     METHODS,
-    InputFile,
     Inputs,
+    all_hashed,
     calibration_json,
     calibration_text,
     encoded,
+    hashed,
     pivot_json,
     pivot_text,
 )
+from lightpen.session.record import is_record, open_record, record_files
+from lightpen.session.solving import record_inputs, solve_record
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return the exit status."""
+ShowWindow: TypeAlias = Callable[[bool], int]
+Command: TypeAlias = Callable[[argparse.Namespace], int]
+
+
+def main(
+    arguments: Sequence[str] | None = None, show_window: ShowWindow | None = None
+) -> int:
+    """Run the command line and return the exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the process unless given.
+    show_window : callable, optional
+        Opens the program's window, or its demo if its argument is True, and returns
+        the exit status. Without it a command must be given.
+    """
     given = sys.argv[1:] if arguments is None else arguments
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
-    options = _parser().parse_args(
+    options = _parser(show_window).parse_args(
         [f" {text}" if NEGATIVE_NUMBER.match(text) else text for text in given]
     )
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a console may lack letters of a name
             stream.reconfigure(errors="backslashreplace")
     cv2.setNumThreads(1)  # images are spread over threads, one each
-    run: Callable[[argparse.Namespace], None] = options.run
+    run: Command = options.run
     try:
-        run(options)
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        status = run(options)
     except CalibrationError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return NO_TIP
     except LightpenError as error:
         print(f"lightpen: {error}", file=sys.stderr)
         return BAD_INPUT
-    except OSError as error:  # files have errors of their own: this is our output
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if isinstance(error, BrokenPipeError):  # its reader has seen enough
-            return DONE
-        print(
-            f"lightpen: The result cannot be printed: {error.strerror}. Free some "
-            "space, or print it elsewhere.",
-            file=sys.stderr,
-        )
-        return BAD_INPUT
     except KeyboardInterrupt:
         print("lightpen: stopped.", file=sys.stderr)
         return BAD_INPUT
-    return DONE
+    return status
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
+    has_window = show_window is not None
     parser = argparse.ArgumentParser(
         prog="lightpen",
-        description="Calibrate the probe tip of a light pen.",
+        description="Calibrate the probe tip of a light pen."
+        + (" Without a command, a window opens and leads through it." * has_window),
         epilog="Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or "
         "unreadable input.",
     )
     parser.add_argument("--version", action="version", version=version("lightpen"))
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    if show_window is not None:
+        parser.set_defaults(run=lambda options: show_window(options.demo))
+        parser.add_argument(
+            "--demo",
+            action="store_true",
+            help="play a whole calibration with a simulated operator",
+        )
+    commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
     _add_calibrate(commands.add_parser("calibrate", help="find the tip from a swing"))
     _add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
     _add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
@@ -100,7 +118,10 @@ def _parser() -> argparse.ArgumentParser:
 def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_calibrate)
     parser.add_argument(
-        "images", nargs="*", metavar="IMAGES", help="a folder, a pattern or a video"
+        "images",
+        nargs="*",
+        metavar="IMAGES",
+        help="a folder, a pattern, a video, or the record of a swing",
     )
     parser.add_argument(
         "--centers",
@@ -108,8 +129,8 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.csv",
         help="LED centres (frame,led,x_px,y_px) in place of IMAGES",
     )
-    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
-    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument("--pen", type=Path, metavar="FILE")
     _add_pen_options(parser)
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
@@ -192,10 +213,91 @@ def _add_pen_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _printing(command: Callable[[argparse.Namespace], None]) -> Command:
+    """Give a command an exit status also where its output cannot be written."""
+
+    @wraps(command)
+    def run(options: argparse.Namespace) -> int:
+        try:
+            command(options)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except BrokenPipeError:  # its reader has seen enough
+            _drop_output()
+        except OSError as error:  # files have errors of their own: this is our output
+            _drop_output()
+            print(
+                f"lightpen: The result cannot be printed: {error.strerror}. Free some "
+                "space, or print it elsewhere.",
+                file=sys.stderr,
+            )
+            return BAD_INPUT
+        return DONE
+
+    return run
+
+
+def _drop_output() -> None:
+    """Keep what is not printed yet from failing again as the program ends."""
+    if sys.stdout is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@dataclass(frozen=True, eq=False)
+class _Calibrated:
+    """A calibration and what it was made from; hashes are read when asked for."""
+
+    calibration: Calibration
+    nominal_tip: FloatArray | None
+    inputs: Callable[[], Inputs]
+
+
+@_printing
 def _calibrate(options: argparse.Namespace) -> None:
     if bool(options.images) == (options.centers is not None):
         raise UsageError("Give either IMAGES or --centers FILE.csv.")
     _require_other_file(options.json, options.camera, options.pen, options.centers)
+    if len(options.images) == 1 and is_record(Path(options.images[0])):
+        calibrated = _from_record(options)
+    else:
+        calibrated = _from_observations(options)
+    calibration = calibrated.calibration
+    print(calibration_text(calibration, options.method, calibrated.nominal_tip))
+    if options.json is not None:
+        record = calibration_json(calibration, calibrated.inputs(), options.method)
+        write_whole(options.json, encoded(record))
+
+
+def _from_record(options: argparse.Namespace) -> _Calibrated:
+    folder = Path(options.images[0])
+    own = {
+        "--camera": options.camera,
+        "--pen": options.pen,
+        "--units": options.units,
+        "--led-diameter": options.led_diameter,
+        "--nominal-tip": options.nominal_tip,
+    }
+    given = [name for name, value in own.items() if value is not None]
+    if given:
+        raise UsageError(
+            f"{folder} is the record of a swing, which brings its own. Leave out "
+            f"{', '.join(given)}."
+        )
+    record = open_record(folder)
+    _require_other_file(options.json, *record_files(record))
+    with _progress("Finding LEDs") as report:
+        solution = solve_record(record, report)
+    return _Calibrated(
+        solution.calibration,
+        solution.source.pen.nominal_tip,
+        lambda: record_inputs(solution.source),
+    )
+
+
+def _from_observations(options: argparse.Namespace) -> _Calibrated:
+    for name, file in (("--camera", options.camera), ("--pen", options.pen)):
+        if file is None:
+            raise UsageError(f"{name} FILE is missing. Only a record needs none.")
     camera = read_camera(options.camera)
     nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
     pen = read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
@@ -208,19 +310,19 @@ def _calibrate(options: argparse.Namespace) -> None:
         files = source.files
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
-    calibration = calibrate(camera, pen, observations)
-    print(calibration_text(calibration, options.method, pen.nominal_tip))
-    if options.json is not None:
-        inputs = Inputs(
-            camera=_hashed(options.camera),
-            pen=_hashed(options.pen),
-            observations=_all_hashed(files),
+    return _Calibrated(
+        calibrate(camera, pen, observations),
+        pen.nominal_tip,
+        lambda: Inputs(
+            camera=hashed(options.camera),
+            pen=hashed(options.pen),
+            observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
-        )
-        record = calibration_json(calibration, inputs, options.method)
-        write_whole(options.json, encoded(record))
+        ),
+    )
 
 
+@_printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen.simulator.sample_pens import SAMPLE_PENS
@@ -245,6 +347,7 @@ def _simulate(options: argparse.Namespace) -> None:
     )
 
 
+@_printing
 def _pivot(options: argparse.Namespace) -> None:
     _require_other_file(options.json, options.poses)
     poses = read_poses(options.poses)
@@ -256,10 +359,11 @@ def _pivot(options: argparse.Namespace) -> None:
     )
     print(pivot_text(fit))
     if options.json is not None:
-        record = pivot_json(fit, _hashed(options.poses), options.least_squares)
+        record = pivot_json(fit, hashed(options.poses), options.least_squares)
         write_whole(options.json, encoded(record))
 
 
+@_printing
 def _pen(options: argparse.Namespace) -> None:
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
@@ -276,15 +380,6 @@ def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
                 f"--json {record} would replace the input file of that name. Give the "
                 "record another name."
             )
-
-
-def _hashed(path: Path) -> InputFile:
-    return InputFile(path, sha256(path))
-
-
-def _all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
-    with ThreadPoolExecutor() as executor:
-        return tuple(executor.map(_hashed, paths))
 
 
 @contextmanager

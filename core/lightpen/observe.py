@@ -2,10 +2,11 @@
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
@@ -49,6 +50,7 @@ class Reason(StrEnum):
     AMBIGUOUS = "ambiguous"
     MISFIT = "LEDs do not fit"
     SLIPPED = "tip slipped"
+    TAKEN_OUT = "taken out"  # by the user
 
 
 UNSEEN = (Reason.UNREADABLE, Reason.WRONG_SIZE)
@@ -105,6 +107,7 @@ def observe_images(
     pen: Pen,
     report: Report = lambda fraction: None,
     n_threads: int | None = None,
+    mask: FloatArray | None = None,
 ) -> Observations:
     """Find and label the LEDs in images.
 
@@ -120,6 +123,8 @@ def observe_images(
         Called with the fraction done, 0 to 1.
     n_threads : int, optional
         One a core if not given.
+    mask : (M, 3) array, optional
+        Circles of stray light to leave out: centre x, y and radius, px.
 
     Returns
     -------
@@ -136,7 +141,8 @@ def observe_images(
     sightings: list[_Sighting] = []
     labels: list[Labels] = []
     n_images = len(source.names)
-    for sighting in _in_threads(source, camera, n_threads or os.cpu_count() or 1):
+    detect = partial(_detect, camera=camera, mask=mask)
+    for sighting in _in_threads(source, detect, n_threads or os.cpu_count() or 1):
         sightings.append(sighting)
         if len(sightings) - len(labels) == LABELLED_AT_ONCE:
             labels += _label(sightings[len(labels) :], camera, pen)
@@ -186,21 +192,39 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     )
 
 
+def leave_out(
+    observations: Observations, reasons: Mapping[int, Reason]
+) -> Observations:
+    """Return the observations with other images left out, by index, and why.
+
+    An image that was of no use anyway keeps the reason that it has.
+    """
+    kept = list(observations.reasons)
+    for index, reason in reasons.items():
+        if kept[index] is Reason.NONE:
+            kept[index] = reason
+    return replace(observations, reasons=tuple(kept))
+
+
 def _in_threads(
-    source: ImageSource, camera: Camera, n_threads: int
+    source: ImageSource,
+    detect: Callable[[Callable[[], Image]], _Sighting],
+    n_threads: int,
 ) -> Iterator[_Sighting]:
     """Detect the spots of all images, in order, with a bounded number in memory."""
     with ThreadPoolExecutor(n_threads) as executor:
         waiting: deque[Future[_Sighting]] = deque()
         for load in source.open():
-            waiting.append(executor.submit(_detect, load, camera))
+            waiting.append(executor.submit(detect, load))
             if len(waiting) >= IN_FLIGHT * n_threads:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
 
 
-def _detect(load: Callable[[], Image], camera: Camera) -> _Sighting:
+def _detect(
+    load: Callable[[], Image], camera: Camera, mask: FloatArray | None
+) -> _Sighting:
     try:
         image = load()
     except FileError as error:
@@ -208,7 +232,7 @@ def _detect(load: Callable[[], Image], camera: Camera) -> _Sighting:
     height, width = image.shape
     if (width, height) != (camera.width, camera.height):
         return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, f"{width} x {height} px")
-    spots = detect_spots(image)
+    spots = detect_spots(image, mask)
     if len(spots) == 0:
         return _Sighting(
             spots, Reason.BLURRED if shows_smears(image) else Reason.EMPTY, ""

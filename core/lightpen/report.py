@@ -3,6 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -14,6 +15,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.calibrate import USUAL_SIGMA, Calibration
 from lightpen.coverage import DIRECTION_NAMES
+from lightpen.files import sha256
 from lightpen.pivot import PivotFit
 from lightpen.uncertainty import COVERAGE_FACTOR
 
@@ -45,6 +47,17 @@ class Inputs:
     pen: InputFile
     observations: tuple[InputFile, ...]
     nominal_tip: FloatArray | None
+
+
+def hashed(path: Path) -> InputFile:
+    """Return a file with its hash."""
+    return InputFile(path, sha256(path))
+
+
+def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
+    """Return files with their hashes, read in threads."""
+    with ThreadPoolExecutor() as executor:
+        return tuple(executor.map(hashed, paths))
 
 
 @dataclass(frozen=True, eq=False)

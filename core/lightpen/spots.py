@@ -309,7 +309,7 @@ def _regions(scene: _Scene, box: Box, level: float) -> list[Box]:
     if level >= np.iinfo(scene.image.dtype).max:
         return []
     step = 1 if box.size <= FINE_SIZE else scene.stride
-    plane = scene.image if step == 1 else scene.thinned
+    plane = scene.thinned if step == scene.stride else scene.image
     frame = box.grown(step, scene.image.shape)
     left, top = frame.left // step, frame.top // step
     window = plane[top : -(-frame.bottom // step), left : -(-frame.right // step)]

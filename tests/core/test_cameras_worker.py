@@ -341,6 +341,46 @@ def test_frames_of_a_live_camera_that_nobody_takes_in_time_are_reported(
     assert bench.worker.stats.skipped >= 5
 
 
+def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
+    benches: Benches,
+) -> None:
+    bench = benches.live(n_queued=1)
+    bench.worker.measure(True)
+    bench.worker.start()
+    for _ in range(3):
+        bench.wait_for_frames(3)
+        bench.worker.next_frame(TIMEOUT)
+    assert len(bench.events.troubles(FramesSkipped)) == 1
+    bench.worker.measure(False)
+    bench.worker.measure(True)
+    bench.wait_for_frames(3)
+
+    assert len(bench.events.troubles(FramesSkipped)) == 2
+
+
+def test_a_recording_that_waits_for_its_reader_goes_on_when_nobody_measures(
+    benches: Benches, recording: Path
+) -> None:
+    camera = ReplayCamera(str(recording), frame_rate=1000, loops=True)
+    bench = benches.make(camera, n_queued=2)
+    bench.worker.measure(True)
+    bench.worker.start()
+    bench.wait_for(FrameReady)
+    bench.worker.measure(False)
+    bench.wait_for_frames(N_IMAGES)
+
+    assert len(waiting(bench.worker)) <= 1  # one may have been on its way
+
+
+def waiting(worker: CameraWorker) -> list[Frame]:
+    frames = []
+    while True:
+        try:
+            frames.append(worker.next_frame(0.05))
+        except FrameTimeout:
+            return frames
+
+
 def test_frames_are_queued_only_while_measuring(benches: Benches) -> None:
     bench = benches.live(n_queued=3)
     bench.worker.start()

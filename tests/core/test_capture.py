@@ -1,6 +1,6 @@
 """From live images to a record, and from the record to the same tip."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,7 +19,16 @@ from lightpen.report import InputFile, Inputs, calibration_json
 from lightpen.session.capture import capture_image, resume_swing
 from lightpen.session.record import FileCopy, Header, open_record, source
 from lightpen.session.recording import RecordWriter
-from lightpen.session.swing_state import Phase, SwingSetup, SwingState, start_swing
+from lightpen.session.sighting import Sighting, look
+from lightpen.session.swing import Fed
+from lightpen.session.swing_state import (
+    Event,
+    Happening,
+    Phase,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
 
@@ -28,17 +37,7 @@ PERIOD = 0.05  # s
 
 def small_scene() -> Scene:
     """Return the paper's scene seen with a quarter of the pixels."""
-    full = paper_camera()
-    camera = replace(
-        full,
-        width=full.width // 2,
-        height=full.height // 2,
-        fx=full.fx / 2,
-        fy=full.fy / 2,
-        cx=(full.cx - 0.5) / 2,
-        cy=(full.cy - 0.5) / 2,
-    )
-    return Scene(camera=camera)
+    return Scene(camera=paper_camera(binning=2))
 
 
 class Wizard:
@@ -67,8 +66,10 @@ class Wizard:
         """Capture until so many images are kept."""
         while self.state.n_kept < n_images:
             frame = self.camera.read(1.0)
+            setup = self.setup
+            sighting = look(frame.image, setup.camera, setup.pen)
             fed = capture_image(
-                *(self.setup, self.state, self.writer, frame.image),
+                *(setup, self.state, self.writer, frame.image, sighting),
                 *(self.clock.now_ns() * 1e-9, frame.device_ts_ns),
             )
             self.state = fed.state
@@ -190,5 +191,38 @@ def test_state_and_record_must_belong_together(wizard: Wizard) -> None:
     wizard.run(1)
     other = start_swing(wizard.setup)
     image = np.zeros((1024, 1224), np.uint8)
+    sighting = look(image, wizard.setup.camera, wizard.setup.pen)
     with pytest.raises(ValueError, match="at image 1, the record at 2"):
-        capture_image(wizard.setup, other, wizard.writer, image, 0.0)
+        capture_image(wizard.setup, other, wizard.writer, image, sighting, 0.0)
+
+
+def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
+    wizard: Wizard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wizard.run(3)
+
+    def slipped_and_kept(
+        setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+    ) -> Fed:
+        events = (Event(Happening.KEPT, (4,)), Event(Happening.SLIPPED, (2,)))
+        return Fed(replace(state, next_number=5), events)
+
+    def fail(writer: RecordWriter, numbers: Sequence[int], reason: str) -> None:
+        raise FileError("The disk is full.")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("lightpen.session.capture.feed", slipped_and_kept)
+        patch.setattr(RecordWriter, "take_out", fail)
+        with pytest.raises(FileError, match="disk is full"):
+            wizard.run(4)
+    assert wizard.writer.next_number == wizard.state.next_number == 4
+    wizard.run(5)
+
+
+def test_a_folder_that_is_gone_is_said_and_nothing_is_kept(wizard: Wizard) -> None:
+    wizard.run(2)
+    wizard.folder.rename(wizard.folder.with_name("elsewhere"))
+    with pytest.raises(FileError, match="cannot be written"):
+        wizard.run(3)
+
+    assert wizard.state.n_kept == 2

@@ -12,7 +12,6 @@ from lightpen.session.guidance import (
     TILTS,
     TURNS,
     Outlook,
-    arrow,
     image_information,
     next_posture,
     usable_leds,
@@ -155,16 +154,3 @@ def test_leds_that_touch_in_the_image_are_not_counted_on() -> None:
     usable = usable_leds(known, known.rotations)[0]
     assert not usable[:2].any()
     assert usable[2:].all()
-
-
-def test_the_arrow_says_how_far_and_to_which_side() -> None:
-    way = arrow(PEN, rotation(0, 0, 10), Posture(np.radians(28), np.pi, -0.1))
-    np.testing.assert_allclose(
-        [way.lean, way.bearing, way.turn],
-        [np.radians(28), np.pi, -0.1 - np.radians(10)],
-        atol=1e-9,
-    )
-
-    across = arrow(PEN, rotation(20, 0), Posture(np.radians(20), np.pi / 2, 0.0))
-    np.testing.assert_allclose(across.lean, np.radians(20) * np.sqrt(2))
-    np.testing.assert_allclose(across.bearing, 3 * np.pi / 4)

@@ -14,7 +14,12 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
+from lightpen.formats.pen_files import (
+    read_pen,
+    read_raw_pen,
+    read_unchecked_pen,
+    write_pen,
+)
 from lightpen.pen import DISC_DIAMETER, Pen
 from lightpen.rigid import rotation_from_vector
 
@@ -387,3 +392,20 @@ def test_the_shared_pen_is_read(shared_data: Path) -> None:
     pen = read_pen(shared_data / "swing-clean" / "leds.csv")
     np.testing.assert_array_equal(pen.leds[1], [-0.04485, 60.13565, -29.86272])
     assert pen.n_leds == 10
+
+
+def test_leds_that_stand_anywhere_can_be_read_to_be_mended(tmp_path: Path) -> None:
+    path = tmp_path / "leds.csv"
+    path.write_text("led,x_mm,y_mm,z_mm\n1,0,0,0\n2,1,0,0\n")
+
+    np.testing.assert_array_equal(
+        read_unchecked_pen(path).leds, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    )
+
+
+def test_what_is_no_number_cannot_be_read_to_be_mended_either(tmp_path: Path) -> None:
+    path = tmp_path / "leds.csv"
+    path.write_text("led,x_mm,y_mm,z_mm\n1,0,0,0\n2,12.4O,0,0\n")
+
+    with pytest.raises(FileError, match=r"Line 3 of leds\.csv"):
+        read_unchecked_pen(path)

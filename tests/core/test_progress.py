@@ -7,7 +7,15 @@ import numpy as np
 from lightpen.session.kept import kept_before
 from lightpen.session.messages import Code
 from lightpen.session.posture import rotations_of
-from lightpen.session.progress import measure_shortfall, missing, next_target, oriented
+from lightpen.session.progress import (
+    N_MORE,
+    limits_for_more,
+    measure_shortfall,
+    missing,
+    next_target,
+    oriented,
+    turn_range,
+)
 from lightpen.session.sighting import sight_centers
 from lightpen.session.swing_state import (
     SwingLimits,
@@ -60,6 +68,54 @@ def test_the_estimate_of_images_to_come_holds() -> None:
     late = state_of(setup, swing)
     n_true = 400 * (late.kept.uncertainty / 0.005) ** 2
     np.testing.assert_allclose(n_needed, n_true, rtol=0.2)
+
+
+def test_no_more_images_are_announced_than_the_limit_allows() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    for max_images, n_more in ((70, 10), (60, 0), (50, 0)):
+        limits = SwingLimits(max_uncertainty=1e-4, max_images=max_images)
+        setup = SwingSetup(CAMERA, PEN, limits)
+        assert measure_shortfall(setup, state_of(setup, swing)).n_more == n_more
+
+
+def test_fields_that_the_camera_cannot_see_are_not_asked_for() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    limits = SwingLimits(min_per_field=2)
+    narrow = replace(CAMERA, width=round(CAMERA.cx) + 50)  # it sees the left half
+    state = state_of(SwingSetup(CAMERA, PEN, limits), swing)
+
+    whole = measure_shortfall(SwingSetup(CAMERA, PEN, limits), state).wanted
+    half = measure_shortfall(SwingSetup(narrow, PEN, limits), state).wanted
+
+    assert whole[0].tolist() == [2] + 7 * [0]
+    assert (whole[1:] == 2).all()
+    assert (half[1:, 0] == 0).all()
+    assert (half[1:, 4] == 2).all()
+
+
+def test_a_swing_that_is_done_can_go_on() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    limits = SwingLimits(max_uncertainty=1.0, max_images=60, min_per_field=0)
+    setup = SwingSetup(CAMERA, PEN, limits)
+    state = state_of(setup, swing)
+    more = replace(setup, limits=limits_for_more(limits, 60))
+
+    assert measure_shortfall(setup, state).is_none
+    assert measure_shortfall(more, state).n_more == N_MORE
+
+
+def test_the_range_of_turns_holds_each_posture_that_was_kept() -> None:
+    rng = np.random.default_rng(4)
+    n_poses = 40
+    turns = rng.uniform(-0.6, 0.5, n_poses)
+    rotations = rotations_of(
+        *(PEN, rng.uniform(0, 0.5, n_poses), rng.uniform(0, 6, n_poses), turns)
+    )
+
+    low, high = turn_range(PEN, rotations) or (0, 0)
+
+    np.testing.assert_allclose((low, high), (turns.min(), turns.max()), atol=1e-9)
+    assert turn_range(PEN, rotations[:0]) is None
 
 
 def test_missing_directions_are_named() -> None:

@@ -283,6 +283,16 @@ def test_masked_circles_are_left_out() -> None:
     nearest(spots, lamps[:3] + lamps[4:])
 
 
+def test_masked_circles_are_left_out_of_a_small_image_too() -> None:
+    lamps = grid_of_lamps()
+    left = [lamp for lamp in lamps if lamp.x < 400 and lamp.y < 400]
+    image = expose(render(lamps))[:400, :400]
+    mask = np.array([[lamp.x, lamp.y, 30.0] for lamp in left[:2]])
+    spots = detect_spots(image, mask)
+    assert len(detect_spots(image)) == len(spots) + 2
+    nearest(spots, left[2:])
+
+
 @pytest.mark.parametrize("gap", [8.0, 5.0, 3.0, 2.0])
 def test_discs_with_a_dark_gap_are_parted(gap: float) -> None:
     lamps = grid_of_lamps(b=21.0)

@@ -15,7 +15,6 @@ from lightpen.session.progress import missing
 from lightpen.session.sighting import Sighting, sight_centers
 from lightpen.session.swing import (
     Fed,
-    capture_more,
     conclude,
     feed,
     finish,
@@ -430,7 +429,7 @@ def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
     assert station.state.counts[2, 0] < 2
 
 
-def test_the_verdict_is_told_and_more_can_be_captured(whole: Station) -> None:
+def test_the_verdict_is_told(whole: Station) -> None:
     good = Message(Code.GOOD, (0.004,))
     fed = conclude(whole.state, good, passed=True)
     assert fed.state.phase is Phase.VERDICT
@@ -440,9 +439,6 @@ def test_the_verdict_is_told_and_more_can_be_captured(whole: Station) -> None:
         Event(Happening.FAILED),
     )
     assert feed(whole.setup, fed.state, whole.sight(), whole.now).events == ()
-    again = capture_more(fed.state)
-    assert again.phase is Phase.WAIT
-    assert again.n_kept == whole.state.n_kept
 
 
 def test_a_pause_does_not_stop_the_solving(whole: Station) -> None:
@@ -497,3 +493,12 @@ def test_whatever_happens_the_events_tell_what_is_kept(seed: int) -> None:
     assert n_lost <= station.state.n_dropped[Reason.SLIPPED]
     assert len(recorded) > 20
     assert station.tip_error < 2 * station.state.kept.uncertainty
+
+
+def test_an_uncertainty_that_is_not_known_yet_is_not_told_as_a_number() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    codes = [message.code for message in missing(station.setup, station.state)]
+    assert Code.UNKNOWN in codes
+    assert Code.UNCERTAIN not in codes

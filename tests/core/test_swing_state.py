@@ -1,9 +1,10 @@
 """The state of a swing: the dial."""
 
 import numpy as np
+import pytest
 
 from lightpen.coverage import measure_coverage
-from lightpen.session.swing_state import dial_counts
+from lightpen.session.swing_state import SwingLimits, dial_counts
 from lightpen.simulator.swings import swing_poses
 
 
@@ -20,3 +21,19 @@ def test_the_dial_counts_every_posture_once_where_the_coverage_has_it() -> None:
 
 def test_the_dial_of_no_image_is_empty() -> None:
     assert not dial_counts(np.zeros((0, 3, 3))).any()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"max_uncertainty": 0.0},
+        {"max_uncertainty": float("nan")},
+        {"min_images": -1},
+        {"max_images": 0},
+        {"min_per_field": -1},
+        {"spacing": -0.1},
+    ],
+)
+def test_limits_that_no_swing_can_keep_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="Nothing can be swung"):
+        SwingLimits(**wrong)  # type: ignore[arg-type]

@@ -10,9 +10,17 @@ from lightpen.arrays import FloatArray
 from lightpen.calibrate import Calibration, calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.observe import observe_centers
-from lightpen.session.messages import Code
+from lightpen.session.messages import Code, Message
 from lightpen.session.swing_state import SwingLimits
-from lightpen.session.verdict import Grade, judge
+from lightpen.session.verdict import (
+    Change,
+    Grade,
+    NextStep,
+    Verdict,
+    change_since,
+    halves_agree,
+    judge,
+)
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     Swing,
@@ -64,7 +72,27 @@ def test_halves_that_differ_are_checked(good: Calibration) -> None:
     verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.01))
     assert verdict.grade is Grade.CHECK
     assert verdict.reason.code is Code.HALVES_DIFFER
-    assert verdict.reason.arguments == (-1.6 * uncertainty[1], uncertainty[1])
+    assert verdict.reason.arguments == (1.6 * uncertainty[1], uncertainty[1])
+
+
+def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
+    good: Calibration,
+) -> None:
+    """The axis that differs most certainly is not the one that differs most."""
+    uncertainty = np.array([0.0005, 0.005, 0.005])
+    halves = Halves(np.array([0.004, 0.020, 0.0]), uncertainty)
+    limits = SwingLimits(max_uncertainty=0.01)
+    assert judge(replace(good, halves=halves), limits).reason.arguments == (0.02, 0.005)
+
+    small = Halves(np.array([0.004, 0.006, 0.0]), uncertainty)
+    assert judge(replace(good, halves=small), limits).grade is Grade.PASS
+
+
+def test_what_must_be_repeated_cannot_be_accepted() -> None:
+    good = Message(Code.GOOD)
+    assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
+        *(True, True, False)
+    ]
 
 
 def test_leds_that_do_not_fit_are_checked() -> None:
@@ -95,3 +123,61 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
     assert verdict.grade is Grade.CHECK
     assert verdict.reason.code is Code.TOO_LITTLE_TILT
     assert verdict.reason.arguments == (8, 4, 5, 6, 7)
+
+
+@pytest.mark.parametrize(
+    ("code", "step"),
+    [
+        (Code.GOOD, NextStep.ACCEPT),
+        (Code.UNCERTAIN, NextStep.CAPTURE_MORE),
+        (Code.TOO_LITTLE_TILT, NextStep.CAPTURE_MORE),
+        (Code.HALVES_DIFFER, NextStep.REPEAT),
+        (Code.MANY_DROPPED, NextStep.REPEAT),
+        (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
+    ],
+)
+def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:
+    assert Verdict(Grade.CHECK, Message(code)).next_step is step
+
+
+def test_halves_may_differ_by_what_chance_leaves() -> None:
+    uncertainty = np.array([0.001, 0.002, 0.001])
+    assert halves_agree(Halves(np.array([1.4, -1.4, 0.0]) * uncertainty, uncertainty))
+    assert not halves_agree(
+        Halves(np.array([0.0, 0.0, -1.6]) * uncertainty, uncertainty)
+    )
+
+
+U_NOW, U_THEN = np.array([0.003, 0.003, 0.003]), np.array([0.004, 0.004, 0.004])
+
+
+def change(difference: list[float]) -> Change:
+    tip_then = np.array([1.0, -90.0, -24.0])
+    return change_since(tip_then + difference, U_NOW, tip_then, U_THEN)
+
+
+def test_a_change_is_uncertain_by_both_calibrations() -> None:
+    found = change([0.03, 0.0, 0.04])
+
+    np.testing.assert_allclose(found.expanded_uncertainty, 0.005)
+    assert found.distance == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("difference", "unusual"),
+    [
+        ([0.0, 0.0, 0.0], False),
+        ([0.019, 0.0, 0.0], False),  # beyond U, but no more than is usual
+        ([0.0, -0.021, 0.0], True),
+        ([0.3, 0.2, 0.1], True),
+    ],
+)
+def test_a_change_beyond_the_usual_is_unusual(
+    difference: list[float], unusual: bool
+) -> None:
+    assert change(difference).is_unusual is unusual
+
+
+def test_a_large_change_that_uncertainty_explains_is_not_unusual() -> None:
+    tip, wide = np.zeros(3), np.full(3, 0.5)
+    assert not change_since(tip + 0.3, wide, tip, wide).is_unusual

@@ -176,6 +176,8 @@ class Caps:
         Whether its images carry the time of its own clock.
     waits : bool
         Whether no image is lost when nobody reads, as with a file.
+    n_images : int or None
+        After so many images a recording begins anew.
     """
 
     width: int
@@ -187,6 +189,7 @@ class Caps:
     has_trigger: bool = False
     has_timestamps: bool = False
     waits: bool = False
+    n_images: int | None = None
 
 
 @dataclass(frozen=True)

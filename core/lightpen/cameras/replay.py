@@ -110,6 +110,7 @@ class ReplayCamera:
             pixel_formats=(f"Mono{8 * first.itemsize}",),
             frame_rate=FRAME_RATE,
             waits=True,
+            n_images=len(source.names) if self._loops else None,
         )
 
     def close(self) -> None:

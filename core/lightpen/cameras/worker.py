@@ -15,6 +15,7 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.mailbox import FrameQueue, Mailbox
 from lightpen.cameras.protocol import (
     CameraFailure,
+    Caps,
     ConfigError,
     DeviceBusy,
     DeviceLost,
@@ -126,6 +127,7 @@ class CameraWorker:
         self._camera = camera
         self._settings = settings
         self._applied = settings
+        self._caps: Caps | None = None
         self._on_event = on_event
         self._clock = clock or MachineClock()
         self._mailbox = Mailbox()
@@ -137,7 +139,7 @@ class CameraWorker:
         self._connection: Connection | None = None
         self._stats = Stats()
         self._n_skipped = 0
-        self._is_full = False
+        self._told_of_skipping = False
         self._heard_ns = 0
         self._n_triggered = 0
 
@@ -145,6 +147,11 @@ class CameraWorker:
     def serial(self) -> str:
         """Serial number of the camera."""
         return self._camera.serial
+
+    @property
+    def caps(self) -> Caps | None:
+        """What the camera can do; None until it was open."""
+        return self._caps
 
     @property
     def stats(self) -> Stats:
@@ -180,12 +187,14 @@ class CameraWorker:
         return self._mailbox.take()
 
     def measure(self, measures: bool) -> None:
-        """Begin or stop to queue every frame for `next_frame`."""
+        """Begin or stop to queue every frame for `next_frame`; none is left over."""
         if measures and not self._measures.is_set():
             self._queue.clear()
+            self._told_of_skipping = False
             self._measures.set()
         elif not measures:
             self._measures.clear()
+            self._queue.clear()  # a recording may wait for room in it
 
     def next_frame(self, timeout_s: float) -> Frame:
         """Return the oldest queued frame, for measuring.
@@ -266,12 +275,10 @@ class CameraWorker:
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
             self._queue.put(frame)
-        elif self._queue.offer(frame):
-            self._is_full = False
-        elif not self._stopping.is_set():
+        elif not self._queue.offer(frame) and not self._stopping.is_set():
             self._n_skipped += 1
-            if not self._is_full:
-                self._is_full = True
+            if not self._told_of_skipping:  # once is enough until measured anew
+                self._told_of_skipping = True
                 self._on_event(Troubled(_too_slow(frame)))
 
     def _quiet_time(self) -> float:
@@ -329,6 +336,7 @@ class CameraWorker:
 
     def _connect(self) -> None:
         self._camera.open()
+        self._caps = self._camera.caps
         self._begin(self._settings)
 
     def _begin(self, settings: Settings) -> None:

@@ -137,6 +137,24 @@ def read_raw_pen(
     return pen if nominal_tip is None else replace(pen, nominal_tip=nominal_tip)
 
 
+def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
+    """Read a pen to be looked at and mended: its LEDs may stand anywhere.
+
+    Parameters
+    ----------
+    path, units
+        As for `read_pen`.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or a cell is not what it should be.
+    UsageError
+        As for `read_pen`.
+    """
+    return _pen(_read(path, units), None, None)
+
+
 def write_pen(pen: Pen, path: Path) -> None:
     """Write a pen as a table or as JSON, to be read back to the last digit.
 

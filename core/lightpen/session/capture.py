@@ -1,4 +1,4 @@
-"""From a live image to a longer record: look, decide, put on disk what is kept."""
+"""From a live image to a longer record: decide, and put on disk what is kept."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from lightpen.observe import Reason
 from lightpen.session.kept import kept_before
 from lightpen.session.record import Record
 from lightpen.session.recording import RecordWriter
-from lightpen.session.sighting import look
+from lightpen.session.sighting import Sighting
 from lightpen.session.swing import Fed, feed, start_again
 from lightpen.session.swing_state import Happening, SwingSetup, SwingState
 
@@ -17,6 +17,7 @@ def capture_image(
     state: SwingState,
     writer: RecordWriter,
     image: Image,
+    sighting: Sighting,
     time: float,
     device_time_ns: int | None = None,
 ) -> Fed:
@@ -30,6 +31,8 @@ def capture_image(
         Of the record that belongs to the state.
     image : (H, W) array
         Grey image of the camera's size, 8 or 16 bit.
+    sighting : Sighting
+        What it shows.
     time : float
         When it was taken, s.
     device_time_ns : int, optional
@@ -50,8 +53,11 @@ def capture_image(
             f"The swing is at image {state.next_number}, the record at "
             f"{writer.next_number}."
         )
-    sighting = look(image, setup.camera, setup.pen, setup.mask, state.sighting)
     fed = feed(setup, state, sighting, time)
+    # The image last: if the disk fails before, state and record both go without it.
+    for event in fed.events:
+        if event.what is Happening.SLIPPED and event.numbers:
+            writer.take_out(event.numbers, Reason.SLIPPED)
     for event in fed.events:
         if event.what is Happening.KEPT:
             writer.append(
@@ -62,8 +68,6 @@ def capture_image(
                 time,
                 device_time_ns,
             )
-        elif event.what is Happening.SLIPPED and event.numbers:
-            writer.take_out(event.numbers, Reason.SLIPPED)
     return fed
 
 

@@ -20,7 +20,7 @@ from lightpen.coverage import N_DIRECTIONS
 from lightpen.joint import ContactModel, reduce
 from lightpen.pen import Pen
 from lightpen.rigid import rotation_from_vector, vector_from_rotation
-from lightpen.session.posture import Posture, angles_between, posture_of, rotations_of
+from lightpen.session.posture import Posture, angles_between, rotations_of
 
 TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of the dial
 TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
@@ -60,25 +60,6 @@ class Outlook:
     spacing: float
 
 
-@dataclass(frozen=True)
-class Arrow:
-    """The way from one posture to another.
-
-    Attributes
-    ----------
-    lean : float
-        How far the top of the pen must move over the dial, rad.
-    bearing : float
-        To which side: 0 to the right, pi/2 away, as the camera sees it, rad.
-    turn : float
-        About the pen's own axis, seen from above against the clock, rad.
-    """
-
-    lean: float
-    bearing: float
-    turn: float
-
-
 def next_posture(
     outlook: Outlook, present: FloatArray, wanted: BoolArray | None = None
 ) -> Posture | None:
@@ -116,18 +97,6 @@ def visible_fields(outlook: Outlook) -> BoolArray:
     visible = np.zeros((3, N_DIRECTIONS), dtype=bool)
     visible[row, column] = True
     return visible
-
-
-def arrow(pen: Pen, present: FloatArray, target: Posture) -> Arrow:
-    """Return the way from the rotation (3, 3) that the pen has to a posture."""
-    here = posture_of(pen, present)
-    move = target.tilt * np.exp(1j * target.direction)
-    move -= here.tilt * np.exp(1j * here.direction)
-    return Arrow(
-        lean=float(abs(move)),
-        bearing=float(np.angle(move) % (2 * np.pi)),
-        turn=target.turn - here.turn,
-    )
 
 
 def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:

@@ -29,7 +29,8 @@ class Code(StrEnum):
     TOO_FEW_IMAGES = "too few images"  # kept, needed
     TOO_LITTLE_TILT = "too little tilt"  # images missing, directions of the dial 0 to 7
     NOT_UPRIGHT = "not upright"  # images missing
-    UNCERTAIN = "uncertain"  # U and its limit, mm; images missing
+    UNKNOWN = "unknown"  # where the tip is cannot be told yet
+    UNCERTAIN = "uncertain"  # U and its limit, mm; perhaps images missing
     HALVES_DIFFER = "halves differ"  # difference and its U, mm
     MANY_DROPPED = "many dropped"  # dropped and taken
     LEDS_MISFIT = "LEDs misfit"  # sigma and what is usual, px

@@ -7,15 +7,17 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.coverage import N_DIRECTIONS
+from lightpen.pen import Pen
 from lightpen.session.guidance import Outlook, next_posture, visible_fields
 from lightpen.session.messages import Code, Message
 from lightpen.session.posture import Posture, angles_between, posture_of, rotations_of
 from lightpen.session.seat import Seat
 from lightpen.session.sighting import Sighting
-from lightpen.session.swing_state import SwingSetup, SwingState
+from lightpen.session.swing_state import SwingLimits, SwingSetup, SwingState
 
 LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
+N_MORE = 40  # images at least, where more are asked for than a swing needs
 PATIENCE = 4.0  # s until a target that is not reached is chosen anew
 
 
@@ -25,17 +27,23 @@ class Shortfall:
 
     Attributes
     ----------
+    wanted : (3, 8) array of int
+        Images asked for in each field of the dial.
     fields : (3, 8) array of int
-        Images missing in each field of the dial.
+        Images missing in each of them.
     n_images : int
         Images missing in all, at the least.
     n_for_uncertainty : int
         Images that the uncertainty still needs, estimated; 0 if it suffices.
+    n_more : int
+        Images that will still be taken, estimated: no more than the limit allows.
     """
 
+    wanted: IntArray
     fields: IntArray
     n_images: int
     n_for_uncertainty: int
+    n_more: int
 
     @property
     def is_none(self) -> bool:
@@ -49,18 +57,58 @@ def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
     Fields of the dial in which the camera would not see enough LEDs are not asked for.
     """
     limits = setup.limits
-    fields = np.maximum(limits.min_per_field - state.counts, 0)
-    fields[0, 1:] = 0
+    wanted: IntArray = np.full((3, N_DIRECTIONS), limits.min_per_field, dtype=np.int64)
+    wanted[0, 1:] = 0
     seat = state.kept.seat
     if seat is not None:
-        fields = np.where(visible_fields(_outlook(setup, state, seat)), fields, 0)
+        wanted[~visible_fields(_outlook(setup, state, seat))] = 0
+    fields = np.maximum(wanted - state.counts, 0)
     excess = (state.kept.uncertainty / limits.max_uncertainty) ** 2 - 1
     n_for_uncertainty = 0
     if excess > 0:  # the variance goes with one over the number of images
         bounded = min(excess * max(state.n_kept, 1), limits.max_images)
         n_for_uncertainty = max(ceil(bounded), 1)
     n_images = max(limits.min_images - state.n_kept, int(fields.sum()), 0)
-    return Shortfall(fields, n_images, n_for_uncertainty)
+    n_allowed = max(limits.max_images - state.n_kept, 0)
+    n_more = min(max(n_images, n_for_uncertainty), n_allowed)
+    return Shortfall(wanted, fields, n_images, n_for_uncertainty, n_more)
+
+
+def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
+    """Return limits by which a swing that has all it needs goes on nevertheless."""
+    n_images = n_kept + N_MORE
+    return replace(
+        limits,
+        min_images=max(limits.min_images, n_images),
+        max_images=max(limits.max_images, n_images),
+    )
+
+
+def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
+    """Return the least and the greatest turn of a pen about its own axis, rad.
+
+    Parameters
+    ----------
+    pen : Pen
+    rotations : (N, 3, 3) array
+        cam_from_pen.
+
+    Returns
+    -------
+    pair of float or None
+        None without any rotation.
+    """
+    if not len(rotations):
+        return None
+    right, down, away = rotations[:, :, 1].T
+    tilts, directions = (
+        np.arctan2(np.hypot(right, away), -down),
+        np.arctan2(away, right),
+    )
+    still = rotations_of(pen, tilts, directions, np.zeros_like(tilts))
+    about_y = np.swapaxes(still, 1, 2) @ rotations
+    turns = np.arctan2(about_y[:, 0, 2], about_y[:, 0, 0])
+    return float(turns.min()), float(turns.max())
 
 
 def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
@@ -77,7 +125,9 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
         uncertainty = state.kept.uncertainty
         limit = setup.limits.max_uncertainty
         n_images = short.n_for_uncertainty
-        found.append(Message(Code.UNCERTAIN, (uncertainty, limit, n_images)))
+        known = np.isfinite(uncertainty)
+        uncertain = Message(Code.UNCERTAIN, (uncertainty, limit, n_images))
+        found.append(uncertain if known else Message(Code.UNKNOWN))
     if state.n_kept < setup.limits.min_images:
         counts = (state.n_kept, setup.limits.min_images)
         found.append(Message(Code.TOO_FEW_IMAGES, counts))

@@ -19,6 +19,7 @@ reading the images when an interrupted swing goes on.
 """
 
 import json
+import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -42,6 +43,7 @@ HEADER, JOURNAL, IMAGES = "header.json", "journal.jsonl", "images"
 FORMAT = 1
 HEADER_LIMIT = MEGABYTE
 JOURNAL_LIMIT = 64 * MEGABYTE
+TAIL = 16_384  # bytes of a journal that hold its last few lines
 DISCARDED = "discarded"
 Plain: TypeAlias = str | int | float | bool | None
 
@@ -155,6 +157,11 @@ class Record:
         return tuple(i for i in self.images if i.number not in self.taken_out)
 
     @property
+    def all_numbers(self) -> IntArray:
+        """Numbers of all images."""
+        return np.array([i.number for i in self.images], dtype=np.int64)
+
+    @property
     def numbers(self) -> IntArray:
         """Numbers of the images that take part, (N,)."""
         return np.array([i.number for i in self.used_images], dtype=np.int64)
@@ -172,7 +179,8 @@ class RecordSource:
     Attributes
     ----------
     images : ImageSource
-        The images that take part; a damaged one raises `FileError` when loaded.
+        All images, in the order of capture; a damaged one raises `FileError` when
+        loaded.
     camera : Camera
     pen : Pen
     mask : (M, 3) array
@@ -225,28 +233,54 @@ def open_record(folder: Path) -> Record:
     return Record(folder, header, tuple(images), taken_out, verdict)
 
 
+def record_files(record: Record) -> tuple[Path, ...]:
+    """Return all files that a record consists of."""
+    header = record.header
+    names = (
+        *(HEADER, JOURNAL),
+        *(copy_name("camera", header.camera), copy_name("pen", header.pen)),
+    )
+    images = (image.file for image in record.images)
+    return (*(record.folder / name for name in names), *images)
+
+
 def is_record(folder: Path) -> bool:
     """Return whether a folder is a record."""
     return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
 
 
 def found_interrupted(root: Path) -> tuple[Record, ...]:
-    """Return the records in a folder that have no verdict, the newest first.
+    """Return the records in a folder that wait to be gone on with, the newest first.
 
-    Folders that cannot be read as records are passed over: they are no offer.
+    They have images and no verdict. Of a concluded record only the end is read, so that
+    thousands of them cost little. Folders that cannot be read as records are passed
+    over: they are no offer.
+
+    Raises
+    ------
+    FileError
+        The folder of the records itself cannot be read.
     """
+    try:
+        folders = list(root.iterdir()) if root.is_dir() else []
+    except OSError as error:
+        raise FileError(
+            f"The folder {printable(str(root))} cannot be read: {error.strerror}. "
+            "Interrupted swings in it are not offered; make sure that it is yours to "
+            "read."
+        ) from error
     records = []
-    folders = sorted(root.iterdir()) if root.is_dir() else []
     for folder in folders:
-        if not is_record(folder):
-            continue
         try:
+            if not is_record(folder) or _ends_in_verdict(folder):
+                continue
             record = open_record(folder)
-        except FileError:
+        except (FileError, OSError):
             continue
-        if record.verdict is None:
+        if record.images and record.verdict is None:
             records.append(record)
-    return tuple(sorted(records, key=lambda r: r.header.created, reverse=True))
+    records.sort(key=lambda record: record.header.created.timestamp(), reverse=True)
+    return tuple(records)
 
 
 def source(record: Record) -> RecordSource:
@@ -260,13 +294,12 @@ def source(record: Record) -> RecordSource:
     header = record.header
     camera_file = record.folder / copy_name("camera", header.camera)
     pen_file = record.folder / copy_name("pen", header.pen)
-    used = record.used_images
 
     def loaders() -> Iterator[Callable[[], Image]]:
-        for image in used:
+        for image in record.images:
             yield partial(_load, image)
 
-    files = tuple(image.file for image in used)
+    files = tuple(image.file for image in record.images)
     return RecordSource(
         images=ImageSource(tuple(file.name for file in files), files, loaders),
         camera=read_camera(camera_file),
@@ -310,6 +343,22 @@ def _recorded_image(folder: Path, entries: Mapping[str, Any]) -> RecordedImage:
         rotation=np.array(entries["rotation"], dtype=np.float64).reshape(3, 3),
         translation=np.array(entries["translation"], dtype=np.float64).reshape(3),
     )
+
+
+def _ends_in_verdict(folder: Path) -> bool:
+    """Return whether the end of the journal shows a verdict that no image follows."""
+    with (folder / JOURNAL).open("rb") as journal:
+        length = journal.seek(0, os.SEEK_END)
+        journal.seek(max(0, length - TAIL))
+        lines = journal.read().split(b"\n")[:-1]
+    for line in reversed(lines):
+        try:
+            kind = json.loads(line)["kind"]
+        except (ValueError, KeyError, TypeError):  # torn, cut by the limit, or damaged
+            return False
+        if kind in ("image", "verdict"):
+            return bool(kind == "verdict")
+    return False
 
 
 def _sound_lines(folder: Path) -> list[bytes]:

@@ -25,6 +25,7 @@ from lightpen.session.record import (
     Record,
     copy_name,
     image_name,
+    open_record,
     sound_length,
 )
 
@@ -65,15 +66,18 @@ class RecordWriter:
         write_whole(folder / copy_name("pen", header.pen), header.pen.data)
         write_whole(folder / JOURNAL, b"")
         text = json.dumps(_header_entries(header), indent=1, ensure_ascii=False)
-        write_whole(folder / HEADER, text.encode())
+        # The bytes of a file name that is no text become JSON escapes.
+        write_whole(folder / HEADER, text.encode("utf-8", "backslashreplace"))
         _sync_folder(folder)
+        _sync_folder(folder.parent)
         return cls(folder, 1, 0)
 
     @classmethod
     def resume(cls, record: Record) -> Self:
         """Go on with a record; what a crash left behind is cut off."""
         for part in (record.folder / IMAGES).glob(".*.part"):
-            part.unlink(missing_ok=True)
+            with suppress(OSError):  # it does no harm where it is
+                part.unlink()
         return cls(record.folder, record.next_number, sound_length(record.folder))
 
     def __enter__(self) -> Self:
@@ -177,6 +181,30 @@ class RecordWriter:
         self._length += length
 
 
+def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
+    """Note which images of a record take part from now on.
+
+    Parameters
+    ----------
+    folder : Path
+    taken_out : mapping of int to str
+        Numbers of all images that do not, and why.
+
+    Raises
+    ------
+    FileError
+        The record cannot be written.
+    """
+    record = open_record(folder)
+    back = sorted(set(record.taken_out) - set(taken_out))
+    out = sorted(set(taken_out) - set(record.taken_out))
+    with RecordWriter.resume(record) as writer:
+        if back:
+            writer.put_back(back)
+        for reason in sorted({taken_out[number] for number in out}):
+            writer.take_out([n for n in out if taken_out[n] == reason], reason)
+
+
 def encode_png(image: Image) -> bytes:
     """Return a grey image as PNG, made for dark images: runs of equal values.
 
@@ -231,8 +259,11 @@ def _sync_folder(folder: Path) -> None:
     """Put the names in a folder on the disk, where the system can (not Windows)."""
     if os.name != "posix":
         return
-    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise _unwritable(folder, error) from error

@@ -116,11 +116,6 @@ def finish(state: SwingState) -> Fed:
     return Fed(replace(solving, target=None), (Event(Happening.CAPTURED),))
 
 
-def capture_more(state: SwingState) -> SwingState:
-    """Return the swing going on after its verdict with the images that it has."""
-    return _await_seat(state)
-
-
 def conclude(state: SwingState, verdict: Message, passed: bool) -> Fed:
     """Show the verdict on the solved swing."""
     happening = Happening.DONE if passed else Happening.FAILED

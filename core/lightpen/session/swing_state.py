@@ -100,6 +100,11 @@ class SwingLimits:
     min_per_field: int = 2
     spacing: float = float(np.radians(2.5))
 
+    def __post_init__(self) -> None:
+        counts = self.min_images, self.min_per_field, self.max_images - 1
+        if not (self.max_uncertainty > 0 and self.spacing >= 0 and min(counts) >= 0):
+            raise ValueError(f"Nothing can be swung by {self}.")
+
 
 @dataclass(frozen=True, eq=False)
 class SwingSetup:

@@ -5,13 +5,16 @@ from enum import StrEnum
 
 import numpy as np
 
+from lightpen.arrays import FloatArray
 from lightpen.calibrate import USUAL_SIGMA, Calibration
 from lightpen.session.messages import Code, Message
 from lightpen.session.swing_state import SwingLimits, dial_counts
+from lightpen.uncertainty import Halves
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 MANY_DROPPED = 0.2  # of the images
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
+USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
 
 
 class Grade(StrEnum):
@@ -20,6 +23,15 @@ class Grade(StrEnum):
     PASS = "pass"
     CHECK = "check"
     REPEAT = "repeat"
+
+
+class NextStep(StrEnum):
+    """What to do after a verdict."""
+
+    ACCEPT = "accept"
+    CAPTURE_MORE = "capture more"
+    REPEAT = "repeat"
+    CHECK_FILES = "check files"
 
 
 @dataclass(frozen=True)
@@ -35,21 +47,86 @@ class Verdict:
     grade: Grade
     reason: Message
 
+    @property
+    def can_be_accepted(self) -> bool:
+        """Whether its tip may be put in force."""
+        return self.grade is not Grade.REPEAT
+
+    @property
+    def next_step(self) -> NextStep:
+        """The one thing to do that answers the reason."""
+        return _NEXT_STEPS[self.reason.code]
+
+
+_NEXT_STEPS = {
+    Code.GOOD: NextStep.ACCEPT,
+    Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
+    Code.HALVES_DIFFER: NextStep.REPEAT,
+    Code.MANY_DROPPED: NextStep.REPEAT,
+    Code.LEDS_MISFIT: NextStep.CHECK_FILES,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How far a tip lies from an earlier one.
+
+    Attributes
+    ----------
+    difference : (3,) array
+        Now minus then, pen frame, mm.
+    expanded_uncertainty : (3,) array
+        U (k = 2) of the difference, of two independent calibrations, mm.
+    """
+
+    difference: FloatArray
+    expanded_uncertainty: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """How far apart the tips lie, mm."""
+        return float(np.linalg.norm(self.difference))
+
+    @property
+    def is_unusual(self) -> bool:
+        """Whether it is more than both uncertainties and usual wear explain."""
+        beyond = np.abs(self.difference) > self.expanded_uncertainty
+        return self.distance > USUAL_CHANGE and bool(beyond.any())
+
+
+def change_since(
+    tip_pen: FloatArray,
+    uncertainty: FloatArray,
+    tip_then: FloatArray,
+    uncertainty_then: FloatArray,
+) -> Change:
+    """Compare a tip with an earlier one: both (3,), pen frame, with U (k = 2), mm."""
+    return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
+
+
+def halves_agree(halves: Halves) -> bool:
+    """Return whether the odd and the even images differ no more than by chance."""
+    within = np.abs(halves.difference) <= HALVES_GATE * halves.expanded_uncertainty
+    return bool(within.all())
+
 
 def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     """Judge a calibration by what its tip is worth, not by its residuals alone."""
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
-    uncertain = Message(Code.UNCERTAIN, (uncertainty, limit, 0))
+    uncertain = Message(Code.UNCERTAIN, (uncertainty, limit))
     if uncertainty > FAR_OFF * limit:
         return Verdict(Grade.REPEAT, uncertain)
-    halves = calibration.halves
-    shares = np.abs(halves.difference) / halves.expanded_uncertainty
-    worst = int(np.argmax(shares))
-    if shares[worst] > HALVES_GATE:
-        figures = (halves.difference[worst], halves.expanded_uncertainty[worst])
-        differ = Message(Code.HALVES_DIFFER, tuple(map(float, figures)))
-        return Verdict(Grade.CHECK, differ)
+    differences = np.abs(calibration.halves.difference)
+    by_chance = HALVES_GATE * calibration.halves.expanded_uncertainty
+    # A difference that is certain but smaller than what is allowed does not matter.
+    apart = (differences > by_chance) & (differences > limit)
+    if apart.any():
+        worst = int(np.argmax(np.where(apart, differences, 0)))
+        usual = calibration.halves.expanded_uncertainty[worst]
+        figures = (float(differences[worst]), float(usual))
+        return Verdict(Grade.CHECK, Message(Code.HALVES_DIFFER, figures))
     if calibration.joint.sigma > USUAL_SIGMA:
         figures = (calibration.joint.sigma, USUAL_SIGMA)
         return Verdict(Grade.CHECK, Message(Code.LEDS_MISFIT, figures))

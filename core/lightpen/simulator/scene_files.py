@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -36,6 +36,14 @@ NOTES = (
     "brighter than full scale. occluded_fraction: share of the disc's area behind "
     "fingers or outside the image."
 )
+
+
+@dataclass(frozen=True)
+class SampleFiles:
+    """The files that go with a simulated camera."""
+
+    camera: Path
+    pen: Path
 
 
 def write_scene(
@@ -81,6 +89,24 @@ def write_scene(
     truth = {"set": folder.name, **scene_truth(plan)}
     write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
     return _tip_in_file_frame(plan)
+
+
+def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
+    """Write the intrinsics and the pen of a scene, as its owner would have them.
+
+    Raises
+    ------
+    FileError
+        They cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _no_folder(folder, error) from error
+    files = SampleFiles(folder / "camera.yaml", folder / "pen.json")
+    write_camera(scene.camera, files.camera, "opencv")
+    write_pen(scene.pen, files.pen)
+    return files
 
 
 def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
@@ -134,16 +160,20 @@ def _make_folder(images: Path, names: list[str]) -> None:
         images.mkdir(parents=True, exist_ok=True)
         strangers = {path.name for path in images.iterdir()} - set(names)
     except OSError as error:
-        raise FileError(
-            f"The folder {images} cannot be made or read: {error.strerror}. Choose "
-            "another folder."
-        ) from error
+        raise _no_folder(images, error) from error
     if strangers:
         raise FileError(
             f"The folder {images} holds {len(strangers)} other files, such as "
             f"{min(strangers)}, which would get mixed up with the new images. Choose "
             "an empty folder."
         )
+
+
+def _no_folder(folder: Path, error: OSError) -> FileError:
+    return FileError(
+        f"The folder {folder} cannot be made or read: {error.strerror}. Choose "
+        "another folder."
+    )
 
 
 def _in_order(

@@ -58,15 +58,22 @@ class Swing:
         return slipped
 
 
-def paper_camera() -> Camera:
-    """Return the paper's camera: 5 megapixels, 4638 px focal length."""
+def paper_camera(binning: int = 1) -> Camera:
+    """Return the paper's camera: 5 megapixels, 4638 px focal length.
+
+    Parameters
+    ----------
+    binning : int
+        So many pixels in a row, and in a column, are read out as one.
+    """
+    shift = (binning - 1) / 2  # pixel (0, 0) is the centre of the first one
     return Camera(
-        width=2448,
-        height=2048,
-        fx=4638.2,
-        fy=4637.1,
-        cx=1219.6,
-        cy=1031.3,
+        width=2448 // binning,
+        height=2048 // binning,
+        fx=4638.2 / binning,
+        fy=4637.1 / binning,
+        cx=(1219.6 - shift) / binning,
+        cy=(1031.3 - shift) / binning,
         distortion=np.array([-0.082, 0.105, 0.0003, -0.0002, 0.0]),
     )
 

@@ -1,0 +1,266 @@
+"""`lightpen calibrate RECORD` gives the tip of the wizard, and says what is wrong."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+
+from lightpen.calibrate import calibrate
+from lightpen.files import sha256
+from lightpen.observe import observe_images
+from lightpen.session.record import (
+    HEADER,
+    JOURNAL,
+    image_name,
+    open_record,
+    source,
+)
+from lightpen.session.recording import note_taken_out
+from lightpen.session.solving import solve_record
+
+Run = Callable[..., CompletedProcess[str]]
+N_IMAGES = 20
+
+
+@pytest.fixture
+def folder(swung: Callable[..., Path], tmp_path: Path) -> Path:
+    """A record that the test may change."""
+    return Path(shutil.copytree(swung(), tmp_path / "swing 1"))
+
+
+@pytest.fixture
+def calibrated(
+    lightpen: Run, tmp_path: Path
+) -> Callable[..., tuple[dict[str, Any], str]]:
+    """Return a function that calibrates a record: the JSON, and the text."""
+
+    def run(folder: Path, *options: str) -> tuple[dict[str, Any], str]:
+        file = tmp_path / "result.json"
+        outcome = lightpen("calibrate", folder, "--json", file, *options)
+        assert outcome.returncode == 0, outcome.stderr
+        fields: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return fields, outcome.stdout
+
+    return run
+
+
+Calibrated = Callable[..., tuple[dict[str, Any], str]]
+
+
+def test_the_tip_is_that_of_the_wizard_to_the_last_bit(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    fields, text = calibrated(folder)
+    joint = solve_record(open_record(folder)).calibration.joint
+
+    assert fields["tip_pen_mm"] == joint.tip_pen.tolist()
+    assert fields["cone_cam_mm"] == joint.cone_cam.tolist()
+    assert f"{N_IMAGES} of {N_IMAGES} used" in text
+
+
+def test_the_record_may_be_called_from_another_folder_or_with_a_slash(
+    calibrated: Calibrated, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tip = calibrated(folder)[0]["tip_pen_mm"]
+    monkeypatch.chdir(folder)
+
+    assert calibrated(Path())[0]["tip_pen_mm"] == tip
+    assert calibrated(Path("images") / "..")[0]["tip_pen_mm"] == tip
+
+
+def test_the_nominal_tip_of_the_record_is_compared_with(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    fields, text = calibrated(folder)
+
+    assert fields["nominal_tip_mm"] == pytest.approx([0.0, -95.0, -25.0], abs=100)
+    assert "change from nominal" in text
+
+
+def test_the_files_of_the_record_are_named_with_their_hashes(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    inputs = calibrated(folder)[0]["inputs"]
+
+    assert (inputs["camera"]["file"], inputs["pen"]["file"]) == (
+        "camera.yaml",
+        "pen.json",
+    )
+    assert inputs["camera"]["sha256"] == sha256(folder / "camera.yaml")
+    assert [file["sha256"] for file in inputs["observations"]] == [
+        image.sha256 for image in open_record(folder).images
+    ]
+
+
+def test_both_methods_can_be_asked_for(calibrated: Calibrated, folder: Path) -> None:
+    two_stage, _ = calibrated(folder, "--method", "two-stage")
+    joint, _ = calibrated(folder)
+
+    assert two_stage["method"] == "two-stage"
+    assert two_stage["tip_pen_mm"] != joint["tip_pen_mm"]
+
+
+def test_images_taken_out_are_named_with_their_reason(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    note_taken_out(folder, {2: "taken out", 9: "taken out", 5: "tip slipped"})
+    fields, text = calibrated(folder)
+    frames = {frame["file"]: frame for frame in fields["frames"]}
+
+    assert fields["images"] == {
+        "total": N_IMAGES,
+        "used": N_IMAGES - 3,
+        "dropped": {"taken out": 2, "tip slipped": 1},
+    }
+    assert frames["000009.png"]["reason"] == "taken out"
+    assert frames["000005.png"]["reason"] == "tip slipped"
+    assert "2 taken out: 000002.png, 000009.png" in text
+    assert "1 tip slipped: 000005.png" in text
+
+
+def test_taking_out_and_putting_back_gives_the_tip_of_before(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    before = calibrated(folder)[0]["tip_pen_mm"]
+    note_taken_out(folder, {4: "taken out"})
+    without = calibrated(folder)[0]["tip_pen_mm"]
+    note_taken_out(folder, {})
+
+    assert calibrated(folder)[0]["tip_pen_mm"] == before != without
+
+
+def test_the_mask_of_the_record_is_in_force(
+    calibrated: Calibrated, swung: Callable[..., Path]
+) -> None:
+    folder = swung(N_IMAGES, ((612.0, 512.0, 90.0),))
+    found = source(open_record(folder))
+    masked = observe_images(found.images, found.camera, found.pen, mask=found.mask)
+    bare = observe_images(found.images, found.camera, found.pen)
+    tip = calibrated(folder)[0]["tip_pen_mm"]
+
+    assert tip == calibrate(found.camera, found.pen, masked).joint.tip_pen.tolist()
+    assert tip != calibrate(found.camera, found.pen, bare).joint.tip_pen.tolist()
+
+
+def test_a_damaged_image_is_left_out_and_named(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    (folder / image_name(3)).write_bytes(b"\x89PNG\r\n\x1a\n")
+    fields, text = calibrated(folder)
+
+    assert fields["images"]["dropped"] == {"unreadable": 1}
+    assert "1 unreadable: 000003.png" in text
+
+
+def test_an_image_that_is_gone_is_left_out_and_named(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    (folder / image_name(3)).unlink()
+    fields, text = calibrated(folder)
+
+    assert fields["images"]["dropped"] == {"unreadable": 1}
+    assert len(fields["inputs"]["observations"]) == N_IMAGES - 1
+    assert "1 unreadable: 000003.png" in text
+
+
+@pytest.mark.parametrize(
+    ("option", "values"),
+    [
+        ("--camera", ["camera.yaml"]),
+        ("--pen", ["pen.json"]),
+        ("--units", ["mm"]),
+        ("--led-diameter", ["10"]),
+        ("--nominal-tip", ["0", "-90", "-25"]),
+    ],
+)
+def test_what_the_record_brings_is_not_to_be_given(
+    lightpen: Run, folder: Path, option: str, values: list[str]
+) -> None:
+    outcome = lightpen("calibrate", folder, option, *values)
+
+    assert outcome.returncode == 2
+    assert f"is the record of a swing, which brings its own. Leave out {option}." in (
+        outcome.stderr
+    )
+
+
+@pytest.mark.parametrize(
+    "name", [HEADER, JOURNAL, "camera.yaml", "pen.json", image_name(1)]
+)
+def test_the_result_does_not_replace_a_file_of_the_record(
+    lightpen: Run, folder: Path, name: str
+) -> None:
+    before = (folder / name).read_bytes()
+    outcome = lightpen("calibrate", folder, "--json", folder / name)
+
+    assert outcome.returncode == 2
+    assert "would replace the input file of that name" in outcome.stderr
+    assert (folder / name).read_bytes() == before
+
+
+def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
+    (folder / JOURNAL).write_bytes(b"")
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 1
+    assert outcome.stderr == (
+        "lightpen: The record swing 1 holds no images. Resume the swing, or begin a "
+        "new one.\n"
+    )
+
+
+def test_a_record_with_too_few_images_says_so(lightpen: Run, folder: Path) -> None:
+    lines = (folder / JOURNAL).read_bytes().splitlines(keepends=True)
+    (folder / JOURNAL).write_bytes(b"".join(lines[:4]))
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 1
+    assert "4 of 4 images are usable; the tip needs at least 6." in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        (HEADER, b"{", "header.json is damaged. Restore it from a copy."),
+        (HEADER, b"", "header.json is empty."),
+        (JOURNAL, b'{"kind": "image"}\n{}\n', "Line 1 of "),
+        ("camera.yaml", b"fx: 1\n", "camera.yaml is not as it was recorded"),
+        ("pen.json", None, "pen.json does not exist."),
+    ],
+)
+def test_a_damaged_record_is_refused_with_what_is_wrong(
+    lightpen: Run, folder: Path, name: str, content: bytes | None, sentence: str
+) -> None:
+    if content is None:
+        (folder / name).unlink()
+    else:
+        (folder / name).write_bytes(content)
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 2
+    assert sentence in outcome.stderr
+    assert outcome.stdout == ""
+
+
+def test_what_a_crash_left_behind_is_passed_over(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    before = calibrated(folder)[0]["tip_pen_mm"]
+    with (folder / JOURNAL).open("ab") as journal:
+        journal.write(b'{"kind": "image", "number": 21, "sha2')
+    (folder / image_name(21)).write_bytes(b"half an image")
+
+    assert calibrated(folder)[0]["tip_pen_mm"] == before
+
+
+def test_a_folder_that_is_no_record_still_needs_its_files(
+    lightpen: Run, folder: Path
+) -> None:
+    outcome = lightpen("calibrate", folder / "images")
+
+    assert outcome.returncode == 2
+    assert "--camera FILE is missing. Only a record needs none." in outcome.stderr
