@@ -19,7 +19,7 @@ from typing import NoReturn
 USAGE = """\
 Usage: {run} COMMAND
 
-  demo             simulate a swing of the pen and calibrate the tip from it
+  demo             watch a simulated operator calibrate a tip
   test [ARGS]      run the test suite; ARGS go to pytest
   check            run the linter, the formatter's check and the type checker
   bench [ARGS]     measure every figure of speed and accuracy; try: {run} bench --help
@@ -28,7 +28,6 @@ Usage: {run} COMMAND
 Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
-DEMO = ROOT / "demo-swing"
 PIP = "pip>=25.1"  # the first that installs dependency groups
 REQUIREMENTS = {
     "program": ["--editable", "."],
@@ -190,36 +189,6 @@ def become(command: Sequence[str]) -> NoReturn:
     os.execv(command[0], list(command))
 
 
-def demo(environment: Environment) -> int:
-    """Simulate a swing, calibrate from it, show both commands."""
-    say(f"Simulates a swing in {DEMO} and calibrates the probe tip from it.")
-    if DEMO.exists():
-        try:
-            shutil.rmtree(DEMO)
-        except OSError as error:
-            raise SetupError(
-                f"The folder {DEMO} of an earlier demo cannot be removed: {error}. "
-                "Delete it, then run the same command again."
-            ) from error
-    for arguments in (
-        ["simulate", str(DEMO), "--images", "60"],
-        [
-            "calibrate",
-            str(DEMO / "images"),
-            *("--camera", str(DEMO / "camera.yaml")),
-            *("--pen", str(DEMO / "leds.csv")),
-            *("--json", str(DEMO / "calibration.json")),
-        ],
-    ):
-        say(f"\n$ lightpen {subprocess.list2cmdline(arguments)}")
-        status = subprocess.run(
-            [environment.program("lightpen"), *arguments], check=False
-        ).returncode
-        if status != 0:
-            return status
-    return 0
-
-
 def check(environment: Environment) -> int:
     """Run every check even if an earlier one fails."""
     python = environment.program("python")
@@ -238,7 +207,8 @@ def main(arguments: Sequence[str]) -> int:
     match arguments:
         case ["demo"]:
             environment.set_up("program")
-            return demo(environment)
+            say("A simulated operator calibrates a tip; it takes a minute.")
+            become([environment.program("lightpen"), "--demo"])
         case ["lightpen", *options]:
             environment.set_up("program")
             become([environment.program("lightpen"), *options])

@@ -1,41 +1,37 @@
 """The application around the window: fonts, colours, language, sounds, crash hook."""
 
+import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TypeAlias
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import (
+    QMessageLogContext,
+    QObject,
+    QTimer,
+    QtMsgType,
+    qInstallMessageHandler,
+)
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from lightpen.errors import LightpenError
+from lightpen.errors import LightpenError, UsageError
+from lightpen.report import calibration_text
+from lightpen.session.sources import Surroundings
+from lightpen_app.bench import Bench
 from lightpen_app.crash import CrashHook
+from lightpen_app.demo import Demo
 from lightpen_app.languages import LanguageSwitch
 from lightpen_app.main_window import MainWindow
 from lightpen_app.pages.page import Page
+from lightpen_app.services import Services
 from lightpen_app.settings import Preferences, Settings, data_folder, settings_file
-from lightpen_app.sounds import Mute, Sounds, find_sounds
+from lightpen_app.sounds import Mute, find_sounds
+from lightpen_app.swing_run import SwingRun
 from lightpen_app.theme import apply_theme, colors_for, load_fonts
-
-
-@dataclass(frozen=True, eq=False)
-class Services:
-    """What a page may need from the application.
-
-    Attributes
-    ----------
-    settings : Settings
-    sounds : Sounds
-    folder : Path
-        Where records are kept unless the user says otherwise.
-    """
-
-    settings: Settings
-    sounds: Sounds
-    folder: Path
-
 
 MakePages: TypeAlias = Callable[[Services], Sequence[Page]]
 
@@ -50,7 +46,9 @@ class Wizard(QObject):
         Returns the pages in the order of the steps.
     settings : Settings
     folder : Path
-        For records, sounds and crash reports.
+        For records, results, sounds and crash reports.
+    around : Surroundings, optional
+        What simulated and recorded sources go by.
     """
 
     def __init__(
@@ -59,6 +57,7 @@ class Wizard(QObject):
         make_pages: MakePages,
         settings: Settings,
         folder: Path,
+        around: Surroundings | None = None,
     ) -> None:
         super().__init__(application)
         self._application = application
@@ -71,11 +70,14 @@ class Wizard(QObject):
         self._sounds = Mute(
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
-        services = Services(settings, self._sounds, folder)
+        self.bench = Bench(settings, folder, around, self)
+        services = Services(self.bench, self._sounds)
         self.window = MainWindow(make_pages(services), settings, self._preferences)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
+        self.bench.troubled.connect(self.window.show_notice)
+        self.window.closing.connect(self.bench.shut_down)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
@@ -108,12 +110,81 @@ def make_application(arguments: Sequence[str]) -> QApplication:
 
 
 def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
-    """Show the wizard until its window closes, and return the exit status."""
+    """Show the wizard until its window closes, and return the exit status.
+
+    Raises
+    ------
+    UsageError
+        There is no display to show it on.
+    """
+    if not has_display():
+        raise UsageError(
+            "There is no display to open a window on. Start the program at a screen, "
+            "or give a command; lightpen --help lists them."
+        )
     application = make_application(arguments)
     wizard = Wizard(application, make_pages, Settings(settings_file()), data_folder())
+    return _shown(application, wizard)
+
+
+def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
+    """Play the demo, and return the exit status.
+
+    Without a display it is played unseen; what happens is printed, and at the end the
+    tip. Settings and records of the user are left alone.
+    """
+    is_seen = has_display()
+    if not is_seen:
+        os.environ["QT_QPA_PLATFORM"] = "offscreen"
+        qInstallMessageHandler(_tell_but_hints)
+    application = make_application(arguments)
+    with TemporaryDirectory(prefix="lightpen-demo-") as folder:
+        settings = Settings(Path(folder) / "lightpen.ini")
+        users = Settings(settings_file()).preferences()
+        settings.set_preferences(users)
+        wizard = Wizard(application, make_pages, settings, Path(folder))
+        demo = Demo(wizard.window, wizard.bench, is_watched=is_seen)
+        if not is_seen:
+            demo.told.connect(_print)
+            demo.ended.connect(partial(_print_tip, wizard.bench.run))
+            demo.ended.connect(wizard.window.close)
+        QTimer.singleShot(0, demo.start)
+        status = _shown(application, wizard)
+        if not is_seen and wizard.bench.run.result is None:
+            return 1
+        return status
+
+
+def has_display() -> bool:
+    """Return whether a window can be shown, or a platform without one is chosen."""
+    if not sys.platform.startswith("linux"):
+        return True
+    names = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    return any(os.environ.get(name) for name in names)
+
+
+def _shown(application: QApplication, wizard: Wizard) -> int:
     wizard.crash_hook.install()
     wizard.window.show()
+    wizard.bench.start()
     try:
         return application.exec()
     finally:
         wizard.crash_hook.remove()
+
+
+def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+    """Hand on what Qt says, but for what each hidden window makes it say."""
+    if "propagateSizeHints" not in text:
+        sys.stderr.write(f"{text}\n")
+
+
+def _print(text: str) -> None:
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
+
+
+def _print_tip(run: SwingRun) -> None:
+    if run.solution is not None:
+        nominal = run.solution.source.pen.nominal_tip
+        _print("\n" + calibration_text(run.solution.calibration, "joint", nominal))

@@ -1,6 +1,7 @@
 """Run one computation of the core off the GUI thread."""
 
 from collections.abc import Callable
+from functools import partial
 from threading import Event
 from typing import TypeAlias
 
@@ -16,7 +17,8 @@ class Job(QObject):
 
     The function gets one argument, ``report``, to call now and then with the
     fraction done; that call is also where a cancelled job stops. An exception
-    that is no `LightpenError` is a bug and goes to `sys.excepthook`.
+    that is no `LightpenError` is a bug and goes to `sys.excepthook`. A job is done
+    with after `ended`: it deletes itself.
 
     Signals
     -------
@@ -26,6 +28,8 @@ class Job(QObject):
         What the function returned.
     failed(str)
         Text for the user.
+    crashed()
+        It ended by a bug, without an outcome.
     ended()
         The last of all, whether it succeeded, failed, was cancelled or crashed.
     """
@@ -33,9 +37,12 @@ class Job(QObject):
     progressed = Signal(float)
     succeeded = Signal(object)
     failed = Signal(str)
+    crashed = Signal()
     ended = Signal()
     _returned = Signal(object)
     _refused = Signal(str)
+    _broke = Signal()
+    _finished = Signal()
 
     def __init__(
         self, function: Callable[[Report], object], parent: QObject | None = None
@@ -43,10 +50,13 @@ class Job(QObject):
         super().__init__(parent)
         self._function = function
         self._cancelled = Event()
+        self._over = Event()
 
         # Connections
         self._returned.connect(self._on_returned)
         self._refused.connect(self._on_refused)
+        self._broke.connect(self._on_broke)
+        self._finished.connect(self._on_finished)
 
     def start(self) -> None:
         """Queue the job."""
@@ -56,15 +66,27 @@ class Job(QObject):
         """Ask the job to stop at its next report; its outcome is then not told."""
         self._cancelled.set()
 
+    @property
+    def is_over(self) -> bool:
+        """Whether it has let go of its thread."""
+        return self._over.is_set()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait for a job that was started; return whether it is over by then."""
+        return self._over.wait(timeout_s)
+
     def _run(self) -> None:
+        tell: Callable[[], object] = self._broke.emit
         try:
-            self._returned.emit(self._function(self._report))
+            tell = partial(self._returned.emit, self._function(self._report))
         except Cancelled:
-            pass
+            tell = _tell_nothing
         except LightpenError as error:
-            self._refused.emit(str(error))
+            tell = partial(self._refused.emit, str(error))
         finally:
-            self.ended.emit()
+            tell()
+            self._finished.emit()
+            self._over.set()
 
     def _report(self, fraction: float) -> None:
         if self._cancelled.is_set():
@@ -81,3 +103,16 @@ class Job(QObject):
     def _on_refused(self, text: str) -> None:
         if not self._cancelled.is_set():
             self.failed.emit(text)
+
+    def _on_broke(self) -> None:
+        if not self._cancelled.is_set():
+            self.crashed.emit()
+
+    def _on_finished(self) -> None:
+        self._over.wait()  # its thread may still be about to let go of it
+        self.ended.emit()
+        self.deleteLater()
+
+
+def _tell_nothing() -> None:
+    """Do as one does who was told to stop."""

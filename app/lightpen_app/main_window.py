@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QMainWindow,
     QMessageBox,
+    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -38,7 +39,6 @@ from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.options_menu import OptionsMenu
 from lightpen_app.widgets.sidebar import Sidebar
 
-SIDEBAR_WIDTH = 30 * GRID
 CLOSING_TIME_MS = 10_000  # a camera may take 8 s to close
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -63,9 +63,12 @@ class MainWindow(QMainWindow):
     -------
     preferences_changed(Preferences)
         The user chose otherwise.
+    closing()
+        The pages are shut down; what they share must be, too.
     """
 
     preferences_changed = Signal(object)
+    closing = Signal()
 
     def __init__(
         self,
@@ -92,6 +95,7 @@ class MainWindow(QMainWindow):
         self._stack = QStackedWidget()
         for page in self._pages:
             self._stack.addWidget(page)
+        self._show_page()
         self._action_bar = ActionBar()
         self._operator_view = OperatorView()
         self._operator_view.set_distance_m(preferences.distance_m)
@@ -113,7 +117,7 @@ class MainWindow(QMainWindow):
         self._options.mute_action.toggled.connect(self._on_mute_toggled)
         self._options.about_chosen.connect(self._on_about_chosen)
         self._operator_view.closed.connect(self._on_operator_view_closed)
-        self._operator_view.advance_requested.connect(self._action_bar.press_main)
+        self._operator_view.advance_requested.connect(self._on_advance_pressed)
         self._operator_view.back_requested.connect(self.go_back)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
         for page in self._pages:
@@ -124,6 +128,7 @@ class MainWindow(QMainWindow):
             self.resize(160 * GRID, 100 * GRID)
         self._pages[0].entered()
         self._refresh()
+        self._focus_page()
 
     def page(self) -> Page:
         """Return the page that is shown."""
@@ -142,7 +147,7 @@ class MainWindow(QMainWindow):
         self._action_bar.set_status("")
         if self._notice_is_of_page:
             self._notice.clear()
-        self._stack.setCurrentWidget(self.page())
+        self._show_page()
         self.page().entered()
         self._refresh()
         self._focus_page()
@@ -157,10 +162,14 @@ class MainWindow(QMainWindow):
         if self._now + 1 < len(self._pages):
             self.go_to(self._now + 1)
 
-    def show_notice(self, text: str) -> None:
+    def press_main(self) -> None:
+        """Press the main button, if it can be pressed."""
+        self._action_bar.press_main()
+
+    def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Show a sentence until the user has read it."""
         self._notice_is_of_page = False
-        self._notice.show_text(text)
+        self._notice.show_text(text, tone)
 
     def show_crash_report(self, path: str) -> None:
         """Tell that the program met a bug of its own; path "" if none is written."""
@@ -211,7 +220,7 @@ class MainWindow(QMainWindow):
             else:
                 self._action_bar.press_main()
         elif key == Qt.Key.Key_PageDown:
-            self._action_bar.press_main()
+            self._on_advance_pressed()
         elif key == Qt.Key.Key_PageUp:
             self.go_back()
         else:
@@ -223,15 +232,17 @@ class MainWindow(QMainWindow):
         if questions and not self._confirmed("\n\n".join(questions)):
             event.ignore()
             return
+        self._settings.save_geometry(self)
+        self.hide()  # what is under way may take its time to end
+        self._operator_view.close()
+        self._help_window.close()
         self.page().left()
         for page in self._pages:
             page.shut_down()
+        self.closing.emit()
         QThreadPool.globalInstance().waitForDone(CLOSING_TIME_MS)
-        self._settings.save_geometry(self)
         with suppress(FileError):  # nobody is left to tell; it was told at the choice
             self._settings.sync()
-        self._operator_view.close()
-        self._help_window.close()
         super().closeEvent(event)
 
     @override
@@ -245,6 +256,7 @@ class MainWindow(QMainWindow):
     def _connect_page(self, page: Page) -> None:
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
+        page.step_requested.connect(self._on_step_requested)
         page.status_changed.connect(self._action_bar.set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.subject_changed.connect(self._sidebar.set_subject)
@@ -260,7 +272,7 @@ class MainWindow(QMainWindow):
         # A presenter's remote sends the page keys.
         self._hands_free_actions = (
             self._action(Qt.Key.Key_Space, self._on_pause_pressed),
-            self._action(Qt.Key.Key_PageDown, self._action_bar.press_main),
+            self._action(Qt.Key.Key_PageDown, self._on_advance_pressed),
             self._action(Qt.Key.Key_PageUp, self.go_back),
         )
         self.addActions(
@@ -273,6 +285,7 @@ class MainWindow(QMainWindow):
         self._operator_view.addActions(
             [self._help_action, self._operator_action, self._options.mute_action]
         )
+        self._help_window.addActions([self._operator_action, self._options.mute_action])
 
     def _action(self, key: Qt.Key, slot: Callable[[], object]) -> QAction:
         action = QAction(self)
@@ -305,6 +318,14 @@ class MainWindow(QMainWindow):
         layout.setRowStretch(0, 1)
         return central
 
+    def _show_page(self) -> None:
+        """Show the present page; only that one may ask for room."""
+        for page in self._pages:
+            shown = page is self.page()
+            wish = QSizePolicy.Policy.Preferred if shown else QSizePolicy.Policy.Ignored
+            page.setSizePolicy(wish, wish)
+        self._stack.setCurrentWidget(self.page())
+
     def _refresh(self) -> None:
         """Show what the pages say of themselves now."""
         page = self.page()
@@ -321,8 +342,12 @@ class MainWindow(QMainWindow):
             each.setEnabled(page.is_hands_free())
 
     def _focus_page(self) -> None:
-        """Put the focus on the first control of the page."""
+        """Put the focus on the control that the page chose, or on its first one."""
         page = self.page()
+        first = page.first_control()
+        if first is not None:
+            first.setFocus(Qt.FocusReason.TabFocusReason)
+            return
         widget = page.nextInFocusChain()
         while widget is not None and page.isAncestorOf(widget):
             takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
@@ -341,11 +366,22 @@ class MainWindow(QMainWindow):
     def _on_main_pressed(self) -> None:
         self.page().run_main_action()
 
-    def _on_notice_raised(self, text: str) -> None:
-        self._notice_is_of_page = True
-        if text:
-            self._notice.show_text(text)
+    def _on_advance_pressed(self) -> None:
+        """Do as a presenter's remote asks, unless someone must be at the screen."""
+        if self.page().main_action().at_screen:
+            self._action_bar.set_status(self.tr("Press this button at the screen."))
         else:
+            self._action_bar.press_main()
+
+    def _on_step_requested(self, key: str) -> None:
+        keys = [page.key for page in self._pages]
+        self.go_to(keys.index(key))
+
+    def _on_notice_raised(self, text: str) -> None:
+        if text:
+            self._notice_is_of_page = True
+            self._notice.show_text(text)
+        elif self._notice_is_of_page:
             self._notice.clear()
 
     def _on_pause_pressed(self) -> None:

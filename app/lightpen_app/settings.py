@@ -10,6 +10,7 @@ from PySide6.QtCore import QByteArray, QLocale, QSettings
 from PySide6.QtWidgets import QWidget
 
 from lightpen.errors import FileError
+from lightpen.session.swing_state import SwingLimits
 from lightpen_app.languages import Language
 from lightpen_app.theme import Appearance
 
@@ -27,15 +28,12 @@ class Preferences:
     muted : bool
     distance_m : float
         From the operator's eyes to the screen, m.
-    station : str
-        Name of the station used last.
     """
 
     language: Language = Language.ENGLISH
     appearance: Appearance = Appearance.SYSTEM
     muted: bool = False
     distance_m: float = 3.0
-    station: str = ""
 
 
 @dataclass(frozen=True)
@@ -55,10 +53,15 @@ class Station:
     source_place : str
         Folder or serial number that the source needs.
     camera_file, pen_file : str
-    mask_file : str
-        Stray light to leave out.
-    exposure_us, gain : float
-        0 when they were never set.
+    pen_units : str
+        Of a pen file that does not say.
+    mask : str
+        Stray light to leave out, "x y radius" in px, circles parted by ";".
+    exposure_us, gain_db : float
+        Of the camera; not a number when they were never set.
+    max_uncertainty : float
+        U (k = 2) of the tip that ends a swing, mm.
+    min_images, max_images : int
     """
 
     operator: str = ""
@@ -71,9 +74,13 @@ class Station:
     source_place: str = ""
     camera_file: str = ""
     pen_file: str = ""
-    mask_file: str = ""
-    exposure_us: float = 0.0
-    gain: float = 0.0
+    pen_units: str = ""
+    mask: str = ""
+    exposure_us: float = math.nan
+    gain_db: float = math.nan
+    max_uncertainty: float = SwingLimits.max_uncertainty
+    min_images: int = SwingLimits.min_images
+    max_images: int = SwingLimits.max_images
 
 
 class Settings:
@@ -118,6 +125,17 @@ class Settings:
         if not name:
             raise ValueError("`name` of a station must not be empty.")
         self._write(f"stations/{_encoded(name)}", station)
+
+    def last_station(self) -> str:
+        """Return the name of the station used last; empty at first."""
+        saved = self._ini.value("last/station")
+        return saved if isinstance(saved, str) else ""
+
+    def set_last_station(self, name: str) -> None:
+        """Remember which station is used."""
+        if name != self.last_station():
+            self._ini.setValue("last/station", name)
+            self.sync()
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""

@@ -8,13 +8,13 @@ import io
 import shutil
 import sys
 import wave
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from PySide6.QtCore import QProcess
+from PySide6.QtCore import QCoreApplication, QProcess
 
 from lightpen.arrays import FloatArray
 
@@ -30,6 +30,7 @@ class Sound(StrEnum):
     KEPT = "kept"
     FIELD_FULL = "field-full"
     LOST = "lost"
+    CAPTURED = "captured"
     DONE = "done"
     FAILED = "failed"
 
@@ -40,6 +41,7 @@ TONES: dict[Sound, tuple[tuple[float, float], ...]] = {
     Sound.KEPT: ((1046.5, 0.03),),
     Sound.FIELD_FULL: ((1318.5, 0.10), (1568.0, 0.25)),
     Sound.LOST: ((196.0, 0.35),),
+    Sound.CAPTURED: ((783.99, 0.10), (783.99, 0.10)),
     Sound.DONE: ((523.25, 0.14), (659.25, 0.14), (783.99, 0.30)),
     Sound.FAILED: ((392.0, 0.20), (261.63, 0.35)),
 }
@@ -57,17 +59,26 @@ class Sounds(Protocol):
 
 
 class Silence:
-    """Plays nothing."""
+    """Plays nothing.
 
-    def __init__(self, reason: str = "") -> None:
-        self._reason = reason
+    Parameters
+    ----------
+    missing : sequence of str
+        Programs of which one could play sounds, if it were installed.
+    """
+
+    def __init__(self, missing: Sequence[str] = ()) -> None:
+        self._missing = tuple(missing)
 
     def play(self, sound: Sound, progress: float = 0.0) -> None:
         """Do nothing."""
 
     def why_silent(self) -> str:
         """Return why nothing can be heard."""
-        return self._reason
+        if not self._missing:
+            return ""
+        words = QCoreApplication.translate("sounds", "none of {0} is installed")
+        return words.format(", ".join(self._missing))
 
 
 class FileSounds:
@@ -134,7 +145,7 @@ def find_sounds(folder: Path) -> Sounds:
         path = shutil.which(program)
         if path is not None:
             return FileSounds(folder, _player(path, options))
-    return Silence("none of {} is installed".format(", ".join(p[0] for p in PLAYERS)))
+    return Silence([program for program, *_ in PLAYERS])
 
 
 def sound_wav(sound: Sound, step: int = 0) -> bytes:

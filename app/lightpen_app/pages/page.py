@@ -17,10 +17,14 @@ class MainAction:
         What it does, a verb first.
     why_not : str
         Why it cannot be pressed now; empty when it can. The reason is shown.
+    at_screen : bool
+        Whether it takes someone at the screen: a presenter's remote and the operator
+        view do not press it.
     """
 
     text: str
     why_not: str = ""
+    at_screen: bool = False
 
 
 class Page(QWidget):
@@ -40,6 +44,8 @@ class Page(QWidget):
         Something that the page says of itself, such as its main action, is different.
     advance_requested()
         The step is done; show the next.
+    step_requested(str)
+        The step of this key must be shown, such as that of a swing to go on with.
     status_changed(str)
         A sentence for the status line.
     notice_raised(str)
@@ -54,6 +60,7 @@ class Page(QWidget):
     key = ""
     changed = Signal()
     advance_requested = Signal()
+    step_requested = Signal(str)
     status_changed = Signal(str)
     notice_raised = Signal(str)
     subject_changed = Signal(str)
@@ -92,6 +99,10 @@ class Page(QWidget):
 
     def toggle_pause(self) -> None:
         """Pause or go on, when Space is pressed."""
+
+    def first_control(self) -> QWidget | None:
+        """Return what has the focus at first; None for the first one there is."""
+        return None
 
     def entered(self) -> None:
         """Begin: the page is now shown."""

@@ -1,14 +1,14 @@
 """The foot of the window: the status line, Back, and the main button."""
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
-from typing_extensions import override
 
 from lightpen_app.pages.page import MainAction
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.translated import Translated
 
 
-class ActionBar(QFrame):
+class ActionBar(Translated, QFrame):
     """One main button, with the reason when it cannot be pressed.
 
     Signals
@@ -80,12 +80,6 @@ class ActionBar(QFrame):
     def focus_main(self) -> None:
         """Put the focus on the main button."""
         self._main.setFocus(Qt.FocusReason.TabFocusReason)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
 
     def _retranslate(self) -> None:
         self._back.setText(self.tr("Back"))

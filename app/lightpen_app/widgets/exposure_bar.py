@@ -1,43 +1,16 @@
 """How brightly the LEDs are exposed: too dark, good, or saturated."""
 
-from dataclasses import dataclass
-
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
+from lightpen.inspection import DARK_PEAK, Exposure
+from lightpen.spots import SATURATED_LEVEL
 from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_sign
 
 BAR_HEIGHT = 2 * GRID
-
-
-@dataclass(frozen=True)
-class Exposure:
-    """Peak brightness of the LEDs of one image.
-
-    Attributes
-    ----------
-    peaks : tuple of float
-        Of each LED, as a fraction of the full scale, 0 to 1.
-    dark, saturated : float
-        Limits of what measures well.
-    """
-
-    peaks: tuple[float, ...] = ()
-    dark: float = 0.3
-    saturated: float = 0.98
-
-    @property
-    def n_dark(self) -> int:
-        """LEDs below the lower limit."""
-        return sum(peak < self.dark for peak in self.peaks)
-
-    @property
-    def n_saturated(self) -> int:
-        """LEDs at or above the upper limit."""
-        return sum(peak >= self.saturated for peak in self.peaks)
 
 
 class ExposureBar(QWidget):
@@ -64,13 +37,25 @@ class ExposureBar(QWidget):
         value = self._value
         if not value.peaks:
             return self.tr("No LED is seen")
+        of_leds = value.are_leds
         if value.n_saturated:
-            text = self.tr("Saturated: {0} of {1} LEDs. Shorten the exposure.")
-            return text.format(value.n_saturated, len(value.peaks))
-        if value.n_dark:
-            text = self.tr("Too dark: {0} of {1} LEDs. Lengthen the exposure.")
-            return text.format(value.n_dark, len(value.peaks))
-        return self.tr("Good: {0} LEDs").format(len(value.peaks))
+            n_meant = value.n_saturated
+            words = (
+                self.tr("Saturated: {0} of {1} LEDs")
+                if of_leds
+                else self.tr("Saturated: {0} of {1} spots")
+            )
+        elif value.n_dark:
+            n_meant = value.n_dark
+            words = (
+                self.tr("Too dark: {0} of {1} LEDs")
+                if of_leds
+                else self.tr("Too dark: {0} of {1} spots")
+            )
+        else:
+            n_meant = value.n_good
+            words = self.tr("Good: {0} LEDs") if of_leds else self.tr("Good: {0} spots")
+        return words.format(n_meant, len(value.peaks))
 
     @override
     def sizeHint(self) -> QSize:
@@ -106,7 +91,7 @@ class ExposureBar(QWidget):
         painter.setBrush(QColor(colors.raised))
         painter.drawRect(bar)
         good = bar.adjusted(
-            bar.width() * value.dark, 0, -bar.width() * (1 - value.saturated), 0
+            bar.width() * DARK_PEAK, 0, -bar.width() * (1 - SATURATED_LEVEL), 0
         )
         painter.setBrush(QColor(colors.partial))
         painter.drawRect(good)
@@ -126,7 +111,7 @@ class ExposureBar(QWidget):
         top = bar.bottom() + 4
         height = self.height() - top
         whole = QRectF(bar.left(), top, bar.width(), height)
-        good_left = whole.adjusted(bar.width() * self._value.dark, 0, 0, 0)
+        good_left = whole.adjusted(bar.width() * DARK_PEAK, 0, 0, 0)
         left, right = Qt.AlignmentFlag.AlignLeft, Qt.AlignmentFlag.AlignRight
         painter.drawText(whole, left, self.tr("dark"))
         painter.drawText(good_left, left, self.tr("good"))

@@ -1,6 +1,6 @@
 """Help about one step, in a window of its own."""
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import (
     QKeyEvent,
     QTextBlockFormat,
@@ -13,6 +13,7 @@ from typing_extensions import override
 
 from lightpen_app.languages import Language
 from lightpen_app.theme import GRID, RESOURCES
+from lightpen_app.widgets.translated import Translated
 
 HELP = RESOURCES / "help"
 _PROPORTIONAL = QTextBlockFormat.LineHeightTypes.ProportionalHeight.value
@@ -27,7 +28,7 @@ def help_text(key: str, language: Language) -> str:
     raise ValueError(f"There is no help about {key!r}.")
 
 
-class HelpWindow(QWidget):
+class HelpWindow(Translated, QWidget):
     """Shows one help text; Escape or F1 closes it."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -64,12 +65,6 @@ class HelpWindow(QWidget):
             self.close()
         else:
             super().keyPressEvent(event)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Help"))

@@ -1,5 +1,6 @@
 """The live image with rings about the LEDs."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,7 +21,6 @@ from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen_app.theme import DARK, GRID, TextSize, Tone, font
-from lightpen_app.widgets.mailbox import Mailbox
 
 MAX_ZOOM = 16.0
 ZOOM_STEP = 1.25
@@ -40,8 +40,12 @@ class Marker:
         Image px; it is drawn no smaller than can be seen.
     label : str
         Beside the ring.
+    label_angle : float
+        Where beside it: clockwise from the right as one sees it, rad.
     tone : Tone
         Its colour; `WARN` and `BAD` are also drawn dashed.
+    crossed : bool
+        Whether two strokes cross in it, as over what is left out.
     """
 
     x: float
@@ -49,6 +53,8 @@ class Marker:
     radius: float = 8.0
     label: str = ""
     tone: Tone = Tone.GOOD
+    label_angle: float = -math.pi / 4
+    crossed: bool = False
 
 
 def pooled(image: Image, bits: int = 8) -> Image:
@@ -98,32 +104,22 @@ class ImageView(QWidget):
         self._center = QPointF(0.5, 0.5)  # of the image, as fractions
         self._pressed: QPointF | None = None
         self._dragged = QPointF()
-        self._mailbox = Mailbox(self)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
         self._describe()
 
-        # Connections
-        self._mailbox.ready.connect(self._on_ready, Qt.ConnectionType.QueuedConnection)
-
-    def post(
-        self, image: Image, markers: Sequence[Marker] = (), *, bits: int = 8
+    def set_half(
+        self, half: Image, size: QSize, markers: Sequence[Marker] = ()
     ) -> None:
-        """Leave an image from any thread; one not yet shown is skipped.
-
-        The image is pooled at once, on the calling thread, so it may be reused.
-        """
-        height, width = image.shape
-        half = pooled(image, bits)
-        self._mailbox.put((half, QSize(width, height), tuple(markers)))
+        """Show an image that is `pooled` already; ``size`` is that of the whole."""
+        self._show(half, size, tuple(markers))
 
     def set_image(
         self, image: Image | None, markers: Sequence[Marker] = (), *, bits: int = 8
     ) -> None:
         """Show an (H, W) image at once, or none."""
-        self._mailbox.take()
         if image is None:
             self._show(None, QSize(), ())
             return
@@ -142,7 +138,7 @@ class ImageView(QWidget):
     def set_message(self, text: str) -> None:
         """Say why there is no image; shown in its place."""
         self._message = text
-        self.setAccessibleDescription(text)
+        self._describe()
         self.update()
 
     def image_size(self) -> QSize:
@@ -218,13 +214,29 @@ class ImageView(QWidget):
         painter.setPen(pen)
         painter.setBrush(Qt.BrushStyle.NoBrush)
         painter.drawEllipse(place, radius, radius)
+        if marker.crossed:
+            arm = radius / 2**0.5
+            painter.drawLine(place - QPointF(arm, arm), place + QPointF(arm, arm))
+            painter.drawLine(place - QPointF(arm, -arm), place + QPointF(arm, -arm))
         if marker.label:
-            painter.setFont(font(TextSize.SMALL, bold=True))
-            corner = place + QPointF(radius, -radius) * 0.75 + QPointF(2, 0)
-            painter.setPen(QColor(DARK.window))
-            painter.drawText(corner + QPointF(1, 1), marker.label)
-            painter.setPen(DARK.tone(marker.tone))
-            painter.drawText(corner, marker.label)
+            self._draw_label(painter, marker, place, radius)
+
+    def _draw_label(
+        self, painter: QPainter, marker: Marker, place: QPointF, radius: float
+    ) -> None:
+        painter.setFont(font(TextSize.SMALL, bold=True))
+        metrics = painter.fontMetrics()
+        width = metrics.horizontalAdvance(marker.label) + 2.0
+        height = float(metrics.capHeight())
+        across, down = math.cos(marker.label_angle), math.sin(marker.label_angle)
+        middle = place + QPointF(
+            across * (radius + 3 + width / 2), down * (radius + 3 + height / 2)
+        )
+        corner = middle + QPointF(-width / 2, height / 2)
+        painter.setPen(QColor(DARK.window))
+        painter.drawText(corner + QPointF(1, 1), marker.label)
+        painter.setPen(DARK.tone(marker.tone))
+        painter.drawText(corner, marker.label)
 
     @override
     def wheelEvent(self, event: QWheelEvent) -> None:
@@ -276,15 +288,12 @@ class ImageView(QWidget):
 
     def _describe(self) -> None:
         self.setAccessibleName(self.tr("Live image"))
-
-    def _on_ready(self) -> None:
-        match self._mailbox.take():
-            case (np.ndarray() as half, QSize() as size, tuple() as markers):
-                self._show(half, size, markers)
+        self.setAccessibleDescription(self._message if self._shown.isNull() else "")
 
     def _show(
         self, half: Image | None, size: QSize, markers: tuple[Marker, ...]
     ) -> None:
+        was_empty = self._shown.isNull()
         self._buffer = half
         self._size = size
         self._markers = markers
@@ -294,6 +303,8 @@ class ImageView(QWidget):
             height, width = half.shape
             grey = QImage.Format.Format_Grayscale8
             self._shown = QImage(half.data, width, height, half.strides[0], grey)
+        if was_empty is not (half is None):
+            self._describe()
         self.update()
 
     def _target(self) -> tuple[QRectF, float]:

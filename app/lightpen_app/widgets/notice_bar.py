@@ -1,13 +1,13 @@
 """A sentence above the page that waits to be read, and stops nothing."""
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
-from typing_extensions import override
 
 from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.widgets.translated import Translated
 
 
-class NoticeBar(QFrame):
+class NoticeBar(Translated, QFrame):
     """Hidden until it has something to say; Close puts it away.
 
     Signals
@@ -59,12 +59,6 @@ class NoticeBar(QFrame):
         """Say nothing."""
         self._text.clear()
         self.hide()
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
 
     def _on_close_clicked(self) -> None:
         self.clear()

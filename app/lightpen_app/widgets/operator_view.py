@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from PySide6.QtCore import QEvent, QRect, Qt, Signal
+from PySide6.QtCore import QRect, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent, QScreen
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -11,6 +11,7 @@ from lightpen_app.theme import GRID, letters_for
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.widgets.translated import Translated
 
 DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
@@ -46,7 +47,7 @@ class OperatorValue:
     dial: DialValue | None = None
 
 
-class OperatorView(QWidget):
+class OperatorView(Translated, QWidget):
     """One instruction, the dial, the count and the state.
 
     The letters are as large as the viewing distance asks for, where they fit; on a
@@ -121,8 +122,10 @@ class OperatorView(QWidget):
             self._progress.setValue(round(1000 * value.fraction))
         self._dial.setVisible(value.dial is not None)
         self._layout.setColumnStretch(0, 0 if value.dial is None else DIAL_SHARE)
+        self._layout.setHorizontalSpacing(0 if value.dial is None else 4 * GRID)
         if value.dial is not None:
             self._dial.set_value(value.dial)
+        self._resize_letters()
 
     def distance_m(self) -> float:
         """Return the viewing distance, m."""
@@ -174,17 +177,12 @@ class OperatorView(QWidget):
         super().closeEvent(event)
         self.closed.emit()
 
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
-
     def _resize_letters(self) -> None:
         letters = max(self.letters(), self.height() * LEAST_SHARE)
         self._instruction.set_largest(letters * 1.2)
         self._hint.set_largest(letters * 0.6)
-        self._count.set_largest(letters * 1.2)
+        is_digit = len(self._value.count) == 1
+        self._count.set_largest(letters * (2.4 if is_digit else 1.2))
         # Else the dial, which wants to be square, would take the room of the words.
         for text, share in (
             (self._instruction, INSTRUCTION_SHARE),
@@ -192,7 +190,8 @@ class OperatorView(QWidget):
         ):
             wanted = text.sizeHint().height()
             text.setMinimumHeight(min(wanted, round(self.height() * share)))
-        self._banner.set_word_size(letters * 0.8)
+        has_room = self._value.dial is None
+        self._banner.set_word_size(letters * (1.6 if has_room else 0.8))
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Operator view"))

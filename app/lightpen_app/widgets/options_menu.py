@@ -3,18 +3,18 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
-from typing_extensions import override
 
 from lightpen_app.languages import Language
 from lightpen_app.settings import Preferences
 from lightpen_app.theme import Appearance
 from lightpen_app.widgets.operator_view import DISTANCES_M
+from lightpen_app.widgets.translated import Translated
 
 
-class OptionsMenu(QMenu):
+class OptionsMenu(Translated, QMenu):
     """Shows and changes the preferences.
 
     Parameters
@@ -70,12 +70,6 @@ class OptionsMenu(QMenu):
     def value(self) -> Preferences:
         """Return the preferences in use."""
         return self._value
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
 
     def _choice_menu(
         self, preference: str, choices: Sequence[object], chosen: object

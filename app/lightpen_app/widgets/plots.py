@@ -5,22 +5,30 @@ Making a plot anew costs fifty times more than `setData` on one that is there.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPen
-from PySide6.QtWidgets import QGraphicsRectItem, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QSize, Qt
+from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.files import write_whole
-from lightpen_app.theme import TextSize, Tone, colors_of, font
+from lightpen_app.theme import GRID, Colors, TextSize, Tone, colors_of, font
 
 PNG_SCALE = 2
+LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
+LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
+N_LEAST = 10  # images that have room along a trace, so that its numbers are whole
+LABELLED = (1, 2, 5)  # of each decade
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
+
+Column: TypeAlias = FloatArray | tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,18 @@ class Axes:
     y: str = ""
 
 
+class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]
+    """An axis whose decades read 10, 20, 50, 100, and not 1e+02."""
+
+    @override
+    def logTickStrings(
+        self, values: Sequence[float], scale: float, spacing: float
+    ) -> list[str]:
+        numbers = (10 ** float(value) for value in values)
+        leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
+        return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
+
+
 class Plot(QWidget):
     """Base of the plots: its frame, its colours, and how it is saved.
 
@@ -48,16 +68,18 @@ class Plot(QWidget):
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._columns: dict[str, FloatArray] = {}
+        self._columns: dict[str, Column] = {}
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
-        self._graphics = pg.PlotWidget(parent=self)
+        left = _ReadableAxis("left")
+        self._graphics = pg.PlotWidget(parent=self, axisItems={"left": left})
         self._item = self._graphics.getPlotItem()
         self._item.setMenuEnabled(False)
         self._item.hideButtons()
         self._item.setMouseEnabled(x=False, y=False)
         self._graphics.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._graphics.viewport().setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._graphics.setFrameShape(pg.PlotWidget.Shape.NoFrame)
         for side in ("left", "bottom"):
             axis = self._item.getAxis(side)
@@ -107,15 +129,12 @@ class Plot(QWidget):
         n_rows = max((len(column) for column in self._columns.values()), default=0)
         lines = [",".join(self._columns)]
         for row in range(n_rows):
-            values = (
-                f"{column[row]:.9g}" if row < len(column) else ""
-                for column in self._columns.values()
-            )
+            values = (_cell(column, row) for column in self._columns.values())
             lines.append(",".join(values))
         write_whole(path, ("\n".join(lines) + "\n").encode())
 
-    def columns(self) -> Mapping[str, FloatArray]:
-        """Return the numbers shown, by the name of their column in the CSV file."""
+    def columns(self) -> Mapping[str, Column]:
+        """Return what is shown, by the name of their column in the CSV file."""
         return self._columns
 
     def ranges(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -145,7 +164,8 @@ class Plot(QWidget):
         """Colour what is there already; a subclass colours its curves besides."""
         colors = colors_of(self.palette())
         self._graphics.setBackground(colors.panel)
-        title = {"color": colors.text, "size": f"{TextSize.SMALL}px"}
+        size = f"{TextSize.SMALL}px"
+        title = {"color": colors.text, "size": size, "justify": "left"}
         self._item.setTitle(self._axes.title, **title)
         for side, words in (("left", self._axes.y), ("bottom", self._axes.x)):
             axis = self._item.getAxis(side)
@@ -176,9 +196,26 @@ class Plot(QWidget):
         )
 
 
+def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:
+    """Return a title as rich text, with the names of curves in their colours."""
+    words = (
+        f'<b><span style="color: {colors.tone(tone).name()}">{escape(name)}</span></b>'
+        for name, tone in zip(names, TONES, strict=False)
+    )
+    return "&nbsp; ".join((escape(title), *words))
+
+
+def _cell(column: Column, row: int) -> str:
+    """Return an entry of a CSV file; empty below the end of a short column."""
+    if row >= len(column):
+        return ""
+    value = column[row]
+    return value if isinstance(value, str) else f"{value:.9g}"
+
+
 @dataclass(frozen=True)
 class Curve:
-    """A curve: its column in the CSV file, and its name in the legend."""
+    """A curve: its column in the CSV file, and its name beside the title."""
 
     column: str
     name: str = ""
@@ -190,9 +227,13 @@ class TracePlot(Plot):
     Parameters
     ----------
     curves : sequence of Curve
-        More than one get a legend.
+        Of more than one, the names stand beside the title in their colours.
     y_zero : bool
         Always show the zero.
+    y_log : bool
+        Show values over decades; those that are not above zero leave a gap.
+    tail : float
+        Share of the images, the newest, whose values must all be in sight.
     """
 
     def __init__(
@@ -201,40 +242,52 @@ class TracePlot(Plot):
         curves: Sequence[Curve],
         *,
         y_zero: bool = False,
+        y_log: bool = False,
+        tail: float = 1.0,
         parent: QWidget | None = None,
     ) -> None:
         self._curves: list[pg.PlotCurveItem] = []
+        self._legend: tuple[str, ...] = ()
         self._limit: pg.InfiniteLine | None = None
         super().__init__(axes, parent)
         self._names = tuple(curve.column for curve in curves)
         self._y_zero = y_zero
+        self._y_log = y_log
+        self._tail = tail
         self._limit_at: float | None = None
-        if len(curves) > 1:
-            self._legend = self._item.addLegend(
-                offset=(-4, 1),
-                colCount=len(curves),
-                labelTextSize=f"{TextSize.SMALL}px",
-            )
-        for each in curves:
-            curve = pg.PlotCurveItem(name=each.name)
+        self._legend = tuple(curve.name for curve in curves)
+        left = self._item.getAxis("left")
+        left.setLogMode(y_log)
+        left.setWidth(LEFT_WIDTH)
+        self._item.layout.setContentsMargins(0, 0, 2 * GRID, 0)
+        self._item.setRange(xRange=(1, N_LEAST), yRange=(0, 1), padding=0.01)
+        for _ in curves:
+            curve = pg.PlotCurveItem()
             curve.setSegmentedLineMode("on")
             self._item.addItem(curve)
             self._curves.append(curve)
-        above = {"position": 0.8, "anchors": [(0.5, 1), (0.5, 1)]}
-        self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=above)
+        # Decades are for what falls to its limit: at the left there is room for words.
+        place = 0.2 if y_log else 0.8
+        words = {"position": place}
+        self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=words)
         self._limit.hide()
         self._item.addItem(self._limit)
         self._restyle()
 
     def set_data(self, x: FloatArray, *values: FloatArray) -> None:
         """Show values (N,) of each curve over x (N,); NaN leaves a gap."""
-        for curve, value in zip(self._curves, values, strict=True):
-            curve.setData(x, value, connect="finite")
         self._columns = {"image": x, **dict(zip(self._names, values, strict=True))}
+        heights = [self._height(value) for value in values]
+        for curve, height in zip(self._curves, heights, strict=True):
+            curve.setData(x, height, connect="finite")
         if len(x):
-            stacked = np.concatenate(values)
-            at = () if self._limit_at is None else (self._limit_at,)
-            self._fit(x, np.append(stacked, at), y_zero=self._y_zero)
+            n_hidden = int((1 - self._tail) * len(x))
+            in_sight = [height[n_hidden:] for height in heights]
+            if self._limit_at is not None:
+                reach = (1.0, LABEL_ROOM if self._y_log else 1.0)
+                in_sight.append(self._height(self._limit_at * np.array(reach)))
+            room = np.append(x, x.min() + N_LEAST - 1)
+            self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero)
 
     def set_limit(self, value: float | None, text: str = "") -> None:
         """Draw a limit line with words on it, or none."""
@@ -242,8 +295,15 @@ class TracePlot(Plot):
         self._limit_at = value
         self._limit.setVisible(value is not None)
         if value is not None:
-            self._limit.setValue(value)
+            self._limit.setValue(float(self._height(np.array([value]))[0]))
             self._limit.label.setFormat(text)
+
+    def _height(self, values: FloatArray) -> FloatArray:
+        """Return how high values (N,) are drawn."""
+        if not self._y_log:
+            return values
+        positive = np.where(values > 0, values, np.nan)
+        return np.asarray(np.log10(positive))
 
     @override
     def _restyle(self) -> None:
@@ -255,168 +315,6 @@ class TracePlot(Plot):
             pen = pg.mkPen(colors.muted, width=1, style=Qt.PenStyle.DashLine)
             self._limit.setPen(pen)
             self._limit.label.setColor(QColor(colors.muted))
-        if len(self._curves) > 1:
-            ground = QColor(colors.panel)
-            ground.setAlphaF(0.85)
-            self._legend.setBrush(pg.mkBrush(ground))
-            for _, label in self._legend.items:
-                label.setText(label.text, color=colors.text)
-
-
-class DotPlot(Plot):
-    """Dots of (x, y), such as residuals along the axes of the image.
-
-    Parameters
-    ----------
-    names : pair of str
-        Columns of the CSV file.
-    square : bool
-        Show a unit of x as long as one of y.
-    """
-
-    def __init__(
-        self,
-        axes: Axes,
-        names: tuple[str, str],
-        *,
-        square: bool = False,
-        parent: QWidget | None = None,
-    ) -> None:
-        self._dots: pg.ScatterPlotItem | None = None
-        super().__init__(axes, parent)
-        self._names = names
-        self._item.setAspectLocked(square)
-        self._dots = pg.ScatterPlotItem(pxMode=True, size=5)
-        self._item.addItem(self._dots)
-        self._restyle()
-
-    def set_data(self, x: FloatArray, y: FloatArray) -> None:
-        """Show dots at x (N,), y (N,)."""
-        assert self._dots is not None
-        self._dots.setData(x, y)
-        self._columns = dict(zip(self._names, (x, y), strict=True))
-        self._fit(x, y)
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._dots is not None:
-            color = QColor(colors_of(self.palette()).accent)
-            color.setAlphaF(0.6)
-            self._dots.setPen(pg.mkPen(None))
-            self._dots.setBrush(pg.mkBrush(color))
-
-
-class ArrowPlot(Plot):
-    """Residuals as enlarged arrows over the image, where they should look random.
-
-    Parameters
-    ----------
-    image_size : (width, height)
-        px.
-    """
-
-    def __init__(
-        self,
-        axes: Axes,
-        image_size: tuple[int, int],
-        parent: QWidget | None = None,
-    ) -> None:
-        self._shafts: pg.PlotCurveItem | None = None
-        super().__init__(axes, parent)
-        self._image_size = image_size
-        self._item.setAspectLocked(True)
-        self._item.invertY(True)
-        self._frame = QGraphicsRectItem(0, 0, *image_size)
-        self._shafts = pg.PlotCurveItem(connect="pairs")
-        self._item.addItem(self._frame)
-        self._item.addItem(self._shafts)
-        width, height = image_size
-        self._item.setRange(QRectF(0, 0, width, height), padding=0.02)
-        self._restyle()
-
-    def set_data(self, points: FloatArray, residuals: FloatArray, scale: float) -> None:
-        """Show residuals (N, 2) at points (N, 2), px, enlarged by a scale."""
-        assert self._shafts is not None
-        x, y = _arrow_lines(points, residuals * scale)
-        self._shafts.setData(x, y, connect="pairs")
-        self._columns = {
-            "x_px": points[:, 0],
-            "y_px": points[:, 1],
-            "residual_x_px": residuals[:, 0],
-            "residual_y_px": residuals[:, 1],
-        }
-
-    def lines(self) -> tuple[FloatArray, FloatArray]:
-        """Return the ends x (6 N,), y (6 N,) of shafts and heads, in pairs."""
-        assert self._shafts is not None
-        x, y = self._shafts.getData()
-        return x, y
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._shafts is not None:
-            colors = colors_of(self.palette())
-            self._shafts.setPen(pg.mkPen(colors.accent, width=1))
-            border = QPen(QColor(colors.edge))
-            border.setCosmetic(True)
-            self._frame.setPen(border)
-
-
-class Histogram(Plot):
-    """How often residuals occur, beside the normal curve of the same spread.
-
-    Parameters
-    ----------
-    name : str
-        Column of the CSV file that holds the middles of the bins.
-    """
-
-    def __init__(self, axes: Axes, name: str, parent: QWidget | None = None) -> None:
-        self._bars: pg.BarGraphItem | None = None
-        super().__init__(axes, parent)
-        self._name = name
-        self._bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
-        self._normal = pg.PlotCurveItem()
-        self._item.addItem(self._bars)
-        self._item.addItem(self._normal)
-        self._restyle()
-
-    def set_data(self, values: FloatArray, n_bins: int = 41) -> None:
-        """Show how values (N,) are distributed."""
-        assert self._bars is not None
-        if not len(values):
-            return
-        reach = float(np.abs(values).max()) or 1.0
-        heights, edges = np.histogram(values, n_bins, (-reach, reach))
-        middles = (edges[1:] + edges[:-1]) / 2
-        step = edges[1] - edges[0]
-        self._bars.setOpts(x=middles, height=heights, width=0.9 * step)
-        fine = np.linspace(-reach, reach, 200)
-        sigma = float(np.sqrt(np.mean(values**2))) or 1.0
-        density = np.exp(-0.5 * (fine / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
-        expected = len(values) * step * density
-        self._normal.setData(fine, expected)
-        self._columns = {self._name: middles, "count": heights.astype(np.float64)}
-        self._fit(edges, np.concatenate([heights, expected]), y_zero=True)
-
-    @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if self._bars is not None:
-            colors = colors_of(self.palette())
-            self._bars.setOpts(pen=pg.mkPen(None), brush=QColor(colors.partial))
-            self._normal.setPen(pg.mkPen(colors.text, width=1))
-
-
-def _arrow_lines(
-    points: FloatArray, vectors: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of shafts and heads as pairs, for one curve of them all."""
-    tips = points + vectors
-    ahead = vectors * 0.3
-    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]]) * 0.5
-    strokes = (points, tips, tips, tips - ahead + aside, tips, tips - ahead - aside)
-    lines = np.stack(strokes, axis=1).reshape(-1, 2)
-    return lines[:, 0], lines[:, 1]
+        if len(self._curves) > 1:  # beside the title they hide nothing
+            title = title_with_names(self._axes.title, self._legend, colors)
+            self._item.titleLabel.setText(title)

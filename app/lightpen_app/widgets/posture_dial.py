@@ -18,9 +18,11 @@ from lightpen_app.theme import GRID, Colors, TextSize, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
 
 MAX_TILT = math.radians(36)  # drawn at the rim
+TILTS = (0.0, *TILT_RINGS, MAX_TILT)
 MAX_TURN = math.radians(75)  # drawn at the ends of the bar
 GAP = math.radians(1.6)  # half the gap between sectors
 RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
+RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
@@ -90,10 +92,17 @@ def field_of(posture: Posture) -> tuple[int, int]:
 
 def place_of(posture: Posture, heading: float) -> tuple[float, float]:
     """Return where a posture is drawn: right and up of the middle, rim = 1."""
-    tilts = (0.0, *TILT_RINGS, MAX_TILT)
-    radius = float(np.interp(posture.tilt, tilts, (0.0, *RING_EDGES)))
+    radius = float(np.interp(posture.tilt, TILTS, (0.0, *RING_EDGES)))
     angle = posture.direction + heading
     return radius * math.cos(angle), radius * math.sin(angle)
+
+
+def posture_at(place: tuple[float, float], turn: float, heading: float) -> Posture:
+    """Return the posture that `place_of` draws at a place; ``turn`` in rad."""
+    x, y = place
+    tilt = float(np.interp(math.hypot(x, y), (0.0, *RING_EDGES), TILTS))
+    direction = (math.atan2(y, x) - heading) % (2 * math.pi)
+    return Posture(tilt, direction, turn)
 
 
 class PostureDial(QWidget):
@@ -148,11 +157,7 @@ class PostureDial(QWidget):
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colors = colors_of(self.palette())
-        side = min(self.width(), self.height() / (1 + BAR_SHARE))
-        left = (self.width() - side) / 2
-        top = (self.height() - side * (1 + BAR_SHARE)) / 2
-        middle = QPointF(left + side / 2, top + side / 2)
-        rim = 0.435 * side
+        middle, rim, bar = self._places()
         self._draw_camera(painter, middle, rim, colors)
         target = self._value.target
         marked = _Field(*field_of(target)) if target else None
@@ -164,8 +169,17 @@ class PostureDial(QWidget):
             painter.setPen(QPen(QColor(colors.pointer), 0.02 * rim + 2))
             painter.drawPath(outline)
         self._draw_posture(painter, middle, rim, colors)
-        bar = QRectF(middle.x() - rim, top + side, 2 * rim, BAR_SHARE * side)
         self._draw_turn(painter, bar, colors)
+
+    def _places(self) -> tuple[QPointF, float, QRectF]:
+        """Return the middle of the dial, its radius, and the bar of the turn, px."""
+        side = min(self.width(), self.height() / (1 + BAR_SHARE))
+        left = (self.width() - side) / 2
+        top = (self.height() - side * (1 + BAR_SHARE)) / 2
+        middle = QPointF(left + side / 2, top + side / 2)
+        rim = RIM_SHARE * side
+        bar = QRectF(middle.x() - rim, top + side, 2 * rim, BAR_SHARE * side)
+        return middle, rim, bar
 
     def _images(self, place: _Field) -> tuple[int, int]:
         """Images kept and wanted in a field."""

@@ -2,18 +2,18 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent, QPoint, Signal
+from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QFrame, QPushButton, QVBoxLayout, QWidget
-from typing_extensions import override
 
 from lightpen_app.steps import Step
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.step_list import StepList
+from lightpen_app.widgets.translated import Translated
 
 WIDTH = 30 * GRID
 
 
-class Sidebar(QFrame):
+class Sidebar(Translated, QFrame):
     """The steps, with buttons for what has a function key.
 
     Signals
@@ -92,12 +92,6 @@ class Sidebar(QFrame):
     def options_corner(self) -> QPoint:
         """Return where on the screen the top left of the options' button is."""
         return self._options.mapToGlobal(QPoint(0, 0))
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._retranslate()
 
     def _retranslate(self) -> None:
         self._name.setText(self.tr("Pen tip calibration"))

@@ -1,0 +1,128 @@
+"""The demo: a simulated operator goes through the whole wizard by itself."""
+
+from dataclasses import replace
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.session.preparation import Names
+from lightpen.session.swing_state import Phase
+from lightpen_app.bench import Bench
+from lightpen_app.main_window import MainWindow
+from lightpen_app.theme import Tone
+
+NAMES = Names(
+    station="Demo", operator="Demo", pen="SIM-1", tip="T-1", cone="C-1",
+    ball_diameter=10.0,
+)  # fmt: skip
+TICK_MS = 100
+WATCHED_S, UNWATCHED_S = 5.0, 0.5  # spent on each page, s
+LONGEST_S = 300.0  # on a page, s; a slow machine takes a minute for the swing
+
+
+class Demo(QObject):
+    """Presses the main button of each page when its step is done, and swings the pen.
+
+    Parameters
+    ----------
+    window : MainWindow
+    bench : Bench
+        With a simulated source.
+    is_watched : bool
+        Whether somebody looks on, who needs time to read.
+
+    Signals
+    -------
+    told(str)
+        A sentence on what is going on.
+    ended()
+        The tip is accepted, or the swing gave none.
+    """
+
+    told = Signal(str)
+    ended = Signal()
+
+    def __init__(
+        self, window: MainWindow, bench: Bench, *, is_watched: bool = True
+    ) -> None:
+        super().__init__(window)
+        self._window = window
+        self._bench = bench
+        self._is_watched = is_watched
+        pause_s = WATCHED_S if is_watched else UNWATCHED_S
+        self._pause_ticks = round(1000 * pause_s / TICK_MS)
+        self._key = ""
+        self._n_ticks = 0
+
+        # Widgets
+        self._timer = QTimer(self)
+        self._timer.setInterval(TICK_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._on_tick)
+        self.told.connect(self._show)
+
+    def start(self) -> None:
+        """Begin on the page that is shown."""
+        now = self._bench.preparation
+        self._bench.set_preparation(replace(now, names=NAMES))
+        self._timer.start()
+
+    def _on_tick(self) -> None:
+        key = self._window.page().key
+        if key != self._key:
+            self._key, self._n_ticks = key, 0
+            self._enter(key)
+        self._n_ticks += 1
+        if self._n_ticks < self._pause_ticks:
+            return
+        run = self._bench.run
+        if run.result is not None:
+            self._end(self._farewell() if self._is_watched else "")
+        elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
+            self._end(self.tr("The demo ends here: there is no tip to accept."))
+        elif key != "swing" or run.solution is not None:
+            self._window.press_main()
+
+    def _has_failed(self) -> bool:
+        run = self._bench.run
+        if run.state is None or run.state.phase is not Phase.VERDICT:
+            return False
+        return run.verdict is None or not run.verdict.can_be_accepted
+
+    def _enter(self, key: str) -> None:
+        words = {
+            "start": self.tr("Demo: station, pen, tip and cone are named."),
+            "camera": self.tr(
+                "Demo: the simulated camera sends images; exposure, focus and the "
+                "intrinsics are checked."
+            ),
+            "leds": self.tr(
+                "Demo: the LEDs of the file are compared with those in the image."
+            ),
+            "swing": self.tr(
+                "Demo: the simulated operator seats the tip and follows the arrow. No "
+                "key is pressed from here to the verdict."
+            ),
+            "review": self.tr("Demo: the tip, what it is worth, and why."),
+        }
+        self.told.emit(words[key])
+        operator = self._bench.live.operator
+        if operator is not None:
+            operator.seat()
+        if key == "swing":
+            self._bench.live.set_following(True)
+
+    def _show(self, words: str) -> None:
+        self._window.show_notice(words, Tone.ACTIVE)
+
+    def _farewell(self) -> str:
+        return self.tr(
+            "That was the demo. Look around as long as you like; nothing of it is "
+            "kept. Start the program without --demo to calibrate a tip."
+        )
+
+    def _end(self, words: str) -> None:
+        self._timer.stop()
+        if words:
+            self.told.emit(words)
+        self.ended.emit()

@@ -1,0 +1,370 @@
+"""The step LEDs: their places on the pen, checked against its frame and live images."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.cameras.worker import Connection
+from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
+from lightpen.pen_check.match import PenMatch
+from lightpen.session.preparation import PenFile, SourceKind
+from lightpen_app.live_view import Shown
+from lightpen_app.pages.leds_file import LedFilePanel
+from lightpen_app.pages.leds_frame import FramePanel
+from lightpen_app.pages.leds_match import MatchPanel
+from lightpen_app.pages.leds_table import Changes, LedTablePanel
+from lightpen_app.pages.leds_watch import PenWatch
+from lightpen_app.pages.page import MainAction, Page
+from lightpen_app.phrases import lack_text
+from lightpen_app.services import Services
+from lightpen_app.theme import GRID
+from lightpen_app.widgets.pen_view import PenPicture
+
+
+class LedsPage(Page):
+    """Opens, shows, mends and saves the LED file.
+
+    The table shows a draft. The live match follows it at once; a swing needs a file, so
+    a draft that differs from the file in use has to be saved before the next step.
+
+    Parameters
+    ----------
+    services : Services
+    """
+
+    key = "leds"
+
+    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._bench = services.bench
+        self._is_shown = False
+        self._in_use: PenFile | None = None
+        self._draft = self._opened = PenDraft()
+        self._is_foreign = False  # opened from a file that cannot be used
+        self._check = DraftCheck()
+
+        # Widgets
+        self._file = LedFilePanel()
+        self._table = LedTablePanel()
+        self._space = FramePanel()
+        self._match = MatchPanel()
+        self._watch = PenWatch(self)
+
+        # Layout
+        panels = QHBoxLayout()
+        panels.setSpacing(2 * GRID)
+        panels.addWidget(self._table, 40)
+        panels.addWidget(self._space, 29)
+        panels.addWidget(self._match, 31)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._file)
+        layout.addLayout(panels, 1)
+
+        # Connections
+        self._file.path_chosen.connect(self._on_path_chosen)
+        self._file.units_chosen.connect(self._on_units_chosen)
+        self._file.save_chosen.connect(self._on_save_chosen)
+        self._file.samples_requested.connect(self._on_samples_requested)
+        self._table.value_changed.connect(self._set_draft)
+        self._table.discard_requested.connect(self._on_discard_requested)
+        self._table.led_chosen.connect(self._space.view().set_chosen)
+        self._space.led_chosen.connect(self._table.set_chosen)
+        self._space.move_requested.connect(self._on_move_requested)
+        self._watch.value_changed.connect(self._on_match_changed)
+        self._bench.changed.connect(self._on_bench_changed)
+        self._bench.live.image_shown.connect(self._on_image_shown)
+        self._bench.live.connection_changed.connect(self._on_connection_changed)
+
+        self._on_bench_changed()
+
+    @override
+    def title(self) -> str:
+        return self.tr("LEDs")
+
+    @override
+    def lead(self) -> str:
+        return self.tr(
+            "Open the file of this pen's LEDs and hold the pen before the camera."
+        )
+
+    @override
+    def is_complete(self) -> bool:
+        return not self._bench.preparation.leds_lacks() and not self._is_pending
+
+    @override
+    def why_closed(self) -> str:
+        preparation = self._bench.preparation
+        for lack in preparation.start_lacks() + preparation.camera_lacks():
+            return lack_text(lack)
+        return ""
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction(self.tr("Continue to the swing"), self._why_not())
+
+    @override
+    def entered(self) -> None:
+        self._is_shown = True
+        self._match.clear()
+        self._watch.start()
+        self._aim()
+        self._refresh_live()
+
+    @override
+    def left(self) -> None:
+        self._is_shown = False
+        self._watch.stop()
+        if self._is_pending and not self._bench.run.is_capturing:
+            self._bench.live.set_aim(self._bench.preparation.aim)
+
+    @override
+    def unsaved(self) -> str:
+        if not self._is_edited:
+            return ""
+        return self.tr("The LED table has changes that are not saved.")
+
+    @override
+    def shut_down(self) -> None:
+        self._watch.stop()
+
+    @override
+    def retranslate(self) -> None:
+        self._refresh()
+
+    @property
+    def _is_edited(self) -> bool:
+        return self._draft != self._opened
+
+    @property
+    def _is_pending(self) -> bool:
+        """Whether the table shows something else than the file in use."""
+        return self._is_edited or self._is_foreign
+
+    @property
+    def _changes(self) -> Changes:
+        if self._is_edited:
+            return Changes.EDITED
+        return Changes.FOREIGN if self._is_foreign else Changes.NONE
+
+    def _why_not(self) -> str:
+        if self._is_pending:
+            if self._check.usable is None:
+                return self.tr("Mend the LED table first: what is wrong is told above.")
+            return self.tr("Save the LED table first: the record needs its file.")
+        for lack in self._bench.preparation.leds_lacks():
+            return lack_text(lack)
+        return ""
+
+    def _on_bench_changed(self) -> None:
+        preparation = self._bench.preparation
+        file = preparation.pen_file
+        if file is not self._in_use:
+            self._in_use = file
+            changed = self._draft if self._is_edited else None
+            self._open_in_use()
+            if changed is not None:
+                self._set_draft(changed)
+        self._file.set_has_samples(preparation.source.kind is SourceKind.SIMULATED)
+        self._refresh()
+        self._aim()
+
+    def _open_in_use(self) -> None:
+        file = self._in_use
+        self._file.set_value("" if file is None else str(file.path))
+        draft = PenDraft() if file is None else PenDraft.of(file.pen)
+        self._open_draft(draft, foreign=False)
+
+    def _open_draft(self, draft: PenDraft, *, foreign: bool) -> None:
+        """Show a draft as it was opened, with nothing to complain about yet."""
+        self._opened, self._is_foreign = draft, foreign
+        self._file.ask_units("")
+        self._set_draft(draft)
+
+    def _set_draft(self, draft: PenDraft) -> None:
+        self._draft = draft
+        self._table.set_value(draft, self._changes)
+        in_use = None if self._is_pending else self._in_use
+        self._check = check_draft(draft, None if in_use is None else in_use.pen)
+        frame = self._check.frame
+        self._table.set_flaw(self._check.flaw)
+        self._file.set_problem("" if frame is None else frame.error)
+        self._refresh()
+        self._aim()
+        self.changed.emit()
+
+    def _refresh(self) -> None:
+        """Show what follows from the draft."""
+        pen = self._check.pen
+        tip = self._bench.preparation.nominal_tip
+        if tip is None and pen is not None:
+            tip = pen.nominal_tip
+        marked = frozenset(self._match.reasons())
+        self._space.set_value(self._check.frame)
+        self._space.set_picture(PenPicture(pen, tip, marked))
+        self._table.set_overriding_tip(self._overriding_tip())
+        why_not = ""
+        if not self._draft.rows:
+            why_not = self.tr("There are no LEDs yet.")
+        elif self._check.usable is None:
+            why_not = self.tr("Mend the LEDs first: a file of these cannot be used.")
+        with_more = bool(self._draft.name or any(self._draft.tip))
+        self._file.set_savable(why_not, "json" if with_more else "csv")
+
+    def _overriding_tip(self) -> str:
+        """Return the nominal tip in force where it is not that of the table."""
+        tip = self._bench.preparation.nominal_tip
+        if tip is None or self._check.pen is None:
+            return ""
+        return "  ".join(f"{each:g}" for each in tip.tolist())
+
+    # Files
+
+    def _on_path_chosen(self, path: str) -> None:
+        self._unless_lost(partial(self._open, Path(path)))
+
+    def _on_units_chosen(self, path: str, units: str) -> None:
+        self._unless_lost(partial(self._open, Path(path), units))
+
+    def _on_samples_requested(self) -> None:
+        self._unless_lost(self._use_samples)
+
+    def _on_discard_requested(self) -> None:
+        self._unless_lost(self._discard)
+
+    def _discard(self) -> None:
+        """Go back to what was opened; from what cannot be used, to the file in use."""
+        if self._is_edited:
+            self._set_draft(self._opened)
+        else:
+            self._open_in_use()
+
+    def _unless_lost(self, act: Callable[[], None]) -> None:
+        """Do what gives up the changes of the table, but ask before."""
+        if not self._is_edited:
+            act()
+            return
+        question = self.tr("The LED table has changes that are not saved.")
+        self._file.ask(question, self.tr("Discard them"), act)
+
+    def _open(self, path: Path, units: str | None = None) -> None:
+        self._file.ask_units("")
+        try:
+            file = PenFile.read(path, units)
+        except UsageError as error:
+            if units is None:
+                self._file.set_problem("")
+                self._file.ask_units(path.name)
+            else:
+                self._file.set_problem(str(error))
+        except FileError as error:
+            self._open_to_mend(path, units, str(error))
+        else:
+            self._use(file)
+
+    def _open_to_mend(self, path: Path, units: str | None, sentence: str) -> None:
+        """Show LEDs that cannot be used; those in use stay in use."""
+        try:
+            pen = read_unchecked_pen(path, units)
+        except LightpenError:
+            self._file.set_problem(sentence)
+            return
+        self._open_draft(PenDraft.of(pen), foreign=True)
+        self._file.set_value(str(path))
+        self._file.set_problem(sentence)
+
+    def _use(self, file: PenFile) -> None:
+        preparation = self._bench.preparation
+        self._bench.set_preparation(replace(preparation, pen_file=file))
+        self._open_in_use()
+        self._file.set_problem("")
+        self.changed.emit()
+
+    def _use_samples(self) -> None:
+        try:
+            self._bench.use_sample_files()
+        except FileError as error:
+            self._file.set_problem(str(error))
+        else:
+            self._open_in_use()
+
+    def _on_save_chosen(self, path: Path) -> None:
+        pen = self._check.usable
+        if pen is None:
+            return
+        try:
+            write_pen(pen, path)
+            file = PenFile.read(path)
+        except LightpenError as error:
+            self._file.set_problem(str(error))
+            return
+        self._use(file)
+        words = self.tr("The LEDs are saved as {0} and in use.")
+        self.status_changed.emit(words.format(path.name))
+
+    # The table
+
+    def _on_move_requested(self) -> None:
+        if self._check.sought is not None:
+            self._set_draft(PenDraft.of(self._check.sought))
+
+    # Live images
+
+    def _aim(self) -> None:
+        """Look for the pen of the table, also before it is saved."""
+        if not self._is_shown:
+            return
+        pen = self._check.sought
+        preparation = self._bench.preparation
+        self._watch.set_pen(preparation.camera, pen)
+        if not self._bench.run.is_capturing:
+            aimed = replace(preparation.aim, pen=pen)
+            self._bench.live.set_aim(aimed if self._is_pending else preparation.aim)
+        self._refresh_live()
+
+    def _refresh_live(self) -> None:
+        """Say what is missing to find the pen in the images."""
+        preparation = self._bench.preparation
+        if not self._bench.live.is_open:
+            why = self.tr("The camera is not open. See the step Camera.")
+        elif self._bench.live.connection is Connection.LOST:
+            why = self.tr("The camera is lost. It is looked for until it is back.")
+        elif preparation.camera is None:
+            why = self.tr("The intrinsics are missing. See the step Camera.")
+        elif self._check.sought is None:
+            why = self.tr("Enter or mend the LEDs, so that they can be looked for.")
+        else:
+            why = ""
+        self._match.set_why_unknown(why)
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        if not self._is_shown:
+            return
+        self._match.set_image(shown)
+        self._watch.add(shown.seen.spots)
+
+    def _on_connection_changed(self) -> None:
+        if self._is_shown:
+            if self._bench.live.connection is not Connection.STREAMING:
+                self._match.clear()
+            self._refresh_live()
+
+    def _on_match_changed(self, match: PenMatch | None) -> None:
+        self._match.set_value(match)
+        misfits = {} if match is None else _misfits(match)
+        self._table.set_misfits(misfits)
+        self._table.set_marked(self._match.reasons())
+        self._refresh()
+
+
+def _misfits(match: PenMatch) -> dict[int, float]:
+    """Return the misfit of each LED that is seen, px, by its number."""
+    numbered = enumerate(match.rms.tolist(), 1)
+    return {led: rms for led, rms in numbered if rms == rms}

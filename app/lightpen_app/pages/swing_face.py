@@ -1,0 +1,148 @@
+"""What is seen of a swing: instruction, dial, count, state, image and plots."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.arrays import Image
+from lightpen.session.swing_state import SwingState
+from lightpen_app.pages.swing_plots import SwingPlots
+from lightpen_app.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.leaning_dial import LeaningDial
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.state_banner import StateBanner
+
+DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
+PROGRESS_STEPS = 1000
+
+
+class SwingFace(QWidget):
+    """Shows a swing at one moment.
+
+    Parameters
+    ----------
+    buttons : sequence of QPushButton
+        Put at the upper right.
+
+    Attributes
+    ----------
+    dial : LeaningDial
+    """
+
+    def __init__(
+        self, buttons: Sequence[QPushButton], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._value = OperatorValue()
+
+        # Widgets
+        self._instruction = FittedText(TextSize.HUGE)
+        self._instruction.setMinimumHeight(7 * GRID)
+        self._hint = FittedText(TextSize.LEAD)
+        self._verdict = StateBanner(TextSize.DISPLAY)
+        self._verdict.setMinimumHeight(10 * GRID)
+        self.dial = LeaningDial()
+        self._count = FittedText(TextSize.DISPLAY)
+        self._note = text_label(TextSize.SMALL, Tone.QUIET)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+        self._banner = StateBanner(TextSize.TITLE)
+        self._image = ImageView()
+        # Its height is that of the numbers beside it; the plots have the rest.
+        self._image.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
+        self._plots = SwingPlots()
+
+        # Layout
+        head = QHBoxLayout()
+        head.setSpacing(GRID)
+        head.addWidget(self._instruction, 1)
+        for button in buttons:
+            head.addWidget(button)
+        numbers = QVBoxLayout()
+        numbers.setSpacing(GRID)
+        numbers.addWidget(self._count)
+        numbers.addWidget(self._progress)
+        numbers.addWidget(self._note)
+        numbers.addStretch(1)
+        numbers.addWidget(self._banner)
+        side = QGridLayout()
+        side.setSpacing(2 * GRID)
+        side.addLayout(numbers, 0, 0)
+        side.addWidget(self._image, 0, 1)
+        side.addWidget(self._plots, 1, 0, 1, 2)
+        side.setColumnStretch(0, 1)
+        side.setColumnStretch(1, 1)
+        side.setRowStretch(0, 1)
+        side.setRowStretch(1, 2)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setHorizontalSpacing(3 * GRID)
+        layout.setVerticalSpacing(GRID)
+        layout.addWidget(self._hint, 1, 0, 1, 2)
+        layout.addWidget(self._verdict, 2, 0, 1, 2)
+        layout.addWidget(self.dial, 3, 0)
+        layout.addLayout(side, 3, 1)
+        # The last in the order of the Tab key: Enter must press a button of these only
+        # if somebody has chosen it.
+        layout.addLayout(head, 0, 0, 1, 2)
+        layout.setRowStretch(0, 1)
+        layout.setRowStretch(3, 10)
+        layout.setColumnStretch(0, DIAL_SHARE)
+        layout.setColumnStretch(1, SIDE_SHARE)
+
+        self._verdict.hide()
+        self.retranslate()
+
+    def value(self) -> OperatorValue:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(
+        self, value: OperatorValue, note: str = "", *, is_verdict: bool = False
+    ) -> None:
+        """Show something else; a verdict has the whole width."""
+        self._value = value
+        self._instruction.set_text(value.instruction)
+        self._hint.set_text(value.hint, bold=False)
+        self._verdict.set_value(value.state)
+        self._banner.set_value(value.state)
+        self._banner.setVisible(not is_verdict)
+        self._verdict.setVisible(is_verdict)
+        self._count.set_text(value.count)
+        self._note.setText(note)
+        self._progress.setVisible(value.fraction is not None)
+        self._progress.setValue(round(PROGRESS_STEPS * (value.fraction or 0.0)))
+        if value.dial is not None:
+            self.dial.set_value(value.dial)
+
+    def set_image(self, half: Image, size: QSize, markers: Sequence[Marker]) -> None:
+        """Show a live image; see `ImageView.set_half`."""
+        self._image.set_half(half, size, markers)
+
+    def set_plots(self, state: SwingState, max_uncertainty: float) -> None:
+        """Show how the swing went so far; the limit of U in mm."""
+        self._plots.set_state(state, max_uncertainty)
+
+    def plots(self) -> SwingPlots:
+        """Return the plots."""
+        return self._plots
+
+    def retranslate(self) -> None:
+        """Set the texts anew."""
+        self._plots.retranslate()
+        self._image.set_message(self.tr("No image yet."))
+        self._progress.setAccessibleName(self.tr("Progress"))

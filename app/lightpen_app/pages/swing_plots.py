@@ -1,0 +1,76 @@
+"""The plots that grow while the pen is swung."""
+
+import numpy as np
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from lightpen.arrays import FloatArray
+from lightpen.session.seat import tip_offsets
+from lightpen.session.swing_state import SwingState
+from lightpen_app.theme import GRID
+from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+
+UM = 1000.0  # um per mm; what is told apart here is smaller than a millimetre
+TAIL = 0.75  # of the estimates; the first ones are far off
+LEAST_HEIGHT = 10 * GRID
+
+
+class SwingPlots(QWidget):
+    """Misfit and tip of each image, the estimate of the tip, and its uncertainty."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
+        self._scatter = TracePlot(
+            Axes(""), [Curve("u_um", "u"), Curve("v_um", "v"), Curve("w_um", "w")]
+        )
+        self._estimate = TracePlot(
+            Axes(""),
+            [Curve("x_um", "x"), Curve("y_um", "y"), Curve("z_um", "z")],
+            tail=TAIL,
+        )
+        self._uncertainty = TracePlot(
+            Axes(""), [Curve("expanded_uncertainty_um")], y_log=True
+        )
+
+        # Layout
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._misfit, 0, 0)
+        layout.addWidget(self._scatter, 0, 1)
+        layout.addWidget(self._estimate, 1, 0)
+        layout.addWidget(self._uncertainty, 1, 1)
+        for plot in self.plots():
+            plot.setMinimumHeight(LEAST_HEIGHT)
+
+        self.retranslate()
+
+    def plots(self) -> tuple[TracePlot, ...]:
+        """Return the plots: misfit, scatter, estimate and uncertainty."""
+        return self._misfit, self._scatter, self._estimate, self._uncertainty
+
+    def set_state(self, state: SwingState, max_uncertainty: float) -> None:
+        """Show how a swing went so far; the limit of U in mm."""
+        kept, trace = state.kept, state.trace
+        numbers = kept.numbers.astype(np.float64)
+        self._misfit.set_data(numbers, kept.misfits)
+        offsets: FloatArray = np.zeros((len(kept), 3))
+        if kept.seat is not None:
+            offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
+        self._scatter.set_data(numbers, *(UM * offsets.T))
+        counts = trace.n_images.astype(np.float64)
+        changes = trace.tips - trace.tips[-1:]
+        self._estimate.set_data(counts, *(UM * changes.T))
+        limit = UM * max_uncertainty
+        self._uncertainty.set_limit(limit, self.tr("limit {0}").format(f"{limit:g}"))
+        finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
+        self._uncertainty.set_data(counts, UM * finite)
+
+    def retranslate(self) -> None:
+        """Set the titles anew."""
+        self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
+        self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
+        self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
+        self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))

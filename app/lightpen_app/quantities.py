@@ -1,0 +1,22 @@
+"""Numbers as they are shown: with as many decimals as their uncertainty warrants."""
+
+import math
+
+MAX_DECIMALS = 6
+DIGITS = 2  # of an uncertainty, as the GUM recommends
+
+
+def decimals_for(uncertainty: float) -> int:
+    """Return the decimals that show an uncertainty by two significant digits."""
+    if not (math.isfinite(uncertainty) and uncertainty > 0):
+        return MAX_DECIMALS
+    decimals = DIGITS - 1 - math.floor(math.log10(uncertainty))
+    if round(uncertainty, decimals) >= 10.0 ** (DIGITS - decimals):  # 0.0998 -> 0.10
+        decimals -= 1
+    return min(max(decimals, 0), MAX_DECIMALS)
+
+
+def number_text(value: float, decimals: int) -> str:
+    """Return a number with so many decimals, without a sign before zero."""
+    text = f"{value:.{decimals}f}"
+    return text.lstrip("-") if float(text) == 0 else text

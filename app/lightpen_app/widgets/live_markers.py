@@ -1,0 +1,69 @@
+"""The rings that tell what a live image shows."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.session.live import LiveImage
+from lightpen_app.theme import Tone
+from lightpen_app.widgets.image_view import Marker
+
+RING = 1.4  # times the radius of its spot
+CLEARANCE = 2.0  # image px between spot and ring, at least
+
+
+def live_markers(seen: LiveImage) -> tuple[Marker, ...]:
+    """Return a ring about each spot, with its number where it is an LED.
+
+    Spots that are no LED are dashed; without intrinsics and pen file nobody can tell,
+    and all rings are plain.
+    """
+    spots = seen.spots
+    numbers = led_numbers(seen)
+    radii = RING * np.sqrt(spots.areas / np.pi) + CLEARANCE
+    angles = _free_angles(spots.centers)
+    other = Tone.ACTIVE if seen.sighting is None else Tone.WARN
+    return tuple(
+        Marker(
+            *(x, y, radius, numbers.get(i, "")),
+            tone=Tone.GOOD if i in numbers else other,
+            label_angle=angle,
+        )
+        for i, ((x, y), radius, angle) in enumerate(
+            zip(spots.centers.tolist(), radii.tolist(), angles.tolist(), strict=True)
+        )
+    )
+
+
+def mask_markers(mask: FloatArray) -> Iterator[Marker]:
+    """Yield a crossed circle for each row x, y, radius of an (M, 3) mask, px."""
+    for x, y, radius in mask.tolist():
+        yield Marker(x, y, radius, tone=Tone.QUIET, crossed=True)
+
+
+def stray_markers(circles: FloatArray, label: str) -> Iterator[Marker]:
+    """Yield a ring for each row x, y, radius of (M, 3) stray lights, px."""
+    for x, y, radius in circles.tolist():
+        yield Marker(x, y, RING * radius, label, Tone.BAD, label_angle=0.0)
+
+
+def _free_angles(places: FloatArray) -> FloatArray:
+    """Return in which direction most room is beside each of (N, 2) places, rad."""
+    offsets = places[:, None] - places[None]
+    distances = np.linalg.norm(offsets, axis=-1)
+    np.fill_diagonal(distances, np.inf)
+    push = (offsets / np.maximum(distances, 1.0)[..., None] ** 3).sum(axis=1)
+    angles: FloatArray = np.arctan2(push[:, 1], push[:, 0])
+    return angles
+
+
+def led_numbers(seen: LiveImage) -> dict[int, str]:
+    """Return the number of the LED of each spot that is one."""
+    if seen.sighting is None or seen.sighting.labels is None:
+        return {}
+    spot_of_led = seen.sighting.labels.spot
+    labelled: BoolArray = spot_of_led >= 0
+    return {
+        int(spot_of_led[led]): str(led + 1) for led in np.flatnonzero(labelled).tolist()
+    }

@@ -1,0 +1,125 @@
+"""A field for the path of a file or a folder, typed or picked in a dialog."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QSizePolicy,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen_app.theme import GRID, Tone, set_tone
+
+QUOTES = "\"'"
+ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+
+
+class EnterEdit(QLineEdit):
+    """A line whose Enter key ends the editing and does nothing else.
+
+    Where nothing was edited, Enter is left to the window.
+    """
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        was_edited = self.isModified()
+        super().keyPressEvent(event)
+        if event.key() in ENTER_KEYS:
+            event.setAccepted(was_edited)
+            self.setModified(False)
+
+
+class PathField(QWidget):
+    """A path that is taken over when Enter is pressed or the field is left.
+
+    Signals
+    -------
+    value_changed(str)
+        Another path was given, or the same one again by Enter.
+    """
+
+    value_changed = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = ""
+
+        # Widgets
+        self._edit = EnterEdit()
+        self._edit.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFocusProxy(self._edit)
+
+        # Layout
+        self._layout = QHBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(GRID)
+        self._layout.addWidget(self._edit, 1)
+
+        # Connections
+        self._edit.returnPressed.connect(self._on_return_pressed)
+        self._edit.editingFinished.connect(self._on_editing_finished)
+
+    def value(self) -> str:
+        """Return the path that was given last."""
+        return self._value
+
+    def set_value(self, value: str) -> None:
+        """Show another path."""
+        self._value = value
+        self._edit.setText(value)
+        self._edit.setToolTip(value)
+
+    def edit(self) -> QLineEdit:
+        """Return the line, for the label that goes with it."""
+        return self._edit
+
+    def set_faulty(self, faulty: bool) -> None:
+        """Mark the path as one that leads to nothing."""
+        set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
+
+    def add_button(self, button: QPushButton) -> None:
+        """Put a button beside the line."""
+        self._layout.addWidget(button)
+
+    def pick(
+        self, mode: QFileDialog.FileMode, title: str, name_filter: str = ""
+    ) -> None:
+        """Let the user pick a file or a folder in a dialog, and take it over."""
+        dialog = QFileDialog(self, title)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(mode)
+        if mode is QFileDialog.FileMode.Directory:
+            dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        elif name_filter:
+            dialog.setNameFilter(name_filter)
+        present = Path(self._value)
+        if present.parent.is_dir():
+            dialog.setDirectory(str(present if present.is_dir() else present.parent))
+        dialog.fileSelected.connect(self.take)
+        dialog.open()
+
+    def take(self, path: str) -> None:
+        """Take over a path as if it were typed."""
+        self.set_value(path)
+        self.value_changed.emit(path)
+
+    def _typed(self) -> str:
+        """Return what was typed, without the quotes that a desktop copies along."""
+        text = self._edit.text().strip()
+        for quote in QUOTES:
+            if len(text) > 1 and text.startswith(quote) and text.endswith(quote):
+                text = text[1:-1]
+        return str(Path(text).expanduser()) if text.startswith("~") else text
+
+    def _on_return_pressed(self) -> None:
+        self.take(self._typed())
+
+    def _on_editing_finished(self) -> None:
+        if self._typed() != self._value:
+            self.take(self._typed())

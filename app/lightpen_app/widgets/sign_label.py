@@ -1,0 +1,97 @@
+"""A sign and the words that go with it."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen_app.theme import GRID, TextSize, Tone, colors_of, set_tone, text_label
+from lightpen_app.widgets.signs import Sign, draw_sign
+
+SIDE = 2 * GRID
+
+
+@dataclass(frozen=True)
+class Remark:
+    """What is found, or is the matter.
+
+    Attributes
+    ----------
+    text : str
+        Empty for nothing to remark.
+    sign : Sign
+    tone : Tone
+    """
+
+    text: str = ""
+    sign: Sign = Sign.NONE
+    tone: Tone = Tone.PLAIN
+
+
+class SignLabel(QWidget):
+    """Shows a remark; hidden while there is none.
+
+    Parameters
+    ----------
+    wraps : bool
+        Whether its words may take more than one line.
+    """
+
+    def __init__(self, *, wraps: bool = True, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = Remark()
+
+        # Widgets
+        self._mark = _Mark()
+        self._words = text_label(TextSize.BODY)
+        self._words.setWordWrap(wraps)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._mark, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self._words, 1)
+
+        self.hide()
+
+    def value(self) -> Remark:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: Remark) -> None:
+        """Show another remark."""
+        if value == self._value:
+            return
+        self._value = value
+        self._mark.set_value(value)
+        self._words.setText(value.text)
+        set_tone(self._words, value.tone)
+        self.setAccessibleName(value.text)
+        self.setVisible(bool(value.text))
+
+
+class _Mark(QWidget):
+    """The sign alone, as high as the first line of the words."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._value = Remark()
+        fixed = QSizePolicy.Policy.Fixed
+        self.setSizePolicy(fixed, fixed)
+
+    def set_value(self, value: Remark) -> None:
+        self._value = value
+        self.update()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(SIDE, self.fontMetrics().height())
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        color = colors_of(self.palette()).tone(self._value.tone)
+        painter = QPainter(self)
+        draw_sign(painter, QRectF(self.rect()), self._value.sign, color)

@@ -1,0 +1,29 @@
+"""Widgets whose texts follow the language that is chosen."""
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+if TYPE_CHECKING:
+    _Base = QWidget
+else:  # a class of Qt's cannot be a base twice
+    _Base = object
+
+
+class Translated(_Base):
+    """Put before the base of a widget, it sets the texts anew at a change of language.
+
+    The widget itself does so once in its constructor.
+    """
+
+    def _retranslate(self) -> None:
+        """Set every text."""
+        raise NotImplementedError
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._retranslate()
