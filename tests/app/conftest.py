@@ -1,16 +1,49 @@
 """Fixtures of the application's tests: its own look, whatever the machine has."""
 
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from threading import Event
 
 import pytest
-from PySide6.QtCore import QLocale
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QEvent, QLocale, QPoint, Qt, QTimer
+from PySide6.QtGui import QWindow
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QGroupBox,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QMessageBox,
+    QScrollArea,
+    QTabBar,
+    QTableView,
+    QTextEdit,
+    QWidget,
+)
+from pytestqt.exceptions import TimeoutError as WaitedInVain
+from pytestqt.qtbot import QtBot
 
+from lightpen.cameras.hand import Operator
+from lightpen.session.preparation import Names
+from lightpen.session.sources import Surroundings
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
+from lightpen_app.application import Wizard
+from lightpen_app.bench import Bench
 from lightpen_app.languages import LanguageSwitch
+from lightpen_app.services import Services
 from lightpen_app.settings import Settings
+from lightpen_app.sounds import Silence
 from lightpen_app.theme import DARK, apply_theme, load_fonts, style_sheet
+from lightpen_app.wizard_pages import make_pages
 
 # No windows on the desk of whoever runs the tests; set it to see them.
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -39,3 +72,380 @@ def look(dressed: QApplication) -> Iterator[None]:
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     return Settings(tmp_path / "config" / "lightpen.ini")
+
+
+class HastyClock:
+    """The clock of a machine on which all goes `SPEED` times as fast."""
+
+    SPEED = 4
+    is_real = True
+
+    def now_ns(self) -> int:
+        return self.SPEED * time.monotonic_ns()
+
+    def wait(self, seconds: float, wake: Event | None = None) -> bool:
+        if wake is not None:
+            return wake.wait(seconds / self.SPEED)
+        time.sleep(seconds / self.SPEED)
+        return False
+
+
+@pytest.fixture(scope="session")
+def small_scene() -> Scene:
+    """The paper's scene seen with a quarter of the pixels."""
+    return Scene(camera=paper_camera(binning=2))
+
+
+@pytest.fixture(scope="session")
+def around(small_scene: Scene) -> Surroundings:
+    """Return the small scene, in which all goes four times as fast as usual."""
+    return Surroundings(small_scene, HastyClock())
+
+
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+
+
+@pytest.fixture
+def bench(settings: Settings, tmp_path: Path, around: Surroundings) -> Iterator[Bench]:
+    """A bench with names and the simulated pen's files; its camera is not open yet.
+
+    `bench.open_camera()` opens it; images then come four times as fast as usual.
+    """
+    bench = Bench(settings, tmp_path / "data", around)
+    bench.set_preparation(replace(bench.preparation, names=NAMES))
+    bench.use_sample_files()
+    yield bench
+    bench.shut_down()
+
+
+@pytest.fixture
+def services(bench: Bench) -> Services:
+    return Services(bench, Silence())
+
+
+# The whole wizard, used as an operator uses it
+
+PATIENCE_MS = 40_000  # on a machine that does other things besides
+LONGEST_ROUND = 200  # presses of the Tab key
+LEFT = Qt.MouseButton.LeftButton
+NONE = Qt.KeyboardModifier.NoModifier
+
+
+class Walker:
+    """Somebody at the window: reads what is shown, presses keys, and clicks.
+
+    Controls are found by the words on them or by their accessible names. Keys go to the
+    control that has the focus, clicks to the window, which hands them on.
+    """
+
+    def __init__(self, qtbot: QtBot, wizard: Wizard) -> None:
+        self._qtbot = qtbot
+        self.wizard = wizard
+        self.bench = wizard.bench
+        self.window = wizard.window
+        self.n_inputs = 0
+        self.window.resize(1280, 800)
+        self.window.show()
+        self.take_window()
+        self.bench.start()
+
+    def take_window(self) -> None:
+        """Turn to the window, as its user does who has closed another one."""
+        self.window.activateWindow()
+        self.until(self.window.isActiveWindow)
+
+    # Reads
+
+    def texts(self, root: QWidget | None = None) -> list[str]:
+        """All that a window says, to the eye or to a screen reader."""
+        return [text for each in self.seen(root) for text in texts_of(each) if text]
+
+    def seen(self, root: QWidget | None = None) -> list[QWidget]:
+        """The visible widgets of a window; that of the wizard unless given."""
+        root = root or self.window
+        return [w for w in (root, *root.findChildren(QWidget)) if w.isVisible()]
+
+    def says(self, text: str) -> bool:
+        """Whether a label, a button or a banner says this and no more."""
+        return text in self.texts()
+
+    def tells(self, words: str) -> bool:
+        """Whether this is part of what is said anywhere."""
+        return any(words in text for text in self.texts())
+
+    def title(self) -> str:
+        return self.window.page().title()
+
+    def steps(self) -> dict[str, str]:
+        """How far each step is."""
+        names = (w.accessibleName() for w in self.seen() if _is_step(w))
+        return dict(name.rsplit(", ", 1) for name in names)
+
+    def main_button(self) -> QAbstractButton:
+        button = self.window.findChild(QAbstractButton, "main_button")
+        assert isinstance(button, QAbstractButton)
+        return button
+
+    def names(self, control: QWidget) -> set[str]:
+        """The words by which a control is found."""
+        return set(texts_of(control)) - {""}
+
+    def control(self, name: str, root: QWidget | None = None) -> QWidget:
+        """The visible control of this name."""
+        found = [w for w in self.seen(root) if _is_control(w) and name in _names(w)]
+        assert len(found) == 1, (name, found)
+        return found[0]
+
+    def offers(self, name: str) -> bool:
+        """Whether there is such a control, and it can be used."""
+        controls = (w for w in self.seen() if _is_control(w) and name in _names(w))
+        return any(control.isEnabled() for control in controls)
+
+    def until(self, happened: Callable[[], bool]) -> None:
+        self._qtbot.waitUntil(happened, timeout=PATIENCE_MS)
+
+    def until_says(self, text: str) -> None:
+        self._until_said(text, self.says)
+
+    def until_tells(self, words: str) -> None:
+        self._until_said(words, self.tells)
+
+    def until_shows(self, title: str) -> None:
+        self.until(lambda: self.title() == title)
+
+    # Presses keys
+
+    def press(self, key: Qt.Key, modifiers: Qt.KeyboardModifier = NONE) -> None:
+        self.n_inputs += 1
+        QTest.keyClick(self._front(), key, modifiers)
+
+    def type(self, text: str) -> None:
+        for character in text:
+            self.n_inputs += 1
+            QTest.keyClick(self._front(), ord(character))
+
+    def tab_to(self, name: str) -> None:
+        """Press Tab until the control of this name has the focus."""
+        wanted = self.control(name)
+        for _ in range(LONGEST_ROUND):
+            now = QApplication.focusWidget()
+            if now is wanted or (now is not None and wanted.focusProxy() is now):
+                return
+            self.press(Qt.Key.Key_Tab)
+        raise AssertionError(f"The Tab key does not lead to {name!r}.")
+
+    def tab_round(self) -> list[QWidget]:
+        """The controls to which the Tab key leads, until it comes to the first."""
+        visited: list[QWidget] = []
+        for _ in range(LONGEST_ROUND):
+            self.press(Qt.Key.Key_Tab)
+            now = QApplication.focusWidget()
+            assert now is not None
+            if visited and now is visited[0]:
+                return visited
+            visited.append(now)
+        raise AssertionError("The Tab key does not come round.")
+
+    def enter(self, name: str, text: str) -> None:
+        """Go to a field by the Tab key and type, instead of what is there."""
+        self.tab_to(name)
+        self.press(Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        self.type(text)
+
+    # Clicks
+
+    def click(self, name: str) -> None:
+        self.click_on(self.control(name))
+
+    def click_anywhere(self, x: int, y: int) -> None:
+        """Click a point of the window."""
+        self._click_at(self.window.windowHandle(), QPoint(x, y))
+
+    def click_on(self, control: QWidget) -> None:
+        """Click what can be seen of a control; scroll to it if need be."""
+        assert control.isEnabled(), (control, control.toolTip())
+        if control.visibleRegion().isEmpty():
+            _scroll_to(control)
+        place = control.visibleRegion().boundingRect().center()
+        if isinstance(control, QCheckBox):
+            place.setX(10)
+        window = control.window()
+        self._click_at(window.windowHandle(), control.mapTo(window, place))
+
+    def click_step(self, title: str) -> None:
+        """Click a step of the list."""
+        (step,) = (
+            widget
+            for widget in self.seen()
+            if _is_step(widget) and widget.accessibleName().startswith(f"{title}, ")
+        )
+        self.click_on(step)
+
+    def click_into(self, name: str, text: str) -> None:
+        """Click into a field and type, instead of what is there."""
+        self.click(name)
+        self.press(Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        self.type(text)
+
+    def choose(self, *names: str) -> None:
+        """Click entries of the menu that is open, the last of them in submenus."""
+        for name in names:
+            menu = QApplication.activePopupWidget()
+            assert isinstance(menu, QMenu)
+            (entry,) = (a for a in menu.actions() if a.text().replace("&", "") == name)
+            place = menu.actionGeometry(entry).center()
+            self._click_at(menu.windowHandle(), place)
+
+    @contextmanager
+    def answering(
+        self, role: QMessageBox.ButtonRole = QMessageBox.ButtonRole.AcceptRole
+    ) -> Iterator[list[str]]:
+        """Answer the questions that stop the window meanwhile; gives what they are."""
+        asked: list[str] = []
+
+        def answer() -> None:
+            box = QApplication.activeModalWidget()
+            if isinstance(box, QMessageBox) and box.isVisible():
+                asked.append(box.text())
+                (button,) = (b for b in box.buttons() if box.buttonRole(b) == role)
+                QTest.mouseClick(button, LEFT)
+
+        timer = QTimer(interval=20)
+        timer.timeout.connect(answer)
+        timer.start()
+        try:
+            yield asked
+        finally:
+            timer.stop()
+
+    # Takes the simulated pen
+
+    @property
+    def operator(self) -> Operator:
+        """Who holds the simulated pen."""
+        operator = self.bench.live.operator
+        assert operator is not None
+        return operator
+
+    def swing(self) -> None:
+        """Seat the tip and follow the arrow, as a person at the cone does."""
+        self.operator.seat()
+        self.bench.live.set_following(True)
+
+    def close(self) -> None:
+        """Close the window, whatever it asks."""
+        with self.answering():
+            self.window.close()
+        others = self.window.operator_view(), self.window.help_window()
+        for each in (*others, self.window, self.wizard):
+            each.deleteLater()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+    def _until_said(self, text: str, is_said: Callable[[str], bool]) -> None:
+        try:
+            self.until(lambda: is_said(text))
+        except WaitedInVain as error:
+            raise AssertionError(f"{text!r} is not said: {self.texts()}") from error
+
+    def _front(self) -> QWidget:
+        """Who gets the keys: a menu, or the control that has the focus."""
+        return (
+            QApplication.activePopupWidget()
+            or QApplication.focusWidget()
+            or QApplication.activeWindow()
+            or self.window
+        )
+
+    def _click_at(self, window: QWindow, place: QPoint) -> None:
+        self.n_inputs += 1
+        QTest.mouseClick(window, LEFT, NONE, place)
+
+
+def texts_of(widget: QWidget) -> Iterator[str]:
+    """Yield what a widget says, to the eye or to a screen reader."""
+    match widget:
+        case QLabel() | QAbstractButton():
+            yield _plain(widget.text())
+        case QLineEdit():
+            yield widget.text() or widget.placeholderText()
+        case QComboBox():
+            yield widget.currentText()
+        case QGroupBox():
+            yield widget.title()
+        case QTabBar():
+            yield from (widget.tabText(index) for index in range(widget.count()))
+        case QTextEdit():
+            yield widget.toPlainText()
+        case QTableView():
+            yield from _cells_of(widget)
+    yield widget.accessibleName()
+    yield widget.accessibleDescription()
+
+
+def _cells_of(table: QTableView) -> Iterator[str]:
+    model, sideways = table.model(), Qt.Orientation.Horizontal
+    for column in range(model.columnCount()):
+        if table.isColumnHidden(column):
+            continue
+        yield str(model.headerData(column, sideways) or "")
+        for row in range(model.rowCount()):
+            yield str(model.index(row, column).data() or "")
+
+
+def _plain(text: str) -> str:
+    """The words of a label without the mark of the letter that goes with Alt."""
+    return text.replace("&", "")
+
+
+def _names(control: QWidget) -> set[str]:
+    text = control.text() if isinstance(control, QAbstractButton) else ""
+    return {control.accessibleName(), _plain(text)}
+
+
+def _is_control(widget: QWidget) -> bool:
+    if isinstance(widget, QAbstractButton):
+        return True
+    return widget.focusPolicy() is not Qt.FocusPolicy.NoFocus
+
+
+def _is_step(widget: QWidget) -> bool:
+    return type(widget).__name__ == "StepButton"
+
+
+def _scroll_to(control: QWidget) -> None:
+    parent = control.parentWidget()
+    while parent is not None and not isinstance(parent, QScrollArea):
+        parent = parent.parentWidget()
+    assert isinstance(parent, QScrollArea), control
+    parent.ensureWidgetVisible(control)
+
+
+OpenWizard = Callable[..., Walker]
+
+
+@pytest.fixture
+def open_wizard(
+    qtbot: QtBot,
+    dressed: QApplication,
+    tmp_path: Path,
+    settings: Settings,
+    around: Surroundings,
+) -> Iterator[OpenWizard]:
+    """Return a function that starts the program, always on the same folder."""
+    opened: list[Walker] = []
+
+    def start(source: Surroundings = around) -> Walker:
+        folder = tmp_path / "data"
+        wizard = Wizard(dressed, make_pages, settings, folder, source)
+        opened.append(Walker(qtbot, wizard))
+        return opened[-1]
+
+    yield start
+    while opened:
+        opened.pop().close()
+
+
+@pytest.fixture
+def walker(open_wizard: OpenWizard) -> Walker:
+    """The program at its first start."""
+    return open_wizard()

@@ -8,9 +8,10 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen_app.application import Services, Wizard
+from lightpen_app.application import Wizard
 from lightpen_app.languages import Language
 from lightpen_app.pages.page import MainAction, Page
+from lightpen_app.services import Services
 from lightpen_app.settings import Preferences, Settings
 from lightpen_app.theme import LIGHT, Appearance, colors_of
 

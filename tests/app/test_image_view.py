@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt, QThreadPool
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from lightpen_app.mailbox import Mailbox
 from lightpen_app.theme import DARK, Tone
 from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker, pooled
-from lightpen_app.widgets.mailbox import Mailbox
 
 WIDTH, HEIGHT = 2448, 2048
 
@@ -86,6 +85,34 @@ def test_rings_of_doubt_are_dashed_besides_their_colour(view: ImageView) -> None
     assert 0.4 < dashed / whole < 0.8
 
 
+def test_what_is_left_out_is_crossed(view: ImageView) -> None:
+    marker = Marker(1200, 1000, 200, tone=Tone.QUIET, crossed=True)
+    view.set_image(dark_image(), [marker])
+
+    shown = view.grab().toImage()
+    for x in (1100, 1200, 1300):
+        on_stroke = shown.pixelColor(view.place_of(x, x - 200).toPoint())
+        assert on_stroke.lightness() > 80
+
+
+@pytest.mark.parametrize(
+    ("angle", "dx", "dy"), [(0.0, 1, 0), (np.pi / 2, 0, 1), (np.pi, -1, 0)]
+)
+def test_a_label_stands_where_it_is_told(
+    view: ImageView, angle: float, dx: int, dy: int
+) -> None:
+    view.set_image(dark_image(), [Marker(1200, 1000, 1, "8", label_angle=angle)])
+    drawn = view.grab().toImage()
+    middle = view.place_of(1200, 1000).toPoint() + QPoint(14 * dx, 14 * dy)
+    lit = [
+        drawn.pixelColor(middle + QPoint(x, y)).lightness() > 60
+        for x in range(-3, 4)
+        for y in range(-3, 4)
+    ]
+
+    assert sum(lit) > 10
+
+
 def test_pixels_and_places_agree_at_every_enlargement(view: ImageView) -> None:
     view.set_image(dark_image())
     for zoom in (1.0, 3.0, MAX_ZOOM):
@@ -149,31 +176,6 @@ def test_without_an_image_it_says_why(view: ImageView) -> None:
         for y in range(grabbed.height() // 2 - 12, grabbed.height() // 2 + 12)
     }
     assert DARK.muted in colors
-
-
-def test_posted_images_are_shown_newest_first_and_only_once(
-    view: ImageView, qtbot: QtBot
-) -> None:
-    def produce() -> None:
-        for number in range(50):
-            view.post(dark_image(), [Marker(number, 0)])
-
-    QThreadPool.globalInstance().start(produce)
-    assert QThreadPool.globalInstance().waitForDone(10_000)
-
-    QApplication.processEvents()
-
-    assert view.markers() == (Marker(49, 0),)
-
-
-def test_a_posted_image_may_be_reused_at_once(view: ImageView) -> None:
-    image = dark_image()
-    image[:] = 200
-    view.post(image)
-    image[:] = 0
-    QApplication.processEvents()
-
-    assert view.grab().toImage().pixelColor(100, 100).lightness() == 200
 
 
 def test_a_mailbox_holds_the_newest_and_rings_once(qtbot: QtBot) -> None:

@@ -74,6 +74,33 @@ def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
         QApplication.processEvents()
 
 
+def test_a_cancelled_job_can_be_waited_for(qtbot: QtBot) -> None:
+    job = Job(endless)
+    with qtbot.waitSignal(job.progressed):
+        job.start()
+    assert not job.is_over
+    job.cancel()
+    assert job.wait(2.0)
+
+    assert job.is_over
+
+
+def test_waiting_for_a_job_that_does_not_end_has_an_end(qtbot: QtBot) -> None:
+    may_end = Event()
+    job = Job(lambda report: may_end.wait(10))
+    job.start()
+    assert not job.wait(0.05)
+    may_end.set()
+
+    assert job.wait(2.0)
+
+
+def test_a_job_that_ended_deletes_itself(qtbot: QtBot) -> None:
+    job = Job(lambda report: 42)
+    with qtbot.waitSignal(job.destroyed):
+        job.start()
+
+
 def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
     qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -82,9 +109,12 @@ def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
         "sys.excepthook", lambda kind, error, trace: caught.append(error)
     )
     job = Job(lambda report: 1 / 0)
+    seen: list[bool] = []
+    job.crashed.connect(lambda: seen.append(QThread.currentThread().isMainThread()))
 
-    with qtbot.waitSignal(job.ended):
+    with qtbot.assertNotEmitted(job.succeeded), qtbot.waitSignal(job.ended):
         job.start()
 
+    assert seen == [True]
     assert QThreadPool.globalInstance().waitForDone(2000)
     assert isinstance(caught[0], ZeroDivisionError)

@@ -35,6 +35,7 @@ class Leaf(Page):
         self.name = name
         self.closed_because = ""
         self.why_not = ""
+        self.at_screen = False
         self.hands_free = False
         self.question = ""
         self.log: list[str] = []
@@ -58,7 +59,7 @@ class Leaf(Page):
 
     @override
     def main_action(self) -> MainAction:
-        return MainAction(f"Leave {self.name}", self.why_not)
+        return MainAction(f"Leave {self.name}", self.why_not, self.at_screen)
 
     @override
     def is_hands_free(self) -> bool:
@@ -204,6 +205,29 @@ def test_a_main_action_that_is_not_possible_says_why(
     assert "Choose the pen first." in shell.window.words()
 
 
+def test_a_page_leads_to_any_step_by_its_key(shell: Shell) -> None:
+    shell.pages[0].step_requested.emit("swing")
+
+    assert shell.shown == "Swing"
+    shell.pages[2].step_requested.emit("start")
+    assert shell.shown == "Start"
+
+
+def test_a_closed_step_that_a_page_leads_to_says_why(shell: Shell) -> None:
+    shell.pages[2].closed_because = "Needs a camera."
+
+    shell.pages[0].step_requested.emit("swing")
+
+    assert shell.shown == "Start"
+    assert "Needs a camera." in shell.window.words()
+
+
+def test_the_window_opens_with_the_focus_on_the_first_control_of_the_page(
+    shell: Shell,
+) -> None:
+    assert QApplication.focusWidget() is shell.pages[0].field
+
+
 def test_a_closed_step_says_why_in_the_list_and_when_it_is_asked_for(
     shell: Shell,
 ) -> None:
@@ -329,6 +353,32 @@ def test_the_operator_view_takes_the_keys_of_a_remote(
     assert shell.pages[0].log == ["entered", "pause", "left", "entered"]
 
 
+def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].at_screen = True
+    view = shell.window.operator_view()
+    QTest.keyClick(shell.window, Key.Key_F11)
+    QTest.keyClick(view, Key.Key_PageDown)
+    QTest.keyClick(view, Key.Key_Return)
+    QTest.keyClick(view, Key.Key_F11)
+    QTest.keyClick(shell.window, Key.Key_PageDown)
+    assert shell.shown == "Start"
+    assert "Press this button at the screen." in shell.window.words()
+
+    QTest.keyClick(shell.window, Key.Key_Return)
+
+    assert shell.shown == "Camera"
+
+
+def test_f11_works_while_the_help_is_in_front(shell: Shell) -> None:
+    QTest.keyClick(shell.window, Key.Key_F1)
+
+    QTest.keyClick(shell.window.help_window(), Key.Key_F11)
+
+    assert shell.window.operator_view().isVisible()
+
+
 def test_f11_in_the_operator_view_leaves_it(shell: Shell, qtbot: QtBot) -> None:
     view = shell.window.operator_view()
     QTest.keyClick(shell.window, Key.Key_F11)
@@ -414,6 +464,15 @@ def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
 
 
+def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:
+    shell.pages[0].notice_raised.emit("The file holds no LED.")
+    shell.window.show_notice("The disk is full.")
+
+    shell.pages[0].notice_raised.emit("")
+
+    assert "The disk is full." in shell.window.words()
+
+
 def test_closing_leaves_the_page_and_stops_every_page(shell: Shell) -> None:
     shell.window.operator_view().show()
 
@@ -446,6 +505,16 @@ def test_closing_asks_where_something_would_be_lost(
     assert asked == ["The LED table has changes that are not saved."]
     assert ("shut down" in shell.pages[1].log) is closes
     shell.pages[1].question = ""
+
+
+def test_the_window_is_gone_before_it_waits_for_what_is_under_way(
+    shell: Shell,
+) -> None:
+    seen: list[bool] = []
+    shell.window.closing.connect(lambda: seen.append(shell.window.isVisible()))
+    shell.window.close()
+
+    assert seen == [False]
 
 
 def test_the_window_comes_back_where_it_was(

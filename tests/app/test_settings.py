@@ -25,7 +25,6 @@ PREFERENCES = Preferences(
     appearance=Appearance.LIGHT,
     muted=True,
     distance_m=4.0,
-    station="Hall 3/2",
 )
 
 
@@ -56,6 +55,24 @@ def test_a_new_station_begins_with_the_simulated_pen(settings: Settings) -> None
     assert settings.station("new").source == "simulated"
 
 
+@pytest.mark.parametrize(
+    "name",
+    ["Hall 3/2", "a, b", "General", "%", "王 Ä", "[x]", "a=b;c", "w" * 200, "@x", "5"],
+)
+def test_the_last_station_survives_whatever_its_name(
+    settings: Settings, name: str
+) -> None:
+    assert settings.last_station() == ""
+    settings.set_station(name, Station(operator=name))
+    settings.set_last_station(name)
+
+    again = reopened(settings)
+
+    assert again.last_station() == name
+    assert again.stations() == (name,)
+    assert again.station(name).operator == name
+
+
 def test_a_station_needs_a_name(settings: Settings) -> None:
     with pytest.raises(ValueError, match="must not be empty"):
         settings.set_station("", Station())
@@ -69,14 +86,14 @@ def test_a_value_that_makes_no_sense_gives_the_default(
     settings: Settings, text: str
 ) -> None:
     settings.file.parent.mkdir()
-    settings.file.write_text(f"[preferences]\n{text}\nstation=Hall 3\n")
+    settings.file.write_text(f"[preferences]\n{text}\nappearance=dark\n")
 
     preferences = Settings(settings.file).preferences()
 
     assert preferences.distance_m == 3.0
     assert preferences.language in Language
     assert not preferences.muted
-    assert preferences.station == "Hall 3"
+    assert preferences.appearance is Appearance.DARK
 
 
 def test_a_file_of_rubbish_gives_the_defaults(settings: Settings) -> None:

@@ -5,8 +5,9 @@ from PySide6.QtCore import QLocale, QRectF
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
+from lightpen.inspection import Exposure
 from lightpen_app.theme import DARK, TextSize, Tone
-from lightpen_app.widgets.exposure_bar import Exposure, ExposureBar
+from lightpen_app.widgets.exposure_bar import ExposureBar
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.notice_bar import NoticeBar
 from lightpen_app.widgets.number_field import NumberField
@@ -26,8 +27,8 @@ from lightpen_app.widgets.state_banner import State, StateBanner
     [
         ((), "No LED is seen"),
         ((0.5, 0.7, 0.9), "Good: 3 LEDs"),
-        ((0.5, 0.2, 0.1), "Too dark: 2 of 3 LEDs. Lengthen the exposure."),
-        ((0.1, 1.0, 0.5), "Saturated: 1 of 3 LEDs. Shorten the exposure."),
+        ((0.5, 0.2, 0.1), "Too dark: 2 of 3 LEDs"),
+        ((0.1, 1.0, 0.5), "Saturated: 1 of 3 LEDs"),
     ],
 )
 def test_the_exposure_is_judged_in_words(
@@ -40,6 +41,15 @@ def test_the_exposure_is_judged_in_words(
 
     assert bar.verdict() == words
     assert bar.accessibleDescription() == words
+
+
+def test_what_may_be_no_led_is_not_called_one(qtbot: QtBot) -> None:
+    bar = ExposureBar()
+    qtbot.addWidget(bar)
+
+    bar.set_value(Exposure((0.5, 0.2), are_leds=False))
+
+    assert bar.verdict() == "Too dark: 1 of 2 spots"
 
 
 def test_each_led_has_a_tick_on_the_exposure_bar(qtbot: QtBot) -> None:

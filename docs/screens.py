@@ -1,0 +1,311 @@
+"""Draw every step of the wizard: ``python docs/screens.py``.
+
+Writes docs/screens/<step>-<language>-<appearance>-<width>x<height>.png, the pictures
+of README.md. The tests draw them again and compare, so run this after a wanted change
+of the look, and look at each. What the wizard shows in them is simulated, with fixed
+seeds and without a running camera, so that they come out the same each time.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import chdir, contextmanager
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event
+from typing import NoReturn
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+import numpy as np
+from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
+from typing_extensions import override
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.hand import Operator
+from lightpen.cameras.protocol import Frame, FrameTimeout, sealed
+from lightpen.cameras.protocol import Settings as CameraSettings
+from lightpen.cameras.simulated import SimulatedCamera
+from lightpen.session.following import Follower
+from lightpen.session.live import LiveImage
+from lightpen.session.preparation import Names, Preparation
+from lightpen.session.recording import RecordWriter
+from lightpen.session.results import Result, store_result
+from lightpen.session.sighting import look, sight_centers
+from lightpen.session.sources import Surroundings
+from lightpen.session.swing import feed
+from lightpen.session.swing_state import SwingSetup, SwingState, start_swing
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.shots import plan_scene, render_shot
+from lightpen.simulator.swings import simulate_centers
+from lightpen_app.application import Wizard, make_application
+from lightpen_app.languages import Language
+from lightpen_app.live_view import Shown
+from lightpen_app.settings import Preferences, Settings
+from lightpen_app.theme import GRID, Appearance
+from lightpen_app.widgets.image_view import pooled
+from lightpen_app.wizard_pages import make_pages
+
+FOLDER = Path(__file__).resolve().parent / "screens"
+DATA = Path("lightpen")  # below the present folder
+STEPS = ("start", "camera", "leds", "swing", "review")
+SIZES = (QSize(1280, 800), QSize(1920, 1080))
+NAMES = Names("Hall 2", "A. Weber", "LP-04", "T-10-80", "C-1", 10.0)
+NOW = datetime.fromisoformat("2026-09-30T10:00:00+02:00")
+SIGMA = 0.05  # px, of the centres in the swing
+PERIOD = 0.05  # s
+N_KEPT = 60  # when the swing is drawn
+N_RECORDED = 60  # images that are reviewed
+N_SHOWN = 40  # live images that a page is shown
+REFRESH_MS = 200  # of the plots
+COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the wizard is drawn."""
+
+    language: Language
+    appearance: Appearance
+    size: QSize
+
+    def file_name(self, step: str) -> str:
+        """Return the name of the picture of a step."""
+        size = f"{self.size.width()}x{self.size.height()}"
+        return f"{step}-{self.language}-{self.appearance}-{size}.png"
+
+
+LOOKS = tuple(
+    Look(language, appearance, size)
+    for language in Language
+    for appearance in (Appearance.DARK, Appearance.LIGHT)
+    for size in SIZES
+)
+
+
+class StillCamera(SimulatedCamera):
+    """A simulated camera that is open and sends nothing by itself."""
+
+    @override
+    def read(self, timeout_s: float) -> NoReturn:
+        Event().wait(timeout_s / 20)
+        raise FrameTimeout("No image was asked for.")
+
+
+class Stage:
+    """The wizard in a folder of its own, shown step by step.
+
+    Parameters
+    ----------
+    application : QApplication
+    """
+
+    def __init__(self, application: QApplication) -> None:
+        self._application = application
+        application.setCursorFlashTime(0)  # a cursor that blinks is not the same twice
+        self._scene = Scene(n_images=N_SHOWN)
+        self._shots = plan_scene(self._scene).shots
+        settings = Settings(DATA / "lightpen.ini")
+        settings.set_preferences(Preferences())
+        store_result(DATA / "results", _earlier_result())
+        around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
+        self.wizard = Wizard(application, make_pages, settings, DATA, around)
+        bench = self._bench = self.wizard.bench
+        bench.set_preparation(replace(bench.preparation, names=NAMES))
+        bench.use_sample_files()
+        bench.live.open(
+            StillCamera(self._scene, around.clock), CameraSettings(), around.clock
+        )
+        self._n_swings = 0
+        bench.live.swing_changed.connect(self._on_swing_changed)
+        self.wizard.window.show()
+
+    def close(self) -> None:
+        """Close the window without a question."""
+        self._bench.run.abandon()
+        self.wizard.window.close()
+
+    def set_look(self, look: Look) -> None:
+        """Change language, colours and size."""
+        self.wizard.window.preferences_changed.emit(
+            Preferences(look.language, look.appearance)
+        )
+        # Wrapped words are laid out by what was there before; one more change of the
+        # size makes that always the same.
+        for size in (look.size + QSize(GRID, GRID), look.size):
+            self.wizard.window.resize(size)
+            self._settle()
+
+    def go_to(self, step: str) -> None:
+        """Go to a step and fill it."""
+        self.wizard.window.go_to(STEPS.index(step))
+        self._settle()
+        getattr(self, f"_fill_{step}")()
+        self._settle()
+
+    def picture(self) -> QImage:
+        """Return the window as it is, as soon as nothing moves in it any more."""
+        before, now = QImage(), self._grabbed()
+        while now != before:
+            self._settle()
+            before, now = now, self._grabbed()
+        return now
+
+    def _grabbed(self) -> QImage:
+        image = self.wizard.window.grab().toImage()
+        return image.convertToFormat(QImage.Format.Format_RGB888)
+
+    def _fill_start(self) -> None:
+        self.wizard.window.page().entered()
+        QThreadPool.globalInstance().waitForDone()
+
+    def _fill_camera(self) -> None:
+        for index in range(N_SHOWN):
+            self._show_image(index)
+
+    def _fill_leds(self) -> None:
+        for index in range(N_SHOWN):
+            self._show_image(index)
+        compared = QDeadlineTimer(COMPARING_MS)
+        self._wait_until(compared.hasExpired)
+        QThreadPool.globalInstance().waitForDone()
+
+    def _fill_swing(self) -> None:
+        swing = _swing(self._bench.preparation.swing_setup(), self._scene)
+        self._wait_until(lambda: self._n_swings > 0)  # of the page's own beginning
+        self._bench.live.swing_changed.emit(swing)
+        for index in range(N_SHOWN):
+            self._show_image(index)
+        refreshed = QDeadlineTimer(2 * REFRESH_MS)
+        self._wait_until(refreshed.hasExpired)
+
+    def _fill_review(self) -> None:
+        QThreadPool.globalInstance().waitForDone()
+
+    def solve(self) -> None:
+        """Record a swing and solve it, so that the review opens."""
+        run = self._bench.run
+        folder = run.records_folder / "20260930-100000_LP-04_T-10-80"
+        _record(folder, self._bench.preparation)
+        run.resume_record(folder)
+        run.finish()
+        self._wait_until(lambda: run.solution is not None)
+
+    def _show_image(self, index: int) -> None:
+        image = sealed(render_shot(self._scene, self._shots[index]))
+        frame = Frame(image, seq=index, host_ts_ns=round(index * PERIOD * 1e9))
+        now = self._bench.preparation
+        assert now.camera is not None
+        assert now.pen is not None
+        sighting = look(image, now.camera, now.pen, now.mask)
+        assert sighting.spots is not None
+        height, width = image.shape
+        seen = LiveImage(frame, sighting.spots, sighting)
+        self._bench.live.image_shown.emit(
+            Shown(pooled(image), QSize(width, height), seen)
+        )
+        self._settle()
+
+    def _wait_until(self, condition: Callable[[], bool]) -> None:
+        while not condition():
+            self._settle()
+
+    def _on_swing_changed(self) -> None:
+        self._n_swings += 1
+
+    def _settle(self) -> None:
+        self._application.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        self._application.processEvents()
+
+
+def draw_all(stage: Stage) -> Iterator[tuple[str, QImage]]:
+    """Yield the name and the picture of every step in every look."""
+    for step in STEPS:
+        if step == "review":
+            stage.solve()
+        stage.go_to(step)
+        stage.set_look(LOOKS[-1])  # what comes first is laid out by what was before
+        for each in LOOKS:
+            stage.set_look(each)
+            yield each.file_name(step), stage.picture()
+
+
+def _earlier_result() -> Result:
+    return Result(
+        names=NAMES,
+        accepted=NOW - timedelta(days=12),
+        grade="pass",
+        tip_pen=np.array([-1.3179, -90.4102, -23.8551]),
+        uncertainty=np.array([0.0011, 0.0024, 0.0017]),
+        record="20260918-095512_LP-04_T-10-80",
+    )
+
+
+def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
+    """Return a swing in the middle of its capture."""
+    clock = SkippingClock()
+    operator = Operator(clock, scene.seed, seated=True)
+    follower = Follower(operator)
+    rng = np.random.default_rng(scene.seed)
+    state = start_swing(setup)
+    while state.n_kept < N_KEPT:
+        clock.wait(PERIOD)
+        now = clock.now_ns() * 1e-9
+        held = operator.held(np.array([now]))
+        R = held.postures.rotations
+        t = scene.cone_cam + held.offsets - R @ scene.tip_pen
+        pixels = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
+        sighting = sight_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
+        state = feed(setup, state, sighting, now).state
+        follower.follow(state)
+    return state
+
+
+def _record(folder: Path, preparation: Preparation) -> None:
+    """Write the record of a swing."""
+    scene = Scene(n_images=N_RECORDED, seed=3)
+    header = replace(preparation.header(), created=NOW)
+    with RecordWriter.create(folder, header) as writer:
+        for index, shot in enumerate(plan_scene(scene).shots):
+            image = render_shot(scene, shot)
+            seen = look(image, scene.camera, scene.pen)
+            writer.append(
+                image, seen.pixels, seen.rotation, seen.translation, index * PERIOD
+            )
+
+
+@contextmanager
+def anywhere() -> Iterator[None]:
+    """Make an empty folder the present one, and UTC the time, for a while."""
+    before = os.environ.get("TZ")
+    os.environ["TZ"] = "UTC"
+    time.tzset()
+    try:
+        with TemporaryDirectory() as folder, chdir(folder):
+            yield
+    finally:
+        del os.environ["TZ"]
+        if before is not None:
+            os.environ["TZ"] = before
+        time.tzset()
+
+
+def main() -> None:
+    """Draw all pictures."""
+    FOLDER.mkdir(exist_ok=True)
+    application = make_application(sys.argv[:1])
+    with anywhere():
+        stage = Stage(application)
+        for name, picture in draw_all(stage):
+            picture.save(str(FOLDER / name))
+        stage.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""`lightpen --demo` plays a calibration by itself; `lightpen` alone needs a screen."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from lightpen.simulator.scenes import Scene
+from lightpen_app.demo import NAMES, Demo
+from lightpen_app.settings import Settings, Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard
+
+Run = Callable[..., CompletedProcess[str]]
+NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "QT_QPA_PLATFORM": ""}
+LONGEST_S = 110  # it goes by the clock on the wall, as for whoever watches
+JOINT = re.compile(r"^ *joint +(\S+) +(\S+) +(\S+)$", re.MULTILINE)
+
+
+@pytest.fixture
+def newcomer(script: Run, tmp_path: Path) -> Run:
+    """Return a function that runs the program for somebody who has no settings yet."""
+    homes = {name: str(tmp_path) for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME")}
+
+    def run(*arguments: str) -> CompletedProcess[str]:
+        return script(*arguments, environment=NO_SCREEN | homes, timeout=LONGEST_S)
+
+    return run
+
+
+def test_the_demo_plays_without_a_screen_and_prints_the_tip(
+    newcomer: Run, tmp_path: Path
+) -> None:
+    outcome = newcomer("--demo")
+
+    assert outcome.returncode == 0, outcome.stderr
+    assert outcome.stdout.count("Demo: ") == 5  # one for each step
+    tip = [float(number) for number in JOINT.findall(outcome.stdout)[0]]
+    assert np.linalg.norm(np.array(tip) - Scene().tip_pen) <= 0.005
+    assert list(tmp_path.rglob("*")) == []  # nothing of it is kept
+
+
+def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> None:
+    outcome = newcomer()
+
+    assert outcome.returncode == 2
+    assert outcome.stdout == ""
+    assert "There is no display to open a window on." in outcome.stderr
+    assert "Traceback" not in outcome.stderr
+
+
+def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
+    open_wizard: "OpenWizard", settings: Settings, qtbot: QtBot
+) -> None:
+    hopeless = Station(max_uncertainty=1e-6, min_images=10, max_images=12)
+    settings.set_station(NAMES.station, hopeless)
+    settings.set_last_station(NAMES.station)
+    walker = open_wizard()
+    demo = Demo(walker.window, walker.bench, is_watched=False)
+
+    with qtbot.waitSignal(demo.ended, timeout=60_000):
+        demo.start()
+
+    assert walker.bench.run.result is None
+    assert "The demo ends here: there is no tip to accept." in walker.window.words()

@@ -1,0 +1,155 @@
+"""Every step looks as it did when it was last looked at, in every look.
+
+`python docs/screens.py` draws the pictures anew after a wanted change.
+"""
+
+import importlib.util
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtWidgets import QApplication
+
+from lightpen.arrays import FloatArray
+
+ROOT = Path(__file__).parents[2]
+DIFFERENT = ROOT / "screens-different"
+VISIBLE = 32  # of 255 levels; other versions of a font renderer shade edges by less
+SQUARE = 64  # px, in which pixels that differ are counted
+MAX_SHARE = 0.02  # of the pixels of a square: a short word of the smallest size
+
+
+def load_screens() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("screens", ROOT / "docs/screens.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+SCREENS = load_screens()
+NAMES = [look.file_name(step) for step in SCREENS.STEPS for look in SCREENS.LOOKS]
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How far two pictures differ.
+
+    Attributes
+    ----------
+    share : float
+        Of the pixels of a square that differ visibly, where that is the most.
+    picture : QImage
+        These in white.
+    """
+
+    share: float
+    picture: QImage
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether something else is shown, not only shaded otherwise."""
+        return self.share > MAX_SHARE
+
+
+def levels(image: QImage) -> FloatArray:
+    """Return (H, W, 3) levels of red, green and blue."""
+    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(rgb.constBits(), np.uint8).reshape(rgb.height(), -1)
+    return rows[:, : 3 * rgb.width()].reshape(rgb.height(), -1, 3).astype(np.float64)
+
+
+def compared(actual: QImage, expected: QImage) -> Difference:
+    if actual.size() != expected.size():
+        return Difference(1.0, actual)
+    apart = np.abs(levels(actual) - levels(expected)).max(axis=2) > VISIBLE
+    shown = np.where(apart, 255, 0).astype(np.uint8)
+    height, width = shown.shape
+    grey = QImage.Format.Format_Grayscale8
+    picture = QImage(shown.tobytes(), width, height, width, grey).copy()
+    square = (SQUARE, SQUARE)
+    shares = cv2.blur(apart.astype(float), square, borderType=cv2.BORDER_CONSTANT)
+    return Difference(float(shares.max()), picture)
+
+
+def moved(picture: QImage, word: QRect, by: QPoint) -> QImage:
+    """Return the picture with a part of it moved."""
+    part = picture.copy(word)
+    assert np.ptp(levels(part)) > VISIBLE
+    drawn = picture.copy()
+    painter = QPainter(drawn)
+    painter.drawImage(word.topLeft() + by, part)
+    painter.end()
+    return drawn
+
+
+@pytest.fixture(scope="module")
+def pictures(dressed: QApplication) -> Iterator[dict[str, QImage]]:
+    with SCREENS.anywhere():
+        stage = SCREENS.Stage(dressed)
+        yield dict(SCREENS.draw_all(stage))
+        stage.close()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_step_looks_as_it_did(pictures: dict[str, QImage], name: str) -> None:
+    expected = QImage(str(SCREENS.FOLDER / name))
+    difference = compared(pictures[name], expected)
+
+    if difference.is_seen:
+        DIFFERENT.mkdir(exist_ok=True)
+        pictures[name].save(str(DIFFERENT / name))
+        difference.picture.save(str(DIFFERENT / f"difference-{name}"))
+        pytest.fail(
+            f"{name}: {100 * difference.share:.1f} % of the pixels of a square differ; "
+            f"see {DIFFERENT}"
+        )
+
+
+def test_no_step_needs_more_room_than_a_small_screen_has(
+    pictures: dict[str, QImage],
+) -> None:
+    smallest = SCREENS.SIZES[0]
+    small = f"{smallest.width()}x{smallest.height()}"
+    sizes = {name: picture.size() for name, picture in pictures.items()}
+    too_large = [n for n, size in sizes.items() if small in n and size != smallest]
+    assert too_large == []
+
+
+@pytest.mark.parametrize(
+    ("word", "by"),
+    [
+        (QRect(270, 26, 120, 34), QPoint(1, 0)),  # the title
+        (QRect(46, 106, 40, 20), QPoint(2, 0)),  # "Start" in the list of steps
+        (QRect(18, 54, 30, 18), QPoint(0, 2)),  # "Pen" below the program's name
+    ],
+)
+def test_a_word_that_moved_is_noticed(
+    pictures: dict[str, QImage], word: QRect, by: QPoint
+) -> None:
+    picture = pictures[NAMES[0]]
+
+    assert compared(moved(picture, word, by), picture).is_seen
+    assert compared(picture, picture).share == 0
+
+
+def test_edges_that_are_shaded_otherwise_are_no_difference(
+    pictures: dict[str, QImage],
+) -> None:
+    picture = pictures[NAMES[0]]
+    sharp = levels(picture)
+    shaded = sharp + 0.2 * (cv2.GaussianBlur(sharp, (3, 3), 0.8) - sharp)
+    rgb = shaded.round().astype(np.uint8)
+    height, width, _ = rgb.shape
+    format_ = QImage.Format.Format_RGB888
+    other = QImage(rgb.tobytes(), width, height, 3 * width, format_).copy()
+
+    assert other != picture
+    assert not compared(other, picture).is_seen

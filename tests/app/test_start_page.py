@@ -1,0 +1,1117 @@
+"""Start: what is typed is remembered, and what there is already is shown."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPointF, Qt, QThreadPool, QTranslator
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QGroupBox,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen.session.preparation import (
+    Names,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.session.record import DISCARDED, open_record
+from lightpen.session.recording import RecordWriter
+from lightpen.session.results import Result, store_result
+from lightpen.session.swing_state import SwingLimits
+from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen_app.bench import Bench
+from lightpen_app.main_window import MainWindow
+from lightpen_app.pages.page import MainAction, Page
+from lightpen_app.pages.start import StartPage
+from lightpen_app.pages.start_interrupted import InterruptedPanel, InterruptedRow
+from lightpen_app.pages.start_result import LastResultPanel
+from lightpen_app.services import Services
+from lightpen_app.settings import Preferences, Settings
+from lightpen_app.sounds import Mute, Silence, Sound, Sounds
+from lightpen_app.widgets.sound_test import SoundTest
+
+Key = Qt.Key
+LEFT = Qt.MouseButton.LeftButton
+BLACK = np.zeros((8, 8), np.uint8)
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+ODD = 'Ä/\\ 王 %41, "x"; \'' + 170 * "w"
+
+
+class Opened:
+    """A Start page on the screen, driven as an operator does."""
+
+    def __init__(self, qtbot: QtBot, bench: Bench, sounds: Sounds) -> None:
+        self.page = StartPage(Services(bench, sounds))
+        self.subjects: list[str] = []
+        self.notices: list[str] = []
+        self.statuses: list[str] = []
+        self.steps: list[str] = []
+        self.page.subject_changed.connect(self.subjects.append)
+        self.page.notice_raised.connect(self.notices.append)
+        self.page.status_changed.connect(self.statuses.append)
+        self.page.step_requested.connect(self.steps.append)
+        qtbot.addWidget(self.page)
+        self.page.resize(1000, 640)
+        self.page.show()
+        self.page.entered()
+        self.settle()
+
+    def field(self, name: str) -> QWidget:
+        """Return the visible control of an accessible name."""
+        (found,) = [
+            widget
+            for widget in self.page.findChildren(QWidget)
+            if widget.accessibleName() == name and widget.isVisibleTo(self.page)
+        ]
+        return found
+
+    def type_into(self, name: str, text: str, end: Key | None = Key.Key_Tab) -> None:
+        """Replace the text of a field by keys, and leave it."""
+        field = self.field(name)
+        field.setFocus()
+        edit = focused()
+        QTest.keyClick(edit, Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(edit, Key.Key_Delete)
+        QTest.keyClicks(edit, text)
+        if end is not None:
+            QTest.keyClick(edit, end)
+
+    def text_of(self, name: str) -> str:
+        field = self.field(name)
+        match field:
+            case QComboBox():
+                return field.currentText()
+            case QLineEdit() | QAbstractSpinBox():
+                return field.text()
+        raise TypeError(name)
+
+    def press(self, text: str) -> None:
+        """Press the first visible button of a text."""
+        button = next(
+            button
+            for button in self.page.findChildren(QPushButton)
+            if button.text() == text and button.isVisibleTo(self.page)
+        )
+        QTest.mouseClick(button, LEFT)
+
+    def settle(self) -> None:
+        """Let what is looked up in the background be shown."""
+        for _ in range(2):
+            QApplication.processEvents()
+            QThreadPool.globalInstance().waitForDone()
+        QApplication.processEvents()
+
+    def last(self) -> tuple[str, ...]:
+        """Return what is said of the last calibration."""
+        (panel,) = self.page.findChildren(LastResultPanel)
+        return panel.words()
+
+    def rows(self) -> tuple[InterruptedRow, ...]:
+        (panel,) = self.page.findChildren(InterruptedPanel)
+        assert panel.isVisibleTo(self.page) is bool(panel.rows())
+        return panel.rows()
+
+    @property
+    def why_not(self) -> str:
+        return self.page.main_action().why_not
+
+
+def focused() -> QWidget:
+    widget = QApplication.focusWidget()
+    assert widget is not None
+    return widget
+
+
+@pytest.fixture
+def fresh(settings: Settings, tmp_path: Path) -> Iterator[Bench]:
+    """A bench on which nothing was ever chosen."""
+    bench = Bench(settings, tmp_path / "data")
+    yield bench
+    bench.shut_down()
+
+
+@pytest.fixture
+def show(qtbot: QtBot) -> Iterator[Callable[[Bench], Opened]]:
+    pages: list[StartPage] = []
+
+    def opened(bench: Bench, sounds: Sounds | None = None) -> Opened:
+        result = Opened(qtbot, bench, sounds or Silence())
+        pages.append(result.page)
+        return result
+
+    yield opened
+    for page in pages:
+        page.shut_down()
+    QThreadPool.globalInstance().waitForDone()
+
+
+@pytest.fixture
+def start(show: Callable[[Bench], Opened], bench: Bench) -> Opened:
+    return show(bench)
+
+
+def accepted(
+    bench: Bench, age: timedelta, pen: str | None = None, tip: str | None = None
+) -> None:
+    """Put a tip in force that was accepted some time ago."""
+    names = bench.preparation.names
+    result = Result(
+        names=replace(names, pen=pen or names.pen, tip=tip or names.tip),
+        accepted=datetime.now().astimezone() - age,
+        grade="pass",
+        tip_pen=np.array([-1.31823, -90.40951, -23.85483]),
+        uncertainty=np.array([0.0031, 0.0121, 0.0998]),
+        record="somewhere",
+    )
+    store_result(bench.run.results_folder, result)
+
+
+def interrupted(
+    bench: Bench,
+    name: str,
+    hours_ago: float = 1.0,
+    n_images: int = 12,
+    names: Names | None = None,
+) -> Path:
+    """Leave a swing without a verdict on the disk."""
+    now = bench.preparation
+    given = replace(now, names=names or now.names)
+    created = datetime.now().astimezone() - timedelta(hours=hours_ago)
+    setup, rng = given.swing_setup(), np.random.default_rng(5)
+    swing = swing_poses(n_images, rng)
+    pixels = simulate_centers(
+        setup.camera, setup.pen, swing.rotations, swing.translations, 0.05, rng
+    )
+    folder = bench.run.records_folder / name
+    header = replace(given.header(), created=created)
+    with RecordWriter.create(folder, header) as writer:
+        for index in range(n_images):
+            pose = swing.rotations[index], swing.translations[index]
+            writer.append(BLACK, pixels[index], *pose, 0.05 * index)
+    return folder
+
+
+# Names
+
+
+def test_at_first_each_missing_name_is_asked_for_in_turn(
+    show: Callable[[Bench], Opened], fresh: Bench
+) -> None:
+    start = show(fresh)
+    asked = []
+    for name in ("Station", "Operator", "Pen, serial number", "Probe tip", "Cone"):
+        asked.append(start.why_not)
+        assert not start.page.is_complete()
+        start.type_into(name, "A-1")
+
+    assert asked == [
+        "Enter the name of the station.",
+        "Enter the name of the operator.",
+        "Enter the serial number of the pen.",
+        "Enter the name of the probe tip.",
+        "Enter the name of the cone.",
+    ]
+    assert start.page.is_complete()
+    assert start.page.main_action() == MainAction("Continue to the camera")
+
+
+def test_a_name_of_blanks_is_none(start: Opened) -> None:
+    start.type_into("Cone", "   ")
+
+    assert start.why_not == "Enter the name of the cone."
+
+
+def test_the_last_name_counts_before_its_field_is_left(start: Opened) -> None:
+    """Else the main button would stay grey, and could not be pressed."""
+    start.type_into("Cone", "", end=None)
+    assert start.why_not
+
+    QTest.keyClicks(start.field("Cone"), "C")
+
+    assert start.why_not == ""
+
+
+def test_what_is_typed_is_taken_over_by_itself(
+    start: Opened, bench: Bench, qtbot: QtBot
+) -> None:
+    start.type_into("Operator", " Bea ", end=None)
+
+    qtbot.wait_until(lambda: bench.preparation.names.operator == "Bea")
+
+    assert start.text_of("Operator") == " Bea "  # more may be typed
+
+
+def test_what_is_typed_is_taken_over_when_the_page_is_left(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("Operator", "Bea", end=None)
+    start.type_into("Ball diameter", "3.0005", end=None)
+
+    start.page.left()
+
+    assert bench.preparation.names.operator == "Bea"
+    assert bench.preparation.names.ball_diameter == 3.0005
+
+
+def test_all_of_it_is_remembered_for_the_station(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    start.type_into("Operator", "Bea")
+    start.type_into("Pen, serial number", "LP-07")
+    start.type_into("Probe tip", "T-3")
+    start.type_into("Cone", "C-9")
+    start.type_into("Ball diameter", "3.0005")
+    start.type_into("U (k = 2) at most", "0.0075")
+    start.type_into("Images at most", "250")
+    start.type_into("Images at least", "80")
+
+    again = Bench(Settings(settings.file), Path("unused"))
+    again.choose_station("Hall 2")
+
+    assert again.preparation.names == Names(
+        "Hall 2", "Bea", "LP-07", "T-3", "C-9", 3.0005
+    )
+    assert again.preparation.limits == SwingLimits(0.0075, 80, 250)
+
+
+@pytest.mark.parametrize("name", [ODD, "a" * 200, "General", "../..", "王"])
+def test_any_name_will_do(
+    start: Opened, bench: Bench, settings: Settings, name: str
+) -> None:
+    for field in ("Station", "Operator", "Pen, serial number", "Probe tip", "Cone"):
+        edit = start.field(field)
+        edit.setFocus()
+        QApplication.clipboard().setText(name)
+        line = focused()
+        QTest.keyClick(line, Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(line, Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(line, Key.Key_Tab)
+
+    names = Names(name, name, name, name, name, 10.0)
+    assert bench.preparation.names == names
+    again = Bench(Settings(settings.file), bench.run.records_folder.parent)
+    assert again.stations() == tuple(sorted(("Hall 2", name)))
+    again.start()
+    assert again.preparation.names == names
+    again.run.begin(again.preparation)
+    assert again.run.record_folder is not None
+    again.shut_down()
+    accepted(bench, timedelta(0))
+    assert again.last_result() is not None
+
+
+def test_the_subject_is_pen_and_cone_as_they_are_typed(start: Opened) -> None:
+    assert start.subjects[-1] == "Pen LP-04  \u00b7  Cone C-1"
+
+    start.type_into("Pen, serial number", "", end=None)
+    assert start.subjects[-1] == "Cone C-1"
+
+    start.type_into("Pen, serial number", 200 * "w", end=None)
+    assert len(start.subjects[-1]) < 60
+
+
+# Stations
+
+
+@pytest.mark.qt_log_ignore(
+    "^This plugin does not support (raise|grabbing)", extend=True
+)
+def test_a_known_station_brings_back_all_that_was_chosen_there(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    start.type_into("Station", "Hall 3")
+    start.type_into("Operator", "Bea")
+    start.type_into("Images at most", "99")
+    combo = start.field("Station")
+    assert isinstance(combo, QComboBox)
+    assert [combo.itemText(i) for i in range(combo.count())] == ["Hall 2", "Hall 3"]
+
+    combo.setFocus()
+    QTest.keyClick(combo, Key.Key_Down)
+    popup = combo.view()
+    assert popup.isVisible()
+    popup.setCurrentIndex(combo.model().index(0, 0))
+    QTest.keyClick(popup, Key.Key_Return)
+
+    assert start.text_of("Station") == "Hall 2"
+    assert start.text_of("Operator") == "Ann"
+    assert start.text_of("Images at most") == "300"
+    assert bench.preparation.names.operator == "Ann"
+    assert settings.last_station() == "Hall 2"
+
+
+def test_a_new_station_takes_over_the_present_choices(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    before = bench.preparation
+
+    start.type_into("Station", "Hall 3")
+
+    assert bench.preparation.names == replace(before.names, station="Hall 3")
+    assert bench.preparation.pen_file is before.pen_file
+    assert bench.stations() == ("Hall 2", "Hall 3")
+    assert Settings(settings.file).last_station() == "Hall 3"
+
+
+def test_a_station_is_not_made_of_each_letter_that_is_typed(
+    start: Opened, bench: Bench, qtbot: QtBot
+) -> None:
+    start.type_into("Station", "Hall 34", end=None)
+    start.type_into("Operator", "Bea")
+
+    assert bench.stations() == ("Hall 2", "Hall 34")
+
+
+def test_the_start_of_a_known_name_is_a_name_of_its_own(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("Station", "Hall")
+
+    assert bench.preparation.names.station == "Hall"
+
+
+def test_a_station_that_was_emptied_is_asked_for_and_keeps_the_rest(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("Station", "")
+
+    assert start.why_not == "Enter the name of the station."
+    assert start.text_of("Operator") == "Ann"
+    assert bench.stations() == ("Hall 2",)
+
+
+def test_what_was_typed_before_stays_with_the_station_before(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    settings.set_station("Hall 3", replace(settings.station("Hall 2"), operator="Cy"))
+    start.type_into("Operator", "Bea", end=None)
+    start.type_into("Station", "Hall 3")
+
+    assert settings.station("Hall 2").operator == "Bea"
+    assert start.text_of("Operator") == "Cy"
+
+
+def test_a_station_whose_files_are_gone_is_told(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    gone = replace(settings.station("Hall 2"), pen_file="/gone/lp04.csv")
+    settings.set_station("Hall 3", gone)
+    told: list[str] = []
+    bench.troubled.connect(told.append)
+
+    start.type_into("Station", "Hall 3")
+
+    assert any("/gone/lp04.csv does not exist" in sentence for sentence in told)
+    assert start.text_of("Station") == "Hall 3"
+
+
+def test_the_station_survives_a_change_of_preferences(
+    start: Opened, bench: Bench, settings: Settings
+) -> None:
+    settings.set_preferences(Preferences(muted=True))
+
+    again = Bench(Settings(settings.file), bench.run.records_folder.parent)
+    again.start()
+
+    assert again.preparation.names.station == "Hall 2"
+    again.shut_down()
+
+
+@pytest.mark.parametrize(
+    "name", ["Station", "Ball diameter", "Images at most", "U (k = 2) at most"]
+)
+def test_the_wheel_does_not_change_a_field_that_scrolls_by(
+    start: Opened, bench: Bench, name: str
+) -> None:
+    before = bench.preparation
+    start.field("Operator").setFocus()
+    field = start.field(name)
+    center = QPointF(field.rect().center())
+    event = QWheelEvent(
+        center, QPointF(field.mapToGlobal(field.rect().center())),
+        QPointF(0, -120).toPoint(), QPointF(0, -120).toPoint(),
+        Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+
+    QApplication.sendEvent(field, event)
+
+    assert bench.preparation is before
+
+
+# Numbers
+
+
+def test_a_negative_ball_diameter_cannot_be_entered(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("Ball diameter", "-3")
+
+    assert bench.preparation.names.ball_diameter >= 0
+    assert "-" not in start.text_of("Ball diameter")
+
+
+def test_a_decimal_comma_is_a_decimal_point(start: Opened, bench: Bench) -> None:
+    start.type_into("Ball diameter", "3,5")
+
+    assert bench.preparation.names.ball_diameter == 3.5
+    assert start.text_of("Ball diameter") == "3.5000 mm"
+
+
+def test_a_ball_need_not_be_known(start: Opened, bench: Bench) -> None:
+    start.type_into("Ball diameter", "0")
+
+    assert start.text_of("Ball diameter") == "not known"
+    assert start.page.is_complete()
+
+
+def test_the_nominal_centre_is_that_of_the_led_file_unless_another_is_typed(
+    start: Opened, bench: Bench
+) -> None:
+    (box,) = start.page.findChildren(QCheckBox)
+    assert box.text() == "As in the LED file: 0.000  -90.000  -25.000 mm"
+    assert bench.preparation.nominal_tip is None
+
+    QTest.keyClick(box, Key.Key_Space)
+    assert start.text_of("Nominal centre of the tip, y") == "-90.0000 mm"
+    start.type_into("Nominal centre of the tip, x", "-1,25")
+    start.type_into("Nominal centre of the tip, z", "a-24b.5")
+
+    assert bench.preparation.nominal_tip is not None
+    np.testing.assert_array_equal(bench.preparation.nominal_tip, [-1.25, -90, -24.5])
+    QTest.keyClick(box, Key.Key_Space)
+    assert bench.preparation.nominal_tip is None
+
+
+def test_a_nominal_centre_comes_back_with_its_station(
+    start: Opened, bench: Bench
+) -> None:
+    point = np.array([1 / 3, -90.0, -25.0])
+    bench.set_preparation(replace(bench.preparation, nominal_tip=point))
+    start.type_into("Operator", "Bea")
+
+    assert start.text_of("Nominal centre of the tip, x") == "0.3333 mm"
+    assert bench.preparation.nominal_tip is not None
+    np.testing.assert_array_equal(bench.preparation.nominal_tip, point)
+
+
+def test_without_an_led_file_no_centre_is_told(
+    show: Callable[[Bench], Opened], fresh: Bench
+) -> None:
+    start = show(fresh)
+    (box,) = start.page.findChildren(QCheckBox)
+    assert box.text() == "As in the LED file"
+
+    QTest.keyClick(box, Key.Key_Space)
+
+    assert start.text_of("Nominal centre of the tip, x") == "0.0000 mm"
+
+
+def test_the_least_and_the_most_images_keep_their_order(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("Images at least", "400")
+    assert start.text_of("Images at most") == "400"
+
+    start.type_into("Images at most", "50")
+    assert start.text_of("Images at least") == "50"
+    assert bench.preparation.limits == SwingLimits(min_images=50, max_images=50)
+
+
+def test_limits_that_make_no_sense_cannot_be_entered(
+    start: Opened, bench: Bench
+) -> None:
+    start.type_into("U (k = 2) at most", "0")
+    start.type_into("Images at least", "0")
+
+    assert bench.preparation.limits.max_uncertainty >= 0.0001
+    assert bench.preparation.limits.min_images >= 10
+
+
+# The last result
+
+
+def test_a_pen_and_tip_that_were_never_calibrated_have_none_yet(start: Opened) -> None:
+    assert start.last() == (
+        *("None yet", "The tip that you accept will be the first in force."),
+    )
+
+
+def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    accepted(bench, timedelta(days=12))
+
+    age, verdict, when, *table = show(bench).last()
+
+    assert (age, verdict) == ("12 days ago", "PASS")
+    assert when.endswith("  \u00b7  Ann")
+    assert table == ["x -1.3182 0.0031", "y -90.410 0.012", "z -23.85 0.10"]
+
+
+@pytest.mark.parametrize(
+    ("days", "age"),
+    [
+        *((0, "Today"), (1, "Yesterday"), (2, "2 days ago"), (59, "59 days ago")),
+        *((60, "2 months ago"), (729, "24 months ago"), (730, "2 years ago")),
+    ],
+)
+def test_the_age_is_told_in_words(
+    show: Callable[[Bench], Opened], bench: Bench, days: int, age: str
+) -> None:
+    accepted(bench, timedelta(days=days))
+
+    assert show(bench).last()[0] == age
+
+
+def test_an_old_tip_comes_with_a_warning(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    accepted(bench, timedelta(days=31))
+
+    assert show(bench).last()[-1] == (
+        "It is older than 30 days. Calibrate before you measure."
+    )
+
+
+def test_a_tip_of_the_future_tells_of_the_clock(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    accepted(bench, timedelta(days=-400))
+
+    age, *_, warning = show(bench).last()
+
+    assert age == "In the future"
+    assert warning == "It is dated later than now. Check the clock here."
+
+
+def test_another_pen_or_tip_shows_its_own_result(start: Opened, bench: Bench) -> None:
+    accepted(bench, timedelta(days=5), pen="LP-05")
+    accepted(bench, timedelta(days=7), tip="T-3")
+
+    start.type_into("Pen, serial number", "LP-05")
+    start.settle()
+    assert start.last()[0] == "5 days ago"
+
+    start.type_into("Pen, serial number", "LP-04")
+    start.type_into("Probe tip", "T-3")
+    start.settle()
+    assert start.last()[0] == "7 days ago"
+
+    start.type_into("Probe tip", "")
+    start.settle()
+    assert start.last() == ("It is shown when the pen and its tip are named.",)
+
+
+def test_a_result_accepted_meanwhile_is_shown_on_return(
+    start: Opened, bench: Bench
+) -> None:
+    start.page.left()
+    accepted(bench, timedelta(0))
+
+    start.page.entered()
+    start.settle()
+
+    assert start.last()[0] == "Today"
+
+
+def test_a_damaged_result_is_told_where_the_result_would_be(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    accepted(bench, timedelta(days=12))
+    (file,) = bench.run.results_folder.iterdir()
+    file.write_text("{")
+
+    (sentence,) = show(bench).last()
+
+    assert sentence.startswith(f"The result {file} is damaged.")
+
+
+def test_a_verdict_of_a_later_version_is_shown_as_it_stands(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    accepted(bench, timedelta(days=12))
+    (file,) = bench.run.results_folder.iterdir()
+    file.write_text(file.read_text().replace('"pass"', '"splendid"'))
+
+    assert show(bench).last()[1] == "splendid"
+
+
+# Interrupted swings
+
+
+def test_without_an_interrupted_swing_nothing_is_offered(start: Opened) -> None:
+    assert start.rows() == ()
+
+
+def test_interrupted_swings_are_offered_the_newest_first(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    interrupted(bench, "a", hours_ago=30)
+    interrupted(bench, "b", hours_ago=2, n_images=1, names=replace(NAMES, pen="LP-05"))
+    interrupted(bench, "c", hours_ago=50)
+
+    told = [row.words()[1] for row in show(bench).rows()]
+
+    assert told == [
+        *("LP-05  \u00b7  T-10  \u00b7  1 image",),
+        *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
+    ]
+
+
+def test_the_page_is_there_before_the_swings_are_looked_for(
+    qtbot: QtBot, bench: Bench
+) -> None:
+    interrupted(bench, "a")
+    page = StartPage(Services(bench, Silence()))
+    qtbot.addWidget(page)
+    page.entered()
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+    (panel,) = page.findChildren(InterruptedPanel)
+    assert panel.value() == ()
+
+    page.show()
+
+    qtbot.wait_until(lambda: len(panel.value()) == 1)
+    page.shut_down()
+
+
+def test_a_swing_goes_on_with_its_images_at_the_step_swing(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    names = replace(NAMES, pen="LP-05", operator="Bea")
+    folder = interrupted(bench, "a", names=names)
+    bench.open_camera()
+    start = show(bench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert bench.run.record_folder == folder
+    assert bench.run.state is not None
+    assert bench.run.state.n_kept == 12
+    assert bench.run.names.pen == bench.preparation.names.pen == "LP-05"
+    assert start.text_of("Operator") == "Bea"
+    assert start.subjects[-1].startswith("Pen LP-05")
+    assert start.notices == []
+
+
+def test_the_swing_under_way_is_not_offered(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    interrupted(bench, "a")
+    interrupted(bench, "b", hours_ago=3)
+    bench.open_camera()
+    start = show(bench)
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    start.page.hide()
+    start.page.show()
+    qtbot.wait_until(lambda: len(start.rows()) == 1)
+
+    (record,) = start.page.findChildren(InterruptedPanel)[0].value()
+    assert record.folder.name == "b"
+
+
+def test_a_swing_of_another_station_goes_on_there(
+    show: Callable[[Bench], Opened], bench: Bench, settings: Settings, qtbot: QtBot
+) -> None:
+    there = replace(settings.station("Hall 2"), max_images=123)
+    settings.set_station("Hall 3", there)
+    interrupted(bench, "a", names=replace(NAMES, station="Hall 3"))
+    bench.open_camera()
+    start = show(bench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert start.text_of("Station") == "Hall 3"
+    assert bench.preparation.limits.max_images == 123
+
+
+def test_a_closed_camera_is_opened_for_the_swing(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    interrupted(bench, "a")
+    start = show(bench)
+    assert not bench.live.is_open
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert bench.live.is_open
+
+
+def test_without_a_camera_it_is_told_where_to_choose_one(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    interrupted(bench, "a")
+    recorded = SourceChoice(SourceKind.RECORDED)
+    bench.set_preparation(replace(bench.preparation, source=recorded))
+    start = show(bench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert start.notices[-1].startswith("No camera is open. Choose the source")
+    assert start.steps == []
+    assert bench.run.state is None
+
+
+def test_a_swing_does_not_go_on_with_images_of_another_size(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    interrupted(bench, "a")
+    bench.open_camera()
+    qtbot.wait_until(lambda: bench.preparation.image_size is not None)
+    bench.live.close()
+    bench.set_preparation(replace(bench.preparation, image_size=(640, 480)))
+    start = show(bench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert start.notices[-1].startswith(
+        "The camera sends 640 x 480, the swing was captured with 1224 x 1024."
+    )
+    assert start.steps == []
+
+
+def test_a_swing_that_was_damaged_since_is_told_and_no_longer_offered(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    folder = interrupted(bench, "a")
+    bench.open_camera()
+    start = show(bench)
+    (folder / "journal.jsonl").write_bytes(b"{\n{\n{\n")
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices) and start.rows() == ())
+
+    assert "Line 1 of" in start.notices[-1]
+    assert start.steps == []
+
+
+def test_a_record_that_cannot_be_written_is_told(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    folder = interrupted(bench, "a")
+    bench.open_camera()
+    start = show(bench)
+    row = start.rows()[0]
+    journal = folder / "journal.jsonl"
+    content = journal.read_bytes()
+
+    start.press("Resume")
+    QThreadPool.globalInstance().waitForDone()
+    journal.unlink()
+    journal.mkdir()  # before the answer of the reading is taken
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert "journal.jsonl" in start.notices[-1]
+    assert start.steps == []
+    assert row.words()[1] == "LP-04  \u00b7  T-10  \u00b7  12 images"
+    journal.rmdir()
+    journal.write_bytes(content)
+
+
+def test_to_discard_asks_and_keeps_by_default(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    folder = interrupted(bench, "a")
+    start = show(bench)
+    (row,) = start.rows()
+
+    start.press("Discard")
+    assert row.words()[1] == "Discard it? Its images stay on the disk."
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Keep"
+    QTest.keyClick(focused, Key.Key_Space)
+
+    assert row.words()[1] == "LP-04  \u00b7  T-10  \u00b7  12 images"
+    assert open_record(folder).verdict is None
+
+
+def test_a_double_click_discards_nothing(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    folder = interrupted(bench, "a")
+    start = show(bench)
+    button = start.rows()[0].findChildren(QPushButton)[1]
+    place = button.mapTo(start.page, button.rect().center())
+    assert button.text() == "Discard"
+
+    QTest.mouseClick(button, LEFT)
+    QApplication.processEvents()  # the question takes its place
+    second = start.page.childAt(place)
+    assert isinstance(second, QPushButton)
+    QTest.mouseClick(second, LEFT)
+    start.settle()
+
+    assert second.text() == "Keep"
+    assert open_record(folder).verdict is None
+
+
+def test_a_discarded_swing_keeps_its_images_and_is_not_offered_again(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    folder = interrupted(bench, "a")
+    interrupted(bench, "b", hours_ago=5)
+    start = show(bench)
+
+    start.press("Discard")
+    start.press("Discard")
+    qtbot.wait_until(lambda: len(start.rows()) == 1)
+
+    assert open_record(folder).verdict == DISCARDED
+    assert len(list((folder / "images").iterdir())) == 12
+    assert start.statuses[-1] == f"Discarded. The images stay in {folder}."
+
+
+def test_buttons_wait_while_a_swing_is_read(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    interrupted(bench, "a")
+    bench.open_camera()
+    start = show(bench)
+    start.press("Resume")
+
+    buttons = start.rows()[0].findChildren(QPushButton)
+    assert not any(button.isEnabled() for button in buttons)
+    assert {button.toolTip() for button in buttons} == {"The swing is being read."}
+
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+    assert all(button.isEnabled() for button in buttons)
+
+
+# Sounds
+
+
+class Recorder:
+    """Remembers what was played, and what was said meanwhile."""
+
+    def __init__(self) -> None:
+        self.played: list[Sound] = []
+        self.said: list[str] = []
+        self.words: Callable[[], str] = str
+
+    def play(self, sound: Sound, progress: float = 0.0) -> None:
+        self.played.append(sound)
+        self.said.append(self.words())
+
+    def why_silent(self) -> str:
+        return ""
+
+
+def test_the_sound_test_plays_each_sound_with_its_word(qtbot: QtBot) -> None:
+    sounds = Recorder()
+    widget = SoundTest(sounds, step_ms=0)
+    sounds.words = widget.words
+    qtbot.addWidget(widget)
+    widget.show()
+
+    (button,) = widget.findChildren(QPushButton)
+    QTest.mouseClick(button, LEFT)
+    qtbot.wait_until(lambda: widget.words() == "")
+
+    assert sounds.played == list(Sound)
+    assert sounds.said == [
+        *("Tip seated", "Image kept", "Field full", "Tip slipped, or pen lost"),
+        *("All captured", "Done", "Failed"),
+    ]
+
+
+def test_it_is_told_why_there_is_no_sound(
+    show: Callable[..., Opened], bench: Bench
+) -> None:
+    start = show(bench, Silence(["pw-play", "aplay"]))
+
+    start.press("Test the sounds")
+
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == (
+        "No sound here: none of pw-play, aplay is installed. All is shown in words and "
+        "signs, too."
+    )
+
+
+def test_it_is_told_that_sounds_are_off(
+    show: Callable[..., Opened], bench: Bench
+) -> None:
+    recorder = Recorder()
+    start = show(bench, Mute(recorder, muted=True))
+
+    start.press("Test the sounds")
+
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == "Sounds are off. Press B to switch them on."
+    assert recorder.played == []
+
+
+def test_the_sound_test_ends_with_the_page(
+    show: Callable[..., Opened], bench: Bench
+) -> None:
+    start = show(bench, Recorder())
+    start.press("Test the sounds")
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == "Tip seated"
+
+    start.page.left()
+
+    assert widget.words() == ""
+
+
+# Keys, names, languages
+
+
+class Next(Page):
+    """The step after this one."""
+
+    key = "camera"
+
+    @override
+    def title(self) -> str:
+        return "Camera"
+
+    @override
+    def is_complete(self) -> bool:
+        return False
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction("Next")
+
+
+@pytest.fixture
+def window(qtbot: QtBot, bench: Bench, settings: Settings) -> Iterator[MainWindow]:
+    page = StartPage(Services(bench, Silence()))
+    window = MainWindow([page, Next()], settings, Preferences())
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitActive(window).__enter__()
+    yield window
+    window.close()
+
+
+def test_whoever_finds_all_as_it_was_goes_on_by_one_key(window: MainWindow) -> None:
+    QTest.keyClick(focused(), Key.Key_Return)
+
+    assert window.page().key == "camera"
+
+
+@pytest.mark.parametrize("name", ["Operator", "Station", "Ball diameter"])
+def test_the_keys_of_a_remote_lead_on_from_every_field(
+    window: MainWindow, bench: Bench, name: str
+) -> None:
+    before = bench.preparation
+    for widget in window.page().findChildren(QWidget):
+        if widget.accessibleName() == name:
+            widget.setFocus()
+
+    QTest.keyClick(focused(), Key.Key_PageDown)
+
+    assert window.page().key == "camera"
+    assert bench.preparation.names == before.names
+
+
+def test_enter_after_a_name_of_a_station_only_takes_it_over(
+    window: MainWindow, bench: Bench
+) -> None:
+    """The operator must see what came back with it before going on."""
+    QTest.keyClicks(focused(), "b")
+    QTest.keyClick(focused(), Key.Key_Return)
+    assert window.page().key == "start"
+    assert bench.preparation.names.station != "Hall 2"
+
+    QTest.keyClick(focused(), Key.Key_Return)
+
+    assert window.page().key == "camera"
+
+
+def test_every_control_has_a_name_and_is_reached_by_tab(start: Opened) -> None:
+    seen: list[QWidget] = []
+    start.field("Station").setFocus()
+    while (widget := focused()) not in seen:
+        seen.append(widget)
+        QTest.keyClick(widget, Key.Key_Tab)
+
+    names = [w.accessibleName() or getattr(w, "text", str)() for w in seen]
+    assert names[:9] == [
+        *("Station", "Operator", "Pen, serial number", "Cone", "Probe tip"),
+        *("Ball diameter", "As in the LED file: 0.000  -90.000  -25.000 mm"),
+        *("U (k = 2) at most", "Images at least"),
+    ]
+    assert "Test the sounds" in names
+    assert all(names)
+
+
+def test_every_label_leads_to_its_field(start: Opened) -> None:
+    texts = {
+        label.text(): label.buddy()
+        for label in start.page.findChildren(QLabel)
+        if label.buddy() is not None
+    }
+
+    assert texts["Operator"] is start.field("Operator")
+    assert texts["Ball diameter"] is start.field("Ball diameter")
+
+
+class Loud(QTranslator):
+    """A language that is English, only louder."""
+
+    @override
+    def translate(
+        self,
+        context: str,
+        text: str,
+        disambiguation: str | None = None,
+        n: int = -1,
+    ) -> str:
+        return text.upper()
+
+    @override
+    def isEmpty(self) -> bool:
+        return False
+
+
+def test_every_word_changes_with_the_language(
+    show: Callable[[Bench], Opened], bench: Bench, dressed: QApplication
+) -> None:
+    accepted(bench, timedelta(days=40))
+    interrupted(bench, "a")
+    start = show(bench)
+    translator = Loud()
+    dressed.installTranslator(translator)
+    dressed.processEvents()
+    try:
+        texts = [start.page.title(), start.page.lead(), start.why_not]
+        texts += [w.text() for w in start.page.findChildren(QLabel)]
+        texts += [w.text() for w in start.page.findChildren(QPushButton)]
+        texts += [w.text() for w in start.page.findChildren(QCheckBox)]
+        texts += [w.title() for w in start.page.findChildren(QGroupBox)]
+        texts += [w.toolTip() for w in start.page.findChildren(QWidget)]
+        data = ("Ann", "x", "y", "z")
+        quiet = [text for text in texts if text != text.upper() and text not in data]
+    finally:
+        dressed.removeTranslator(translator)
+        dressed.sendPostedEvents(None, QEvent.Type.LanguageChange)
+
+    assert [text for text in quiet if "Ann" not in text and ":" not in text] == []
