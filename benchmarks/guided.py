@@ -1,27 +1,19 @@
 """Images that a swing takes to a good tip: the arrow followed, or not.
 
-Usage: python benchmarks/guided.py
-
 At 20 images a second, one simulated hand leans the pen where the arrow says, another to
 postures drawn at random from those in which all LEDs show; a third swings it round as
 operators do. All are captured by the same rules until U (k = 2) of the tip along its
 weakest direction is 5 um at a noise of 0.05 px. Only LED centres are simulated.
 """
 
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from benchmarks.machine import description
-from benchmarks.rows import Row, table
-from benchmarks.workers import Workers, one_core_workers
+from benchmarks.rows import Row
+from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
@@ -203,15 +195,3 @@ def _mean_images(outcomes: Sequence[Outcome]) -> float:
 def _range(outcomes: Sequence[Outcome]) -> str:
     counts = [outcome.n_images for outcome in outcomes]
     return f"{_mean_images(outcomes):.0f} ({min(counts)} to {max(counts)})"
-
-
-def main() -> int:
-    """Measure, print the table, and return the exit status."""
-    with one_core_workers() as workers:
-        rows = guided_rows(workers)
-    print(f"{description()}\n\n{table(rows)}")
-    return 0 if all(row.met for row in rows) else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())

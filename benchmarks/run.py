@@ -2,8 +2,9 @@
 
 Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
 
-Figures on the image sets need LIGHTPEN_DATA. Takes some three minutes on two
-cores; nothing else should run meanwhile. Exit status 1 if a limit is missed.
+Figures on the image sets need LIGHTPEN_DATA. Takes some fifteen minutes on two cores,
+ten of them for the section `soak`; nothing else should run meanwhile. Exit status 1 if
+a limit is missed.
 """
 
 import argparse
@@ -15,8 +16,10 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.cramer_rao import cramer_rao_rows
+from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
 from benchmarks.image_sets import data_folder
+from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
 from benchmarks.rows import NEEDS_DATA, Row, table
@@ -24,6 +27,7 @@ from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.whole_program import program_rows
+from benchmarks.wizard import soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
 
 README = Path(__file__).resolve().parents[1] / "README.md"
@@ -40,6 +44,10 @@ SECTIONS: dict[str, Section] = {
     "tracker": lambda workers, data: tracker_rows(data),
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
+    "guided": lambda workers, data: guided_rows(workers),
+    "killed": lambda workers, data: killed_rows(),
+    "start": lambda workers, data: start_rows(),
+    "soak": lambda workers, data: soak_rows(),
 }
 
 

@@ -1,0 +1,83 @@
+"""The wizard as its operator meets it: its start, its pace, its memory."""
+
+import json
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from benchmarks.rows import Row
+
+HERE = Path(__file__).parent
+N_STARTS = 5
+START_LIMIT = 2.5  # s
+SOAK_SECONDS = 600
+LEAST_RATE = 18.0  # images/s
+MOST_LATE = 50.0  # ms
+LEAST_PLOT_RATE = 5.0  # Hz
+MOST_MEMORY = 500.0  # MB
+GROWTH = 10.0  # MB after the first minute that count as none: two images
+
+
+def start_rows() -> list[Row]:
+    """Return how long the wizard takes to start."""
+    what = "wizard: process start to a painted window that answers a key, offscreen"
+    if sys.platform != "linux":
+        return [Row(what, "needs Linux")]
+    command = [sys.executable, str(HERE / "start_wizard.py")]
+    times = [float(_output(command)) for _ in range(N_STARTS + 1)][1:]
+    median = statistics.median(times)
+    return [
+        Row(what, f"{median:.2f} s", f"<= {START_LIMIT} s", met=median <= START_LIMIT)
+    ]
+
+
+def soak_rows(seconds: float = SOAK_SECONDS) -> list[Row]:
+    """Return pace and memory of swing after swing at 2448 x 2048."""
+    minutes = seconds / 60
+    name = f"wizard, {minutes:.0f} minutes of swings at 2448 x 2048, 20 images a second"
+    if sys.platform != "linux":
+        return [Row(name, "needs Linux")]
+    found = json.loads(
+        _output([sys.executable, str(HERE / "soak_wizard.py"), str(seconds)])
+    )
+    rate = found["images"] / found["seconds"]
+    median, late, latest = found["lateness_ms"]
+    sizes = found["memory_minutes_mb"]
+    growth = sizes[-1] - sizes[min(1, len(sizes) - 1)]  # the second follows the first
+    minutes_mb = ", ".join(f"{size:.0f}" for size in sizes)
+    return [
+        Row(
+            f"{name}: images looked at",
+            f"{rate:.1f} a second, {found['lost']} lost, {found['swings']} swings "
+            "solved meanwhile",
+            f">= {LEAST_RATE:.0f} a second",
+            met=rate >= LEAST_RATE,
+        ),
+        Row(
+            "- lateness of a 10 ms timer on the GUI thread, p99",
+            f"{late:.0f} ms (median {median:.1f}, most {latest:.0f})",
+            f"< {MOST_LATE:.0f} ms",
+            met=late < MOST_LATE,
+        ),
+        Row(
+            f"- slowest of {found['n_plots']} plots",
+            f"painted {found['plots_hz']:.1f} times a second",
+            f">= {LEAST_PLOT_RATE:.0f}",
+            met=found["plots_hz"] >= LEAST_PLOT_RATE,
+        ),
+        Row(
+            "- memory at most; from the second minute to the last",
+            f"{found['memory_mb']:.0f} MB; {growth:+.0f} MB (by the minute: "
+            f"{minutes_mb})",
+            f"<= {MOST_MEMORY:.0f} MB, no growth (to {GROWTH:.0f} MB)",
+            met=found["memory_mb"] <= MOST_MEMORY and growth <= GROWTH,
+        ),
+    ]
+
+
+def _output(command: list[str]) -> Any:
+    return subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, encoding="utf-8"
+    ).stdout
