@@ -86,7 +86,7 @@ class HastyClock:
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
         if wake is not None:
             return wake.wait(seconds / self.SPEED)
-        time.sleep(seconds / self.SPEED)
+        time.sleep(max(seconds, 0.0) / self.SPEED)
         return False
 
 

@@ -241,7 +241,7 @@ def test_in_chinese_no_english_word_is_left(
 
     for _ in ("start", "camera", "leds"):
         read_and_go_on()
-    reading = QTimer(interval=200)
+    reading = QTimer(walker.window, interval=200)
     reading.timeout.connect(read)
     reading.start()
     walker.swing()

@@ -562,7 +562,7 @@ def test_about_tells_the_versions(prepared: "Walker") -> None:
             told.extend(prepared.texts(about))
             prepared.press(Key.Key_Escape)
 
-    timer = QTimer(interval=20)
+    timer = QTimer(prepared.window, interval=20)
     timer.timeout.connect(read_and_close)
     timer.start()
     prepared.press(Key.Key_F10)
@@ -632,7 +632,7 @@ def test_any_keys_and_clicks_leave_a_window_that_answers(
         prepared.swing()
         keep_on(prepared)
     window = prepared.window
-    leaving = QTimer(interval=50)
+    leaving = QTimer(window, interval=50)
     leaving.timeout.connect(leave_dialog)
     leaving.start()
     for _ in range(N_MASHED):

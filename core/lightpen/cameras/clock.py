@@ -16,7 +16,10 @@ class Clock(Protocol):
         """Return a time that never goes back, ns from an arbitrary start."""
 
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
-        """Wait, or until ``wake`` is set; return whether it is."""
+        """Wait, or until ``wake`` is set; return whether it is.
+
+        A time that is over, `seconds` below zero, is not waited for.
+        """
 
 
 class MachineClock:
@@ -32,7 +35,7 @@ class MachineClock:
         """Wait, or until ``wake`` is set; return whether it is."""
         if wake is not None:
             return wake.wait(seconds)
-        time.sleep(seconds)
+        time.sleep(max(seconds, 0.0))
         return False
 
 
@@ -58,5 +61,5 @@ class SkippingClock:
         if wake is not None and wake.is_set():
             return True
         with self._lock:
-            self._now_ns += round(seconds * 1e9)
+            self._now_ns += round(max(seconds, 0.0) * 1e9)
         return False

@@ -190,8 +190,7 @@ class ReplayCamera:
                 f"The next image of {self._where} comes {wait_s - timeout_s:.1f} s "
                 "later. Wait, or replay the images faster."
             )
-        if wait_s > 0:
-            self._clock.wait(wait_s)
+        self._clock.wait(wait_s)
 
     def _next_loader(self) -> Callable[[], Image]:
         """Return the loader of the next image and set the time of the one after."""

@@ -265,14 +265,13 @@ class SimulatedCamera:
         limit = self._now + timeout_s
         end = self._schedule_next()
         if end is None or end > limit:
-            self._clock.wait(max(limit - self._now, 0.0))
+            self._clock.wait(limit - self._now)
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
             raise FrameTimeout(
                 f"The simulated camera {self._serial} sent no image for "
                 f"{timeout_s:.1f} s. Check its cable and its trigger."
             )
-        if end > self._now:
-            self._clock.wait(end - self._now)
+        self._clock.wait(end - self._now)
 
     def _schedule_next(self) -> float | None:
         """Settle and return when the exposure of the next image ends, if one comes."""
