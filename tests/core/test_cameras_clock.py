@@ -20,7 +20,9 @@ def test_a_wait_takes_its_time(clock: Clock) -> None:
 
 
 @pytest.mark.parametrize("wake", [None, Event()])
-def test_a_time_that_is_over_is_not_waited_for(clock: Clock, wake: Event | None) -> None:
+def test_a_time_that_is_over_is_not_waited_for(
+    clock: Clock, wake: Event | None
+) -> None:
     before = clock.now_ns()
     assert not clock.wait(-1e-6, wake)
     assert 0 <= clock.now_ns() - before < 1_000_000_000
