@@ -24,7 +24,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.session.record import Record, found_interrupted, open_record
+from lightpen.session.interrupted import found_interrupted
+from lightpen.session.record import Record, open_record
 from lightpen.session.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
 

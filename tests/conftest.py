@@ -5,14 +5,25 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import IO, Any
 
 import pytest
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from lightpen.session.record import open_record
+from lightpen.session.recording import RecordWriter
+
+with RecordWriter.resume(open_record(Path(sys.argv[1]))):
+    print("held", flush=True)
+    time.sleep(600)
+"""
 
 
 @pytest.fixture(scope="session")
@@ -135,6 +146,27 @@ def swung(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return folder
 
     return recorded
+
+
+@pytest.fixture
+def holding() -> Iterator[Callable[[Path], "subprocess.Popen[str]"]]:
+    """Return a function that lets another process hold a record to write to it."""
+    with ExitStack() as stack:
+
+        def hold(folder: Path) -> "subprocess.Popen[str]":
+            process = stack.enter_context(
+                subprocess.Popen(
+                    [sys.executable, "-c", HOLDER, str(folder)],
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+            )
+            stack.callback(process.kill)
+            assert process.stdout is not None
+            assert process.stdout.readline() == "held\n"
+            return process
+
+        yield hold
 
 
 @pytest.fixture(scope="session")

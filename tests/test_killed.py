@@ -14,12 +14,8 @@ from time import sleep
 import numpy as np
 import pytest
 
-from lightpen.session.record import (
-    Record,
-    found_interrupted,
-    is_record,
-    open_record,
-)
+from lightpen.session.interrupted import found_interrupted
+from lightpen.session.record import Record, is_record, open_record
 from lightpen.session.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
 
@@ -38,8 +34,8 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.cameras.hand import Operator
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
+from lightpen.session.interrupted import found_interrupted, read_resumable
 from lightpen.session.preparation import Names
-from lightpen.session.record import found_interrupted
 from lightpen.session.sources import Surroundings
 from lightpen.session.swing_state import Happening, SwingLimits
 from lightpen.simulator.scenes import Scene
@@ -60,7 +56,7 @@ class HastyClock:
     def wait(self, seconds, wake=None):
         if wake is not None:
             return wake.wait(seconds / SPEED)
-        time.sleep(seconds / SPEED)
+        time.sleep(max(seconds, 0.0) / SPEED)
         return False
 
 def tell(*words):
@@ -86,7 +82,7 @@ def swing(folder):
     bench.live.set_following(True)
     offered = found_interrupted(run.records_folder)
     if offered:
-        run.resume_record(offered[0].folder)
+        run.go_on(read_resumable(offered[0].folder))
         tell("resumed", offered[0].folder.name, run.state.n_kept)
     else:
         run.begin(bench.preparation)

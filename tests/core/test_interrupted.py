@@ -1,6 +1,8 @@
 """Interrupted swings: found at little cost, gone on with, or set aside."""
 
+import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -10,9 +12,15 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.session.interrupted import discard_swing, read_resumable
+from lightpen.session.interrupted import (
+    discard_damaged,
+    discard_swing,
+    find_unfinished,
+    found_interrupted,
+    read_resumable,
+)
 from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
-from lightpen.session.record import DISCARDED, found_interrupted, open_record
+from lightpen.session.record import DISCARDED, open_record
 from lightpen.session.recording import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
@@ -125,6 +133,9 @@ def test_folders_that_are_no_records_are_passed_over(
     (tmp_path / "file").touch()
 
     assert names_found(tmp_path) == ["a"]
+    (damaged,) = find_unfinished(tmp_path).damaged
+    assert damaged.folder == tmp_path / "damaged"
+    assert damaged.sentence.startswith("The pen file ")
     assert names_found(tmp_path / "file") == []
     assert names_found(tmp_path / "nothing here") == []
 
@@ -158,10 +169,11 @@ def test_a_thousand_concluded_swings_cost_little(
     recorded(preparation, tmp_path / "open", 1).close()
 
     start = time.perf_counter()
-    found = names_found(tmp_path)
+    found = find_unfinished(tmp_path)
     elapsed = time.perf_counter() - start
 
-    assert found == ["open"]
+    assert [record.folder.name for record in found.interrupted] == ["open"]
+    assert found.damaged == ()
     assert elapsed < 1.0  # 0.05 s on an idle machine; reading them whole takes 4 s
 
 
@@ -223,3 +235,103 @@ def test_a_damaged_swing_cannot_go_on(preparation: Preparation, tmp_path: Path) 
         read_resumable(tmp_path / "a")
     with pytest.raises(FileError, match=r"Line 1 of .* is damaged"):
         discard_swing(tmp_path / "a")
+
+
+def told(root: Path) -> str:
+    """Return what is said of the only damaged swing, which can be discarded."""
+    (damaged,) = find_unfinished(root).damaged
+    assert names_found(root) == []
+    return damaged.sentence
+
+
+def test_a_header_cut_in_half_is_told(preparation: Preparation, tmp_path: Path) -> None:
+    recorded(preparation, tmp_path / "a", 1).close()
+    header = tmp_path / "a" / "header.json"
+    header.write_bytes(header.read_bytes()[:200])
+
+    assert told(tmp_path) == f"{header} is damaged. Restore it from a copy."
+
+
+@pytest.mark.parametrize("name", ["header.json", "journal.jsonl"])
+def test_images_without_a_header_or_journal_are_told(
+    preparation: Preparation, tmp_path: Path, name: str
+) -> None:
+    recorded(preparation, tmp_path / "a", 1).close()
+    (tmp_path / "a" / name).unlink()
+
+    assert told(tmp_path).startswith(
+        f"{tmp_path / 'a'} holds images of a swing, but no {name}."
+    )
+
+
+def test_an_emptied_journal_is_told(preparation: Preparation, tmp_path: Path) -> None:
+    recorded(preparation, tmp_path / "a", 3).close()
+    (tmp_path / "a" / "journal.jsonl").write_bytes(b"")
+
+    assert "knows none of the 3 images" in told(tmp_path)
+
+
+def test_a_record_that_was_just_being_made_is_passed_over(
+    preparation: Preparation, tmp_path: Path
+) -> None:
+    recorded(preparation, tmp_path / "a", 0).close()
+    (tmp_path / "a" / "header.json").unlink()
+    recorded(preparation, tmp_path / "b", 1).close()
+    (tmp_path / "b" / "journal.jsonl").write_bytes(b"")  # killed before its line
+
+    assert find_unfinished(tmp_path).damaged == ()
+    assert names_found(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["header.json", "journal.jsonl", "camera.yaml"])
+def test_a_damaged_swing_that_was_discarded_is_not_told_again(
+    preparation: Preparation, tmp_path: Path, name: str
+) -> None:
+    recorded(preparation, tmp_path / "a", 3).close()
+    damaged = tmp_path / "a" / name
+    content = damaged.read_bytes()
+    damaged.unlink()
+    assert told(tmp_path)
+
+    discard_damaged(tmp_path / "a")
+
+    assert find_unfinished(tmp_path).damaged == ()
+    assert len(list((tmp_path / "a" / "images").iterdir())) == 3
+    damaged.write_bytes(content)
+    assert len(open_record(tmp_path / "a").images) == 3
+
+
+def test_a_torn_line_does_not_become_a_damage_by_discarding(
+    preparation: Preparation, tmp_path: Path
+) -> None:
+    recorded(preparation, tmp_path / "a", 3).close()
+    journal, header = (tmp_path / "a" / n for n in ("journal.jsonl", "header.json"))
+    journal.write_bytes(journal.read_bytes()[:-5])
+    content = header.read_bytes()
+    header.unlink()
+
+    discard_damaged(tmp_path / "a")
+    header.write_bytes(content)
+
+    record = open_record(tmp_path / "a")
+    assert (len(record.images), record.verdict) == (2, DISCARDED)
+
+
+def test_a_swing_under_way_in_another_program_is_told_apart_until_that_is_killed(
+    preparation: Preparation,
+    tmp_path: Path,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    recorded(preparation, tmp_path / "a", 2).close()
+    other = holding(tmp_path / "a")
+
+    found = find_unfinished(tmp_path)
+    assert [record.folder.name for record in found.under_way] == ["a"]
+    assert found.interrupted == ()
+    with pytest.raises(FileError, match="Another program is writing"):
+        discard_swing(tmp_path / "a")
+
+    other.kill()
+    other.wait()
+    assert find_unfinished(tmp_path).under_way == ()
+    assert names_found(tmp_path) == ["a"]

@@ -4,9 +4,11 @@ import json
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -16,14 +18,15 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.pen_files import write_pen
 from lightpen.images import decode_image
+from lightpen.session.interrupted import found_interrupted
 from lightpen.session.record import (
     FileCopy,
     Header,
-    found_interrupted,
     open_record,
+    record_files,
     source,
 )
-from lightpen.session.recording import RecordWriter, encode_png
+from lightpen.session.recording import RecordWriter, encode_png, note_taken_out
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 N_KILLS = 20
@@ -194,6 +197,67 @@ def test_damage_in_the_middle_is_refused_and_located(
     with pytest.raises(FileError, match=r"Line 2 of .* is damaged"):
         open_record(folder)
     assert found_interrupted(tmp_path) == ()
+
+
+def test_one_program_at_a_time_writes_to_a_record(
+    tmp_path: Path,
+    header: Header,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    folder = recorded(tmp_path / "swing", header, 2)
+    part = folder / "images" / ".0123456789abcdef.part"
+    part.write_bytes(b"an image being written by the other program")
+    other = holding(folder)
+    part.write_bytes(b"another")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+    with pytest.raises(FileError, match="Another program is writing to the swing in"):
+        RecordWriter.resume(open_record(folder))
+    with pytest.raises(FileError, match="Another program is writing to the swing in"):
+        note_taken_out(folder, {1: "taken out"})
+    assert len(open_record(folder).images) == 2
+    for load in source(open_record(folder)).images.open():
+        load()
+    assert before == {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+    other.kill()
+    other.wait()
+    with RecordWriter.resume(open_record(folder)) as writer:
+        assert append(writer) == 3
+    assert set(record_files(open_record(folder))) == {
+        path for path in folder.rglob("*") if path.is_file()
+    }
+
+
+def test_the_program_itself_writes_to_a_record_once_at_a_time(
+    tmp_path: Path, header: Header
+) -> None:
+    with RecordWriter.create(tmp_path / "swing", header) as writer:
+        append(writer)
+        record = open_record(tmp_path / "swing")
+        with pytest.raises(FileError, match="Another program is writing"):
+            RecordWriter.resume(record)
+        append(writer)
+    writer.close()  # once more is no harm
+
+    with pytest.raises(FileError, match="has changed since it was read"):
+        RecordWriter.resume(record)
+    for number in (3, 4):
+        with RecordWriter.resume(open_record(tmp_path / "swing")) as writer:
+            assert append(writer) == number
+
+
+def test_a_writer_waits_for_one_who_is_about_to_close(
+    tmp_path: Path, header: Header
+) -> None:
+    folder = recorded(tmp_path / "swing", header, 1)
+    first = RecordWriter.resume(open_record(folder))
+    closing = Timer(0.1, first.close)
+    closing.start()
+
+    with RecordWriter.resume(open_record(folder)) as second:
+        assert append(second) == 2
+    closing.join()
 
 
 def test_an_image_changed_later_is_not_used(tmp_path: Path, header: Header) -> None:

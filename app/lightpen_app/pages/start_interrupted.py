@@ -1,6 +1,9 @@
-"""The swings that were interrupted: each is offered to go on with, or to discard."""
+"""The swings without a verdict: offered to go on with, or to discard.
 
-from collections.abc import Sequence
+One that another program captures, or that is damaged, is told of and not offered.
+"""
+
+import re
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
@@ -12,21 +15,30 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from lightpen.session.interrupted import DamagedSwing, Unfinished
 from lightpen.session.preparation import recorded_names
 from lightpen.session.record import Record
-from lightpen_app.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.words import PARTED, moment_text, shortened
 
-ROW_HEIGHT = 7 * GRID
+ROW_HEIGHT, SENTENCE_HEIGHT = 7 * GRID, 17 * GRID
 LONGEST = 16  # characters of a name
 N_ROWS_SEEN = 2  # the others are scrolled to
+BREAK = "\u200b"  # where a line may end, though no blank is there
 NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
 class InterruptedRow(QFrame):
-    """One interrupted swing.
+    """One swing without a verdict.
+
+    Parameters
+    ----------
+    swing : Record or DamagedSwing
+    is_under_way : bool
+        Whether another program captures it.
 
     Signals
     -------
@@ -37,18 +49,24 @@ class InterruptedRow(QFrame):
     resume_requested = Signal()
     discard_requested = Signal()
 
-    def __init__(self, record: Record, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        swing: Record | DamagedSwing,
+        is_under_way: bool = False,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
-        self._record = record
+        self._swing = swing
+        self._is_under_way = is_under_way
 
         # Widgets
         self._when = text_label(TextSize.BODY)
         self._what = text_label(TextSize.SMALL, Tone.QUIET)
-        self._resume = QPushButton()
-        self._discard = QPushButton()
+        self._resume = PushButton()
+        self._discard = PushButton()
         self._offer = _button_row(self._resume, self._discard)
-        self._confirm = QPushButton()
-        self._keep = QPushButton()
+        self._confirm = PushButton()
+        self._keep = PushButton()
         # Keep is where Discard was, so that a double click discards nothing.
         self._question = _button_row(self._confirm, self._keep)
 
@@ -57,14 +75,20 @@ class InterruptedRow(QFrame):
         words.setSpacing(0)
         words.addStretch(1)
         words.addWidget(self._when)
-        words.addWidget(self._what)
+        if isinstance(swing, Record):
+            words.addWidget(self._what)
         words.addStretch(1)
-        layout = QHBoxLayout(self)
+        line = QHBoxLayout()
+        line.setSpacing(2 * GRID)
+        line.addLayout(words, 1)
+        line.addWidget(self._offer)
+        line.addWidget(self._question)
+        layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addLayout(words, 1)
-        layout.addWidget(self._offer)
-        layout.addWidget(self._question)
+        layout.setSpacing(GRID // 2)
+        layout.addLayout(line)
+        if isinstance(swing, DamagedSwing):
+            layout.addWidget(self._what, 1, Qt.AlignmentFlag.AlignTop)
 
         # Connections
         self._resume.clicked.connect(self.resume_requested)
@@ -73,12 +97,16 @@ class InterruptedRow(QFrame):
         self._confirm.clicked.connect(self.discard_requested)
 
         self._question.hide()
+        self._offer.setVisible(not is_under_way)
+        self._resume.setVisible(isinstance(swing, Record))
+        if isinstance(swing, DamagedSwing):
+            set_tone(self._when, Tone.BAD)
         self.setMinimumHeight(ROW_HEIGHT)
         self.retranslate()
 
     def words(self) -> tuple[str, str]:
         """Return what the row says."""
-        return self._when.text(), self._what.text()
+        return self._when.text(), self._what.text().replace(BREAK, "")
 
     def set_waiting(self, why: str) -> None:
         """Disable the buttons for a reason, or enable them for none."""
@@ -88,7 +116,7 @@ class InterruptedRow(QFrame):
 
     def retranslate(self) -> None:
         """Set the texts in the language that is chosen."""
-        when = moment_text(self._record.header.created, self.tr("d MMM yyyy, hh:mm"))
+        when = self._heading()
         self._when.setText(when)
         self._what.setText(
             self.tr("Discard it? Its images stay on the disk.")
@@ -104,8 +132,19 @@ class InterruptedRow(QFrame):
             button.setText(text)
             button.setAccessibleName(name.format(when))
 
+    def _heading(self) -> str:
+        match self._swing:
+            case DamagedSwing(folder):
+                return self.tr("Damaged: {0}").format(shortened(folder.name))
+            case Record(header=header):
+                return moment_text(header.created, self.tr("d MMM yyyy, hh:mm"))
+
     def _description(self) -> str:
-        names, n_images = recorded_names(self._record), len(self._record.images)
+        if isinstance(self._swing, DamagedSwing):
+            return _breakable(self._swing.sentence)
+        if self._is_under_way:
+            return self.tr("Another program is capturing it.")
+        names, n_images = recorded_names(self._swing), len(self._swing.images)
         images = (
             self.tr("1 image")
             if n_images == 1
@@ -129,26 +168,30 @@ class InterruptedRow(QFrame):
 
 
 class InterruptedPanel(Translated, QGroupBox):
-    """Lists interrupted swings; hidden while there are none.
+    """Lists swings without a verdict; hidden while there are none.
 
     Signals
     -------
     resume_requested(Path), discard_requested(Path)
         The folder of the record.
+    search_requested()
+        They are to be looked for again.
     """
 
     resume_requested = Signal(object)
     discard_requested = Signal(object)
+    search_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._value: tuple[Record, ...] = ()
+        self._value = Unfinished()
         self._rows: list[InterruptedRow] = []
 
         # Widgets
         self._hint = text_label(TextSize.SMALL, Tone.QUIET)
         self._scroll = PageScroll()
         self._scroll.setHorizontalScrollBarPolicy(NEVER)
+        self._again = PushButton()
 
         # Layout
         layout = QVBoxLayout(self)
@@ -156,18 +199,26 @@ class InterruptedPanel(Translated, QGroupBox):
         layout.setSpacing(GRID)
         layout.addWidget(self._hint)
         layout.addWidget(self._scroll)
+        layout.addWidget(self._again, 0, Qt.AlignmentFlag.AlignLeft)
+
+        # Connections
+        self._again.clicked.connect(self.search_requested)
 
         self.hide()
         self._retranslate()
 
-    def value(self) -> tuple[Record, ...]:
-        """Return the records that are offered."""
+    def value(self) -> Unfinished:
+        """Return the swings that are listed."""
         return self._value
 
-    def set_value(self, records: Sequence[Record]) -> None:
-        """Offer these records."""
-        self._value = tuple(records)
-        self._rows = [self._row(record) for record in records]
+    def set_value(self, swings: Unfinished) -> None:
+        """List these swings."""
+        self._value = swings
+        self._rows = [
+            *(self._row(record) for record in swings.interrupted),
+            *(self._row(record, is_under_way=True) for record in swings.under_way),
+            *(self._row(swing) for swing in swings.damaged),
+        ]
         content = QWidget()
         layout = QVBoxLayout(content)
         layout.setContentsMargins(0, 0, GRID, 0)
@@ -176,13 +227,16 @@ class InterruptedPanel(Translated, QGroupBox):
             layout.addWidget(row)
         layout.addStretch(1)
         self._scroll.setWidget(content)
-        n_seen = min(len(records), N_ROWS_SEEN)
-        self._scroll.setFixedHeight(n_seen * (ROW_HEIGHT + GRID))
+        n_whole = len(swings.interrupted) + len(swings.under_way)
+        heights = [ROW_HEIGHT] * n_whole + [SENTENCE_HEIGHT] * len(swings.damaged)
+        self._scroll.setFixedHeight(sum(h + GRID for h in heights[:N_ROWS_SEEN]))
+        self._hint.setVisible(bool(swings.interrupted))
+        self._again.setVisible(bool(swings.under_way or swings.damaged))
         self._retranslate()
-        self.setVisible(bool(records))
+        self.setVisible(bool(self._rows))
 
     def rows(self) -> tuple[InterruptedRow, ...]:
-        """Return the rows, the newest swing first."""
+        """Return the rows: what is offered, under way, and damaged."""
         return tuple(self._rows)
 
     def set_waiting(self, why: str) -> None:
@@ -190,9 +244,11 @@ class InterruptedPanel(Translated, QGroupBox):
         for row in self._rows:
             row.set_waiting(why)
 
-    def _row(self, record: Record) -> InterruptedRow:
-        row = InterruptedRow(record)
-        folder = record.folder
+    def _row(
+        self, swing: Record | DamagedSwing, is_under_way: bool = False
+    ) -> InterruptedRow:
+        row = InterruptedRow(swing, is_under_way)
+        folder = swing.folder
         row.resume_requested.connect(lambda: self.resume_requested.emit(folder))
         row.discard_requested.connect(lambda: self.discard_requested.emit(folder))
         return row
@@ -207,8 +263,14 @@ class InterruptedPanel(Translated, QGroupBox):
         self._hint.setText(
             self.tr("Resumed, it has all its images and the files it began with.")
         )
+        self._again.setText(self.tr("Look again"))
         for row in self._rows:
             row.retranslate()
+
+
+def _breakable(sentence: str) -> str:
+    """Let a path take more than one line."""
+    return re.sub(r"([/\\_])", rf"\1{BREAK}", sentence)
 
 
 def _button_row(*buttons: QPushButton) -> QWidget:

@@ -12,7 +12,8 @@ A record is a folder:
 ==================== ===================================================================
 
 `lightpen.session.recording` puts an image on the disk before its line, and its line
-before it acknowledges the image. A torn last line, or an image without a line, is what
+before it acknowledges the image; `lightpen.session.record_lock` keeps a second program
+from writing meanwhile. A torn last line, or an image without a line, is what
 a crash leaves: it was not acknowledged and is passed over. Everything needed to
 calibrate again is in the images and the two files; the centres in the journal spare
 reading the images when an interrupted swing goes on.
@@ -143,6 +144,8 @@ class Record:
         Numbers of images that do not take part, and why.
     verdict : str or None
         The last one; None if the swing was interrupted.
+    length : int
+        Of what was read of the journal, bytes.
     """
 
     folder: Path
@@ -150,6 +153,7 @@ class Record:
     images: tuple[RecordedImage, ...]
     taken_out: Mapping[int, str]
     verdict: str | None
+    length: int
 
     @property
     def used_images(self) -> tuple[RecordedImage, ...]:
@@ -208,7 +212,8 @@ def open_record(folder: Path) -> Record:
     images: list[RecordedImage] = []
     taken_out: dict[int, str] = {}
     verdict = None
-    for number, line in enumerate(_sound_lines(folder), start=1):
+    lines = _sound_lines(folder)
+    for number, line in enumerate(lines, start=1):
         try:
             entries = json.loads(line)
             match entries["kind"]:
@@ -230,7 +235,7 @@ def open_record(folder: Path) -> Record:
                 "Restore the file from a copy, or remove the line to go on without "
                 "that image."
             ) from error
-    return Record(folder, header, tuple(images), taken_out, verdict)
+    return Record(folder, header, tuple(images), taken_out, verdict, _length_of(lines))
 
 
 def record_files(record: Record) -> tuple[Path, ...]:
@@ -249,38 +254,29 @@ def is_record(folder: Path) -> bool:
     return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
 
 
-def found_interrupted(root: Path) -> tuple[Record, ...]:
-    """Return the records in a folder that wait to be gone on with, the newest first.
+def ends_in_verdict(folder: Path) -> bool:
+    """Return whether the end of the journal shows a verdict that no image follows.
 
-    They have images and no verdict. Of a concluded record only the end is read, so that
-    thousands of them cost little. Folders that cannot be read as records are passed
-    over: they are no offer.
+    No more is read than its last lines, so that thousands of concluded records cost
+    little. That no verdict is seen there does not mean that there is none.
 
     Raises
     ------
-    FileError
-        The folder of the records itself cannot be read.
+    OSError
+        There is no journal, or it cannot be read.
     """
-    try:
-        folders = list(root.iterdir()) if root.is_dir() else []
-    except OSError as error:
-        raise FileError(
-            f"The folder {printable(str(root))} cannot be read: {error.strerror}. "
-            "Interrupted swings in it are not offered; make sure that it is yours to "
-            "read."
-        ) from error
-    records = []
-    for folder in folders:
+    with (folder / JOURNAL).open("rb") as journal:
+        length = journal.seek(0, os.SEEK_END)
+        journal.seek(max(0, length - TAIL))
+        lines = journal.read().split(b"\n")[:-1]
+    for line in reversed(lines):
         try:
-            if not is_record(folder) or _ends_in_verdict(folder):
-                continue
-            record = open_record(folder)
-        except (FileError, OSError):
-            continue
-        if record.images and record.verdict is None:
-            records.append(record)
-    records.sort(key=lambda record: record.header.created.timestamp(), reverse=True)
-    return tuple(records)
+            kind = json.loads(line)["kind"]
+        except (ValueError, KeyError, TypeError):  # torn, cut by the limit, or damaged
+            return False
+        if kind in ("image", "verdict"):
+            return bool(kind == "verdict")
+    return False
 
 
 def source(record: Record) -> RecordSource:
@@ -345,22 +341,6 @@ def _recorded_image(folder: Path, entries: Mapping[str, Any]) -> RecordedImage:
     )
 
 
-def _ends_in_verdict(folder: Path) -> bool:
-    """Return whether the end of the journal shows a verdict that no image follows."""
-    with (folder / JOURNAL).open("rb") as journal:
-        length = journal.seek(0, os.SEEK_END)
-        journal.seek(max(0, length - TAIL))
-        lines = journal.read().split(b"\n")[:-1]
-    for line in reversed(lines):
-        try:
-            kind = json.loads(line)["kind"]
-        except (ValueError, KeyError, TypeError):  # torn, cut by the limit, or damaged
-            return False
-        if kind in ("image", "verdict"):
-            return bool(kind == "verdict")
-    return False
-
-
 def _sound_lines(folder: Path) -> list[bytes]:
     """Return the lines of the journal but a torn last one."""
     path = folder / JOURNAL
@@ -374,7 +354,11 @@ def _sound_lines(folder: Path) -> list[bytes]:
 
 def sound_length(folder: Path) -> int:
     """Return how many bytes of the journal in a folder are whole lines."""
-    return sum(len(line) + 1 for line in _sound_lines(folder))
+    return _length_of(_sound_lines(folder))
+
+
+def _length_of(lines: list[bytes]) -> int:
+    return sum(len(line) + 1 for line in lines)
 
 
 def _is_whole(line: bytes) -> bool:

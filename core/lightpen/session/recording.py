@@ -3,8 +3,9 @@
 import json
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from hashlib import sha256
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -28,21 +29,21 @@ from lightpen.session.record import (
     open_record,
     sound_length,
 )
+from lightpen.session.record_lock import lock_journal, unlock_journal
 
 
 class RecordWriter:
-    """Appends to a record; every method returns when its data is on the disk."""
+    """Appends to a record; every method returns when its data is on the disk.
+
+    No other writer can be made of the record, by this program or another, until it is
+    closed.
+    """
 
     def __init__(self, folder: Path, next_number: int, length: int) -> None:
         self._folder = folder
         self._next_number = next_number
         self._length = length
-        path = folder / JOURNAL
-        try:
-            self._journal = path.open("ab", buffering=0)
-            self._journal.truncate(length)
-        except OSError as error:
-            raise _unwritable(path, error) from error
+        self._journal = _own_journal(folder, length)
 
     @classmethod
     def create(cls, folder: Path, header: Header) -> Self:
@@ -74,11 +75,31 @@ class RecordWriter:
 
     @classmethod
     def resume(cls, record: Record) -> Self:
-        """Go on with a record; what a crash left behind is cut off."""
+        """Go on with a record; what a crash left behind is cut off.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record or did so since it was read, or it
+            cannot be written.
+        """
+        writer = cls(record.folder, record.next_number, record.length)
         for part in (record.folder / IMAGES).glob(".*.part"):
             with suppress(OSError):  # it does no harm where it is
                 part.unlink()
-        return cls(record.folder, record.next_number, sound_length(record.folder))
+        return writer
+
+    @classmethod
+    def of_damaged(cls, folder: Path) -> Self:
+        """Write into the journal of a record that cannot be read, to conclude it.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record, or it cannot be written.
+        """
+        length = sound_length(folder) if (folder / JOURNAL).exists() else 0
+        return cls(folder, 1, length)
 
     def __enter__(self) -> Self:
         return self
@@ -163,8 +184,11 @@ class RecordWriter:
         self._write_line({"kind": "verdict", "verdict": verdict})
 
     def close(self) -> None:
-        """Close the journal."""
-        self._journal.close()
+        """Close the journal and let other writers in."""
+        if self._journal.closed:
+            return
+        with self._journal, suppress(OSError):  # closing does it, too
+            unlock_journal(self._journal)
 
     def _write_line(self, entries: Mapping[str, Any]) -> None:
         line = json.dumps(entries, allow_nan=False).encode() + b"\n"
@@ -217,6 +241,26 @@ def encode_png(image: Image) -> bytes:
     if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.12 and later
         options += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
     return cv2.imencode(".png", image, options)[1].tobytes()
+
+
+def _own_journal(folder: Path, length: int) -> FileIO:
+    """Open a journal of so many bytes for this writer alone, and cut off the rest."""
+    path = folder / JOURNAL
+    with ExitStack() as stack:
+        try:
+            journal = stack.enter_context(path.open("ab", buffering=0))
+            lock_journal(journal, folder)
+            if sound_length(folder) != length:
+                raise FileError(
+                    f"The swing in {printable(str(folder))} has changed since it was "
+                    "read: another program wrote to it. Read it again to go on with "
+                    "all of its images."
+                )
+            journal.truncate(length)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        stack.pop_all()
+    return journal
 
 
 def _header_entries(header: Header) -> dict[str, Any]:
