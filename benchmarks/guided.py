@@ -8,7 +8,7 @@ weakest direction is 5 um at a noise of 0.05 px. Only LED centres are simulated.
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -114,7 +114,7 @@ def _swing(seed: int, kind: str) -> Outcome:
     operator = Operator(clock, seed, seated=True)
     rng = np.random.default_rng([STREAM, seed])
     anywhere = _Wandering(setup, rng)
-    state = start_swing(setup, heading=0.0)
+    state = replace(start_swing(setup), heading=0.0)
     aim: Posture | None = None
     began, slowest = 0.0, 0.0
     while state.phase is not Phase.SOLVING and clock.now_ns() < LONGEST * 1e9:

@@ -16,8 +16,8 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QCoreApplication
 
+from lightpen.session.interrupted import found_interrupted, read_resumable
 from lightpen.session.preparation import Names
-from lightpen.session.record import found_interrupted
 from lightpen.session.swing_state import Event, Happening, SwingLimits
 from lightpen_app.bench import Bench
 from lightpen_app.settings import Settings
@@ -48,7 +48,7 @@ def main() -> int:
     offered = found_interrupted(run.records_folder)
     if offered:
         record = offered[0]
-        run.resume_record(record.folder)
+        run.go_on(read_resumable(record.folder))
         _say("resumed", record.folder.name, len(record.images))
     else:
         run.begin(bench.preparation)

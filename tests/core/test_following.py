@@ -38,7 +38,7 @@ def operator() -> ToldOperator:
 @pytest.fixture
 def state() -> SwingState:
     """Return a swing that captures and knows the operator's right."""
-    start = start_swing(SwingSetup(paper_camera(), paper_pen()), heading=0.0)
+    start = replace(start_swing(SwingSetup(paper_camera(), paper_pen())), heading=0.0)
     return replace(start, phase=Phase.CAPTURING, target=ASKED)
 
 

@@ -181,6 +181,11 @@ def test_an_exchanged_coordinate_is_named() -> None:
     assert wrong == []
 
 
+def test_a_pen_fits_when_it_was_seen_in_views_enough() -> None:
+    assert not match_pen(CAMERA, PEN, SWUNG[:4]).fits
+    assert match_pen(CAMERA, PEN, SWUNG[:5]).fits
+
+
 def test_leds_exchanged_as_a_whole_fit_the_images() -> None:
     # LEDs are alike: only the frame can tell, see `frame_check`.
     leds = PEN.leds.copy()

@@ -121,6 +121,28 @@ def test_a_nominal_tip_takes_the_place_of_that_of_the_file(whole: Preparation) -
     np.testing.assert_array_equal(whole.pen.nominal_tip, whole.pen_file.pen.nominal_tip)
 
 
+def test_a_swing_goes_by_names_files_limits_mask_and_nominal_tip(
+    whole: Preparation,
+) -> None:
+    tip = np.array([0.0, 140.0, 2.0])
+    assert whole.camera_file is not None
+    assert whole.pen_file is not None
+    assert whole.swings_like(replace(whole, image_size=None))
+    assert replace(whole, nominal_tip=tip).swings_like(
+        replace(whole, nominal_tip=tip.copy())
+    )
+    others = (
+        replace(whole, names=replace(NAMES, tip="T-11")),
+        replace(whole, camera_file=CameraFile.read(whole.camera_file.path)),
+        replace(whole, pen_file=PenFile.read(whole.pen_file.path)),
+        replace(whole, limits=SwingLimits(max_images=200)),
+        replace(whole, mask=np.array([[10.0, 20.0, 5.0]])),
+        replace(whole, nominal_tip=tip),
+    )
+    assert not any(whole.swings_like(other) for other in others)
+    assert not replace(whole, nominal_tip=tip).swings_like(whole)
+
+
 @pytest.mark.parametrize("name", [ODD, "", "王", "a\tb"])
 def test_a_record_brings_its_names_back(
     whole: Preparation, tmp_path: Path, name: str

@@ -20,6 +20,7 @@ from lightpen.session.swing import (
     finish,
     pause,
     resume,
+    stillness,
 )
 from lightpen.session.swing_state import (
     Event,
@@ -457,6 +458,14 @@ def test_an_upright_and_still_pen_is_noticed() -> None:
     assert station.state.still_since is None or (
         station.now - station.state.still_since < 1.0
     )
+
+
+def test_three_seconds_upright_and_still_say_yes_and_no_more_than_that() -> None:
+    still = replace(Station().state, still_since=1.0)
+    assert stillness(replace(still, still_since=None, time=9.0)) == 0.0
+    assert stillness(replace(still, time=3.9)) == pytest.approx(2.9 / 3)
+    assert stillness(replace(still, time=4.0)) == 1.0
+    assert stillness(replace(still, time=9.0)) == 1.0
 
 
 @pytest.mark.parametrize("seed", range(3))

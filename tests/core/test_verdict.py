@@ -110,6 +110,17 @@ def test_many_dropped_images_are_checked(good: Calibration) -> None:
     assert verdict.reason.arguments == (38, 150)
 
 
+def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
+    good: Calibration,
+) -> None:
+    limits = SwingLimits(max_uncertainty=0.01, min_images=150)
+    assert judge(good, limits).grade is Grade.PASS
+
+    verdict = judge(good, replace(limits, min_images=151))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == Message(Code.TOO_FEW_IMAGES, (150, 151))
+
+
 def test_sides_that_the_pen_never_leant_to_are_named() -> None:
     rng = np.random.default_rng(0)
     postures = Postures(
@@ -131,6 +142,7 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         (Code.GOOD, NextStep.ACCEPT),
         (Code.UNCERTAIN, NextStep.CAPTURE_MORE),
         (Code.TOO_LITTLE_TILT, NextStep.CAPTURE_MORE),
+        (Code.TOO_FEW_IMAGES, NextStep.CAPTURE_MORE),
         (Code.HALVES_DIFFER, NextStep.REPEAT),
         (Code.MANY_DROPPED, NextStep.REPEAT),
         (Code.LEDS_MISFIT, NextStep.CHECK_FILES),

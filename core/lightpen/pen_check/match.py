@@ -31,6 +31,7 @@ MAX_VIEWS = 30
 MOVED = 0.006  # of the extent of the spots, by which views differ
 N_COMPARED = 20  # spots of each, at most, as every image is compared with all views
 BESIDE = 12.0  # px from its place, where an LED's spot is looked for
+ENOUGH_VIEWS = 5  # before a pen is said to fit
 SAME = 0.3  # mm, within which two coordinates are the same
 SURE = 0.05  # mm, standard deviation of a shift that is told with its direction
 SURE_SHARE = 0.1  # of its length, likewise
@@ -99,8 +100,9 @@ class PenMatch:
 
     @property
     def fits(self) -> bool:
-        """Whether the pen was found and nothing is wrong."""
-        return self.n_labelled > 0 and not self.findings
+        """Whether the pen was found in views enough to say so, and nothing is wrong."""
+        enough = self.n_labelled > 0 and self.n_views >= ENOUGH_VIEWS
+        return enough and not self.findings
 
 
 def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:

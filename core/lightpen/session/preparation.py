@@ -199,6 +199,17 @@ class Preparation:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
         return SwingSetup(camera, pen, self.limits, self.mask)
 
+    def swings_like(self, other: "Preparation") -> bool:
+        """Return whether a swing begun with the other would be the same."""
+        return (
+            self.camera_file is other.camera_file
+            and self.pen_file is other.pen_file
+            and self.names == other.names
+            and self.limits == other.limits
+            and _same(self.nominal_tip, other.nominal_tip)
+            and np.array_equal(self.mask, other.mask)
+        )
+
     def header(self, settings: dict[str, Plain] | None = None) -> Header:
         """Return the header of a record that begins now; files are read again."""
         if self.camera_file is None or self.pen_file is None:
@@ -252,15 +263,26 @@ def recorded_setup(record: Record) -> SwingSetup:
     FileError
         The copy of the camera or pen file cannot be read.
     """
-    found, usual = source(record), SwingLimits()
-    limits = SwingLimits(
+    found = source(record)
+    return SwingSetup(found.camera, found.pen, recorded_limits(record), found.mask)
+
+
+def recorded_limits(record: Record) -> SwingLimits:
+    """Return what a record's swing needed, and when it was to end."""
+    usual = SwingLimits()
+    return SwingLimits(
         max_uncertainty=_number(record, "max_uncertainty_mm", usual.max_uncertainty),
         min_images=int(_number(record, "min_images", usual.min_images)),
         max_images=int(_number(record, "max_images", usual.max_images)),
         min_per_field=int(_number(record, "min_per_field", usual.min_per_field)),
         spacing=_number(record, "spacing_rad", usual.spacing),
     )
-    return SwingSetup(found.camera, found.pen, limits, found.mask)
+
+
+def _same(one: FloatArray | None, other: FloatArray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def _number(record: Record, key: str, usual: float) -> float:

@@ -56,6 +56,7 @@ BAD_SIGMA = 3.0  # times the noise of the other images
 SOME_SIGMA = 0.05  # px; less is never bad
 UPRIGHT = np.radians(8.0)
 STILL = np.radians(1.5)
+CONFIRMING = 3.0  # s upright and still, by which the operator says yes without a key
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +121,13 @@ def conclude(state: SwingState, verdict: Message, passed: bool) -> Fed:
     """Show the verdict on the solved swing."""
     happening = Happening.DONE if passed else Happening.FAILED
     return Fed(_enter(state, Phase.VERDICT, verdict), (Event(happening),))
+
+
+def stillness(state: SwingState) -> float:
+    """Return how much of the time to say yes the pen is upright and still, 0 to 1."""
+    if state.still_since is None:
+        return 0.0
+    return min((state.time - state.still_since) / CONFIRMING, 1.0)
 
 
 def start_again(

@@ -231,19 +231,8 @@ class SwingState:
         return dial_counts(self.kept.rotations)
 
 
-def start_swing(
-    setup: SwingSetup, time: float = 0.0, heading: float | None = None
-) -> SwingState:
-    """Return a swing of which nothing has been seen.
-
-    Parameters
-    ----------
-    setup : SwingSetup
-    time : float
-        s.
-    heading : float, optional
-        The operator's right as the camera sees it, rad, if it is known.
-    """
+def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
+    """Return a swing of which nothing has been seen; the time is in s."""
     return SwingState(
         phase=Phase.WAIT,
         since=time,
@@ -259,7 +248,7 @@ def start_swing(
         strayed_since=None,
         stray_rotations=np.zeros((0, 3, 3)),
         flawed_rotations=np.zeros((0, 3, 3)),
-        heading=heading,
+        heading=None,
         target=None,
         target_since=time,
         still_since=None,

@@ -61,6 +61,7 @@ class Verdict:
 _NEXT_STEPS = {
     Code.GOOD: NextStep.ACCEPT,
     Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
     Code.MANY_DROPPED: NextStep.REPEAT,
@@ -136,6 +137,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         return Verdict(Grade.CHECK, dropped)
     if uncertainty > limit:
         return Verdict(Grade.CHECK, uncertain)
+    if n_images < limits.min_images:
+        few = Message(Code.TOO_FEW_IMAGES, (n_images, limits.min_images))
+        return Verdict(Grade.CHECK, few)
     bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
     if len(bare):
         n_images = limits.min_per_field * len(bare)
