@@ -33,6 +33,7 @@ from lightpen.cameras.protocol import Frame, FrameTimeout, sealed
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.session.following import Follower
+from lightpen.session.interrupted import read_resumable
 from lightpen.session.live import LiveImage
 from lightpen.session.preparation import Names, Preparation
 from lightpen.session.recording import RecordWriter
@@ -193,7 +194,7 @@ class Stage:
         run = self._bench.run
         folder = run.records_folder / "20260930-100000_LP-04_T-10-80"
         _record(folder, self._bench.preparation)
-        run.resume_record(folder)
+        run.go_on(read_resumable(folder))
         run.finish()
         self._wait_until(lambda: run.solution is not None)
 

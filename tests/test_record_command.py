@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -70,6 +71,17 @@ def test_the_record_may_be_called_from_another_folder_or_with_a_slash(
 
     assert calibrated(Path())[0]["tip_pen_mm"] == tip
     assert calibrated(Path("images") / "..")[0]["tip_pen_mm"] == tip
+
+
+def test_a_swing_that_another_program_captures_can_be_calibrated(
+    calibrated: Calibrated,
+    folder: Path,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    tip = calibrated(folder)[0]["tip_pen_mm"]
+    holding(folder)
+
+    assert calibrated(folder)[0]["tip_pen_mm"] == tip
 
 
 def test_the_nominal_tip_of_the_record_is_compared_with(

@@ -25,7 +25,7 @@ from lightpen_app.bench import Bench
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.languages import LanguageSwitch
-from lightpen_app.main_window import MainWindow
+from lightpen_app.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.pages.page import Page
 from lightpen_app.services import Services
 from lightpen_app.settings import Preferences, Settings, data_folder, settings_file
@@ -73,6 +73,7 @@ class Wizard(QObject):
         self.bench = Bench(settings, folder, around, self)
         services = Services(self.bench, self._sounds)
         self.window = MainWindow(make_pages(services), settings, self._preferences)
+        self.window.setMinimumSize(LEAST_SIZE)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
@@ -124,7 +125,8 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         )
     application = make_application(arguments)
     wizard = Wizard(application, make_pages, Settings(settings_file()), data_folder())
-    return _shown(application, wizard)
+    status = _shown(application, wizard)
+    return _ended(wizard, status)
 
 
 def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
@@ -145,14 +147,14 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         wizard = Wizard(application, make_pages, settings, Path(folder))
         demo = Demo(wizard.window, wizard.bench, is_watched=is_seen)
         if not is_seen:
-            demo.told.connect(_print)
+            demo.told.connect(partial(print, flush=True))
             demo.ended.connect(partial(_print_tip, wizard.bench.run))
             demo.ended.connect(wizard.window.close)
         QTimer.singleShot(0, demo.start)
         status = _shown(application, wizard)
         if not is_seen and wizard.bench.run.result is None:
-            return 1
-        return status
+            status = 1
+    return _ended(wizard, status)
 
 
 def has_display() -> bool:
@@ -173,18 +175,28 @@ def _shown(application: QApplication, wizard: Wizard) -> int:
         wizard.crash_hook.remove()
 
 
+def _ended(wizard: Wizard, status: int) -> int:
+    """Return the exit status, but end the process where something has not ended.
+
+    Qt and OpenBLAS wait at the end of a process for their threads, without end for one
+    that is stuck, as in a write to a disk that does not answer. What was acknowledged
+    is on the disk, as after any kill.
+    """
+    if not wizard.bench.shut_down(0.0):
+        for stream in (sys.stdout, sys.stderr):
+            if stream is not None:  # as it is without a console on Windows
+                stream.flush()
+        os._exit(status)
+    return status
+
+
 def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
     """Hand on what Qt says, but for what each hidden window makes it say."""
     if "propagateSizeHints" not in text:
-        sys.stderr.write(f"{text}\n")
-
-
-def _print(text: str) -> None:
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
+        print(text, file=sys.stderr)
 
 
 def _print_tip(run: SwingRun) -> None:
     if run.solution is not None:
         nominal = run.solution.source.pen.nominal_tip
-        _print("\n" + calibration_text(run.solution.calibration, "joint", nominal))
+        print("\n" + calibration_text(run.solution.calibration, "joint", nominal))

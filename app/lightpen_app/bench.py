@@ -3,9 +3,10 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QThreadPool, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Settings as CameraSettings
@@ -18,11 +19,10 @@ from lightpen.session.preparation import (
     SourceChoice,
     SourceKind,
 )
-from lightpen.session.results import Result, last_result
 from lightpen.session.sources import Surroundings, camera_of
 from lightpen.session.swing_state import SwingLimits
 from lightpen.simulator.scene_files import write_sample_files
-from lightpen_app.live_view import LiveView, Shown
+from lightpen_app.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.settings import Settings, Station
 from lightpen_app.swing_run import SwingRun
 
@@ -170,22 +170,20 @@ class Bench(QObject):
             )
         )
 
-    def last_result(self) -> Result | None:
-        """Return the result in force for the pen and tip that are chosen.
+    def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
+        """Close the camera, cancel what is under way, and wait until all has ended.
 
-        Raises
-        ------
-        FileError
-            It is damaged.
+        Returns
+        -------
+        bool
+            Whether it has, the jobs of all pages included. What goes on may be left
+            behind: all that was acknowledged is on the disk.
         """
-        names = self._preparation.names
-        return last_result(self.run.results_folder, names.pen, names.tip)
-
-    def shut_down(self) -> None:
-        """Close the camera and cancel what is under way."""
+        deadline = monotonic() + timeout_s
         self.run.shut_down()
         self.live.close()
-        self.live.await_closed()
+        jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
+        return self.live.await_closed(max(0.0, deadline - monotonic())) and jobs_ended
 
     def _files(self, station: Station) -> tuple[CameraFile | None, PenFile | None]:
         """Read the files of a station; what cannot be read must be chosen again."""

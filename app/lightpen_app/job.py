@@ -66,18 +66,11 @@ class Job(QObject):
         """Ask the job to stop at its next report; its outcome is then not told."""
         self._cancelled.set()
 
-    @property
-    def is_over(self) -> bool:
-        """Whether it has let go of its thread."""
-        return self._over.is_set()
-
-    def wait(self, timeout_s: float) -> bool:
-        """Wait for a job that was started; return whether it is over by then."""
-        return self._over.wait(timeout_s)
-
     def _run(self) -> None:
         tell: Callable[[], object] = self._broke.emit
         try:
+            if self._cancelled.is_set():  # while it waited for a thread
+                raise Cancelled
             tell = partial(self._returned.emit, self._function(self._report))
         except Cancelled:
             tell = _tell_nothing

@@ -30,7 +30,7 @@ from lightpen.session.swing_state import Event, Phase, SwingState
 from lightpen_app.mailbox import Mailbox
 from lightpen_app.widgets.image_view import pooled
 
-CLOSING_TIME = 10.0  # s; a dead camera may take 8
+CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,11 +3,12 @@
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from PySide6.QtCore import QEvent, QPoint, Qt, QThreadPool, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
+    QBoxLayout,
     QFrame,
     QGridLayout,
     QMainWindow,
@@ -37,9 +38,10 @@ from lightpen_app.widgets.help_window import HelpWindow
 from lightpen_app.widgets.notice_bar import NoticeBar
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.options_menu import OptionsMenu
+from lightpen_app.widgets.room import Room
 from lightpen_app.widgets.sidebar import Sidebar
 
-CLOSING_TIME_MS = 10_000  # a camera may take 8 s to close
+LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
@@ -64,7 +66,8 @@ class MainWindow(QMainWindow):
     preferences_changed(Preferences)
         The user chose otherwise.
     closing()
-        The pages are shut down; what they share must be, too.
+        The pages are shut down; what they share must be, too, and whoever does so
+        waits for what is still under way.
     """
 
     preferences_changed = Signal(object)
@@ -85,14 +88,17 @@ class MainWindow(QMainWindow):
         self._pages = tuple(pages)
         self._settings = settings
         self._now = 0
+        self._room = Room()
         self._notice_is_of_page = False
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
         self._notice = NoticeBar()
         self._title = text_label(TextSize.TITLE)
+        self._title.setWordWrap(False)
         self._lead = text_label(TextSize.BODY, Tone.QUIET)
         self._stack = QStackedWidget()
+        self._stack.setMinimumSize(1, 1)  # the pages ask for none: they scroll
         for page in self._pages:
             self._stack.addWidget(page)
         self._show_page()
@@ -123,6 +129,7 @@ class MainWindow(QMainWindow):
         for page in self._pages:
             self._connect_page(page)
 
+        self._use_room()
         self._retranslate()
         if not settings.restore_geometry(self):
             self.resize(160 * GRID, 100 * GRID)
@@ -227,6 +234,14 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        room = Room.of(event.size())
+        if room != self._room:
+            self._room = room
+            self._use_room()
+
+    @override
     def closeEvent(self, event: QCloseEvent) -> None:
         questions = [page.unsaved() for page in self._pages if page.unsaved()]
         if questions and not self._confirmed("\n\n".join(questions)):
@@ -239,10 +254,9 @@ class MainWindow(QMainWindow):
         self.page().left()
         for page in self._pages:
             page.shut_down()
-        self.closing.emit()
-        QThreadPool.globalInstance().waitForDone(CLOSING_TIME_MS)
         with suppress(FileError):  # nobody is left to tell; it was told at the choice
             self._settings.sync()
+        self.closing.emit()
         super().closeEvent(event)
 
     @override
@@ -298,13 +312,15 @@ class MainWindow(QMainWindow):
         """Return all widgets in their places."""
         area = QFrame()
         area.setObjectName("page_area")
-        page = QVBoxLayout(area)
-        page.setContentsMargins(4 * GRID, 2 * GRID, 4 * GRID, 3 * GRID)
+        self._page_layout = page = QVBoxLayout(area)
         page.setSpacing(GRID)
         page.addWidget(self._notice)
         page.addSpacing(GRID)
-        page.addWidget(self._title)
-        page.addWidget(self._lead)
+        self._heading = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._heading.setSpacing(GRID)
+        self._heading.addWidget(self._title)
+        self._heading.addWidget(self._lead, 1)
+        page.addLayout(self._heading)
         page.addSpacing(GRID)
         page.addWidget(self._stack, 1)
 
@@ -317,6 +333,21 @@ class MainWindow(QMainWindow):
         layout.addWidget(self._action_bar, 1, 1)
         layout.setRowStretch(0, 1)
         return central
+
+    def _use_room(self) -> None:
+        """Arrange what is about the page as the size of the window allows."""
+        room = self._room
+        side = room.margin
+        if room.is_low:
+            self._page_layout.setContentsMargins(side, 0, side, GRID)
+            self._heading.setDirection(QBoxLayout.Direction.LeftToRight)
+            self._heading.setSpacing(3 * GRID)
+        else:
+            self._page_layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
+            self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
+            self._heading.setSpacing(GRID)
+        self._sidebar.set_room(room)
+        self._action_bar.set_room(room)
 
     def _show_page(self) -> None:
         """Show the present page; only that one may ask for room."""

@@ -173,8 +173,8 @@ _PHRASES: dict[Code, tuple[str, str]] = {
         QT_TRANSLATE_NOOP("phrases", "Many images dropped"),
         QT_TRANSLATE_NOOP(
             "phrases",
-            "{0} of {1} images do not take part. Look at their reasons below, and "
-            "repeat the swing if the tip slipped.",
+            "{0} of {1} images do not take part. Review has their reasons; repeat the "
+            "swing if the tip slipped.",
         ),
     ),
     Code.LEDS_MISFIT: (

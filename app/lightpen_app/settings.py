@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import platformdirs
 from PySide6.QtCore import QByteArray, QLocale, QSettings
@@ -13,8 +13,6 @@ from lightpen.errors import FileError
 from lightpen.session.swing_state import SwingLimits
 from lightpen_app.languages import Language
 from lightpen_app.theme import Appearance
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -81,6 +79,9 @@ class Station:
     max_uncertainty: float = SwingLimits.max_uncertainty
     min_images: int = SwingLimits.min_images
     max_images: int = SwingLimits.max_images
+
+
+Group = TypeVar("Group", Preferences, Station)
 
 
 class Settings:
@@ -162,16 +163,16 @@ class Settings:
         if self._ini.status() != QSettings.Status.NoError:
             raise _cannot_be_saved(self._file)
 
-    def _read(self, group: str, default: T) -> T:
-        values = {}
-        for each in fields(default):  # type: ignore[arg-type]
+    def _read(self, group: str, default: Group) -> Group:
+        values: dict[str, Any] = {}
+        for each in fields(default):
             fallback = getattr(default, each.name)
             saved = self._ini.value(f"{group}/{each.name}")
             values[each.name] = _converted(saved, fallback)
         return type(default)(**values)
 
-    def _write(self, group: str, value: object) -> None:
-        for each in fields(value):  # type: ignore[arg-type]
+    def _write(self, group: str, value: Preferences | Station) -> None:
+        for each in fields(value):
             content = getattr(value, each.name)
             text = repr(content) if isinstance(content, float) else str(content)
             self._ini.setValue(f"{group}/{each.name}", text)
@@ -195,16 +196,16 @@ def _cannot_be_saved(file: Path) -> FileError:
     )
 
 
-def _converted(saved: object, fallback: T) -> T:
+def _converted(saved: object, fallback: Any) -> Any:
     """Return a saved text as the type of its default, or the default."""
     if not isinstance(saved, str):
         # QSettings turns a text with commas into a list.
         return fallback
     kind = type(fallback)
     if kind is bool:
-        return {"True": True, "False": False}.get(saved, fallback)  # type: ignore[return-value]
+        return {"True": True, "False": False}.get(saved, fallback)
     try:
-        value = kind(saved)  # type: ignore[call-arg]
+        value = kind(saved)
     except ValueError:
         return fallback
     usable = not isinstance(value, float) or math.isfinite(value)

@@ -5,7 +5,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from time import monotonic
 
 from PySide6.QtCore import QObject, Signal
 
@@ -22,6 +21,7 @@ from lightpen.session.messages import Code, Message
 from lightpen.session.preparation import (
     Names,
     Preparation,
+    recorded_limits,
     recorded_names,
 )
 from lightpen.session.record import open_record
@@ -32,6 +32,7 @@ from lightpen.session.solving import Solution, solve_again, solve_record
 from lightpen.session.swing import conclude
 from lightpen.session.swing_state import (
     Phase,
+    SwingLimits,
     SwingSetup,
     SwingState,
 )
@@ -40,7 +41,6 @@ from lightpen_app.job import Job, Report
 from lightpen_app.live_view import LiveView
 
 RECORDS, RESULTS = "records", "results"
-CLOSING_TIME = 10.0  # s, after which a job that does not end is left alone
 
 
 class SwingRun(QObject):
@@ -79,13 +79,14 @@ class SwingRun(QObject):
         self._state: SwingState | None = None
         self._record_folder: Path | None = None
         self._names = Names()
+        self._limits = SwingLimits()
         self._solution: Solution | None = None
         self._verdict: Verdict | None = None
         self._result: Result | None = None
         self._wanted: Mapping[int, str] = {}
         self._tried: Mapping[int, str] = {}
         self._job: Job | None = None
-        self._jobs: list[Job] = []
+        self._reading: Job | None = None
 
         # Connections
         live.swing_changed.connect(self._on_swing_changed)
@@ -135,6 +136,11 @@ class SwingRun(QObject):
         return self._job is not None
 
     @property
+    def is_reading(self) -> bool:
+        """Whether the images of the swing are being read, to capture more."""
+        return self._reading is not None
+
+    @property
     def is_capturing(self) -> bool:
         """Whether images are being taken, or wait to be."""
         state = self._state
@@ -163,19 +169,7 @@ class SwingRun(QObject):
         now = datetime.now().astimezone()
         folder = new_folder(self.records_folder, preparation.names, now)
         RecordWriter.create(folder, preparation.header()).close()
-        swing = read_resumable(folder)  # so with the files as they are recorded
-        heading = None if self._state is None else self._state.heading
-        self.go_on(replace(swing, state=replace(swing.state, heading=heading)))
-
-    def resume_record(self, folder: Path) -> None:
-        """Go on with an interrupted swing, with the files of its record.
-
-        Raises
-        ------
-        FileError
-            The record or one of its files cannot be read or written.
-        """
-        self.go_on(read_resumable(folder))
+        self.go_on(read_resumable(folder))  # so with the files as they are recorded
 
     def go_on(self, swing: Resumable) -> None:
         """Go on with an interrupted swing that was read back.
@@ -189,20 +183,29 @@ class SwingRun(QObject):
         if self.is_capturing and record.folder == self._record_folder:
             return  # it goes on already
         writer = RecordWriter.resume(record)
+        self._limits = recorded_limits(record)  # asking for more does not raise them
         swinging = Swinging(swing.setup, writer, swing.state)
         self._enter(recorded_names(record), record.folder, swinging)
 
     def capture_more(self) -> None:
-        """Go on with this swing after its verdict.
+        """Go on with this swing after its verdict, as soon as its images are read.
 
-        Raises
-        ------
-        FileError
-            As `resume_record`.
+        Where they cannot be, it is `troubled`, and the solution stays.
         """
-        if self._record_folder is None:
+        folder = self._record_folder
+        if folder is None:
             raise ValueError("`capture_more` needs a swing.")
-        self.go_on(read_for_more(self._record_folder))
+        if self.is_reading:
+            return
+        self.cancel()
+        self._reading = job = Job(lambda _: read_for_more(folder), self)
+
+        # Connections
+        job.succeeded.connect(self._on_read)
+        job.failed.connect(self._on_unread)
+        job.crashed.connect(self.cancel)
+        job.start()
+        self.changed.emit()
 
     def pause(self) -> None:
         """Pause the capture for the user."""
@@ -235,11 +238,13 @@ class SwingRun(QObject):
         self._run(lambda report: solve_record(open_record(folder), report))
 
     def cancel(self) -> None:
-        """Stop computing; images, record and solution stay as they are."""
-        job, self._job = self._job, None
-        if job is None:
+        """Stop computing and reading; images, record and solution stay as they are."""
+        jobs = [job for job in (self._job, self._reading) if job is not None]
+        if not jobs:
             return
-        job.cancel()
+        self._job = self._reading = None
+        for job in jobs:
+            job.cancel()
         if self._solution is not None:
             self._wanted = self._solution.taken_out
         self.changed.emit()
@@ -264,6 +269,8 @@ class SwingRun(QObject):
         solution, verdict = self._require_solution(), self._verdict
         assert verdict is not None
         assert self._record_folder is not None
+        if not verdict.can_be_accepted:
+            raise ValueError(f"The verdict must not be {verdict.grade}.")
         calibration = solution.calibration
         result = Result(
             names=self._names,
@@ -301,12 +308,9 @@ class SwingRun(QObject):
         self.abandon()
 
     def shut_down(self) -> None:
-        """End what is under way; a swing that is captured can be resumed."""
+        """Cancel what is under way; a swing that is captured can be resumed."""
         self.cancel()
         self._live.abandon()
-        deadline = monotonic() + CLOSING_TIME
-        for job in self._jobs:
-            job.wait(max(0.0, deadline - monotonic()))
 
     def _enter(self, names: Names, folder: Path, swinging: Swinging) -> None:
         self.cancel()
@@ -335,7 +339,6 @@ class SwingRun(QObject):
 
     def _run(self, function: Callable[[Report], Solution]) -> None:
         self._job = job = Job(function, self)
-        self._jobs = [*(each for each in self._jobs if not each.is_over), job]
 
         # Connections
         job.progressed.connect(self.progressed)
@@ -368,8 +371,19 @@ class SwingRun(QObject):
             return
         self._live.swing(replace(left, writer=writer))
 
+    def _on_read(self, swing: Resumable) -> None:
+        self._reading = None
+        try:
+            self.go_on(swing)
+        except FileError as error:
+            self._on_unread(str(error))
+
+    def _on_unread(self, sentence: str) -> None:
+        self._reading = None
+        self.troubled.emit(sentence)
+        self.changed.emit()
+
     def _on_solved(self, solution: Solution) -> None:
-        assert self._setup is not None
         assert self._record_folder is not None
         if self._solution is None:
             self._wanted = solution.taken_out
@@ -380,7 +394,7 @@ class SwingRun(QObject):
                 self._on_unsolved(str(error))
                 return
         self._job, self._solution, self._result = None, solution, None
-        self._verdict = judge(solution.calibration, self._setup.limits)
+        self._verdict = judge(solution.calibration, self._limits)
         self._conclude(self._verdict.reason, self._verdict.grade is not Grade.REPEAT)
         if self._wanted != solution.taken_out:
             self._solve_again()

@@ -394,10 +394,6 @@ def test_a_recording_does_not_forget_the_exposure(
 # Results and records
 
 
-def test_no_result_is_in_force_at_first(stage: Stage) -> None:
-    assert stage.bench.last_result() is None
-
-
 def test_a_swing_of_a_recorded_source_finds_its_images(
     stage: Stage, swung: Callable[..., Path]
 ) -> None:

@@ -38,6 +38,7 @@ from lightpen.spots import detect_spots
 from lightpen_app.bench import Bench
 from lightpen_app.main_window import MainWindow
 from lightpen_app.pages.camera import CameraPage
+from lightpen_app.pages.camera_intrinsics import IntrinsicsPanel
 from lightpen_app.pages.camera_stray import StrayLightPanel
 from lightpen_app.pages.page import MainAction, Page
 from lightpen_app.services import Services
@@ -329,6 +330,19 @@ def test_date_and_uncertainty_of_the_intrinsics_are_shown(
     assert "14" in live.words
     assert "2025" in live.words
     assert "no uncertainty" not in live.words
+
+
+def test_facts_that_are_not_known_take_no_focus(live: Seen, bench: Bench) -> None:
+    facts = live.child(IntrinsicsPanel).findChildren(QLabel)
+    selectable = Qt.TextInteractionFlag.TextSelectableByMouse
+    told = [each for each in facts if each.textInteractionFlags() & selectable]
+    assert len(told) == 4
+    assert all(each.text() for each in told)
+
+    bench.set_preparation(replace(bench.preparation, camera_file=None))
+
+    focusable = [each for each in facts if each.focusPolicy() != Qt.FocusPolicy.NoFocus]
+    assert focusable == []
 
 
 def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(

@@ -342,6 +342,7 @@ def test_wrong_units_are_told(seen: Seen, bench: Bench, tmp_path: Path) -> None:
     choice.textActivated.emit(choice.currentText())
 
     assert "Are the coordinates in metres?" in seen.words
+    assert f"{before.path.name} stays in use." in seen.words
     assert in_use(bench) is before
 
 
@@ -677,6 +678,23 @@ def test_a_pen_that_fits_is_said_to(live: Seen) -> None:
     live.qtbot.waitUntil(lambda: live.cell(7, MISFIT).startswith("0.0"))
     labels = {marker.label for marker in live.markers}
     assert labels <= {str(led) for led in range(1, 11)} | {""}
+
+
+def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_compared(
+    live: Seen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    live.wait("Every LED sits where the table has it, in")
+    with monkeypatch.context() as broken:
+        broken.setattr("lightpen_app.pages.leds_watch.match_pen", lambda *_: 1 / 0)
+        live.qtbot.waitUntil(lambda: bool(caught), timeout=8000)
+        live.qtbot.waitUntil(lambda: not live.cell(7, MISFIT), timeout=8000)
+        assert "Every LED sits" not in live.words
+
+    live.wait("Every LED sits where the table has it, in")
+    live.qtbot.waitUntil(lambda: live.cell(7, MISFIT).startswith("0.0"))
+    assert all(isinstance(error, ZeroDivisionError) for error in caught)
 
 
 def test_a_displaced_led_is_named_and_marked_everywhere(live: Seen) -> None:

@@ -169,3 +169,30 @@ def test_the_camera_is_drawn_where_it_stands(dial: PostureDial) -> None:
     for heading, y in ((0.0, -1.085), (math.pi, 1.085)):
         dial.set_value(DialValue(needed=WANTED, heading=heading))
         assert color_at(seen(dial), 0.0, y) == QColor(DARK.muted).name()
+
+
+@pytest.mark.parametrize("side", [240, 400])
+@pytest.mark.parametrize("eighths", range(1, 8))
+def test_the_camera_is_named_from_whichever_side_it_looks(
+    qtbot: QtBot, side: int, eighths: int
+) -> None:
+    """As much is drawn of mark and word as where they have the most room."""
+    dial = PostureDial()
+    qtbot.addWidget(dial)
+    dial.resize(side, side + 60)
+    wanted = n_muted(seen(dial))
+
+    dial.set_value(DialValue(heading=eighths * math.pi / 4))
+
+    # Words that are turned are shaded otherwise, by 2 %; the word is a quarter of all.
+    assert n_muted(seen(dial)) == pytest.approx(wanted, rel=0.05)
+
+
+def n_muted(image: QImage) -> float:
+    """Return how much is drawn in the colour of quiet words, in whole pixels."""
+    rgb = image.convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(rgb.constBits(), np.uint8).reshape(rgb.height(), -1)
+    pixels = rows[:, : 3 * rgb.width()].reshape(rgb.height(), -1, 3).astype(float)
+    red = pixels[:, :, 0]
+    ground, ink = (QColor(each).red() for each in (DARK.line, DARK.muted))
+    return float(np.sum(np.clip((red - ground) / (ink - ground), 0, 1)))

@@ -27,12 +27,14 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
 from lightpen.observe import Reason
+from lightpen.session.interrupted import read_resumable
 from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
 from lightpen.session.progress import N_MORE
 from lightpen.session.record import DISCARDED, open_record
 from lightpen.session.recording import RecordWriter
-from lightpen.session.results import Result, store_result
+from lightpen.session.results import Result, last_result, store_result
 from lightpen.session.sighting import look
+from lightpen.session.swing_state import SwingLimits
 from lightpen.session.verdict import Grade
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.scene_files import write_sample_files
@@ -76,6 +78,7 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
         names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
         camera_file=CameraFile.read(files.camera),
         pen_file=PenFile.read(files.pen),
+        limits=SwingLimits(min_images=N_IMAGES),
     )
     camera, pen = small_scene.camera, small_scene.pen
     tilts = np.radians([2.0, 15.0, 28.0]).repeat(8)[4:]
@@ -109,7 +112,7 @@ class Bed:
         header["settings"]["max_uncertainty_mm"] = limit
         (folder / "header.json").write_text(json.dumps(header), "utf-8")
         bench.open_camera()
-        bench.run.resume_record(folder)
+        bench.run.go_on(read_resumable(folder))
         bench.run.finish()
         self.qtbot.waitUntil(lambda: bench.run.verdict is not None, timeout=PATIENCE_MS)
         bench.live.close()
@@ -215,6 +218,11 @@ def await_solution(qtbot: QtBot, bench: Bench) -> None:
     qtbot.waitUntil(lambda: not bench.run.is_solving, timeout=PATIENCE_MS)
 
 
+def in_force(bench: Bench) -> Result | None:
+    names = bench.preparation.names
+    return last_result(bench.run.results_folder, names.pen, names.tip)
+
+
 def put_in_force(bench: Bench, tip_pen: FloatArray, pen: str = "LP-04") -> None:
     """Store a result of some time ago."""
     names = replace(bench.run.names, pen=pen)
@@ -297,7 +305,7 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     assert page.main_action().why_not.startswith("Not good enough")
     page.run_main_action()
     assert not page.is_complete()
-    assert bench.last_result() is None
+    assert in_force(bench) is None
 
 
 def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
@@ -469,6 +477,32 @@ def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
         timeout=PATIENCE_MS,
     )
     assert the(page, ResidualView).image_size().isEmpty()
+
+
+def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    bed.solve()
+    with monkeypatch.context() as broken:
+        broken.setattr("lightpen_app.pages.review_images.load_image", lambda *_: 1 / 0)
+        page = bed.show()
+        view, numbers = the(page, ResidualView), table(page)
+        bed.qtbot.waitUntil(
+            lambda: "The image cannot be shown." in view.accessibleDescription(),
+            timeout=PATIENCE_MS,
+        )
+    assert isinstance(caught[0], ZeroDivisionError)
+    assert view.image_size().isEmpty()
+    first = numbers.number()
+
+    for key in (Qt.Key.Key_Down, Qt.Key.Key_Up):
+        QTest.keyClick(numbers, key)
+        bed.qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
+    bed.qtbot.waitUntil(lambda: not view.image_size().isEmpty(), timeout=PATIENCE_MS)
+    assert numbers.number() == first
+    assert "cannot be shown" not in view.accessibleDescription()
 
 
 def test_a_click_on_the_misfit_chooses_the_image(
@@ -654,12 +688,12 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     page: ReviewPage, bench: Bench, qtbot: QtBot
 ) -> None:
     assert page.unsaved().startswith("The tip is not accepted.")
-    assert bench.last_result() is None
+    assert in_force(bench) is None
 
     with qtbot.waitSignal(page.changed):
         page.run_main_action()
 
-    result = bench.last_result()
+    result = in_force(bench)
     assert result is not None
     np.testing.assert_array_equal(result.tip_pen, tip(bench))
     state = banner(page)
@@ -739,11 +773,12 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 ) -> None:
     (bench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
 
-    with qtbot.waitSignal(page.notice_raised, timeout=PATIENCE_MS) as told:
+    with qtbot.waitSignal(bench.troubled, timeout=PATIENCE_MS) as told:
         click(page, "Capture more")
 
     assert "is damaged" in told.args[0]
     assert bench.run.solution is not None
+    assert page.main_action().why_not == ""
 
 
 def test_a_repetition_is_asked_for_and_can_be_declined(

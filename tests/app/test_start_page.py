@@ -1,5 +1,7 @@
 """Start: what is typed is remembered, and what there is already is shown."""
 
+import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import datetime, timedelta
@@ -31,7 +33,7 @@ from lightpen.session.preparation import (
 )
 from lightpen.session.record import DISCARDED, open_record
 from lightpen.session.recording import RecordWriter
-from lightpen.session.results import Result, store_result
+from lightpen.session.results import Result, last_result, store_result
 from lightpen.session.swing_state import SwingLimits
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen_app.bench import Bench
@@ -125,6 +127,15 @@ class Opened:
         (panel,) = self.page.findChildren(InterruptedPanel)
         assert panel.isVisibleTo(self.page) is bool(panel.rows())
         return panel.rows()
+
+    def buttons(self) -> list[str]:
+        """Return what can be pressed of the swings and below."""
+        return [
+            button.text()
+            for button in self.page.findChildren(QPushButton)
+            if button.isVisibleTo(self.page)
+            and button.text() in ("Resume", "Discard", "Look again", "Test the sounds")
+        ]
 
     @property
     def why_not(self) -> str:
@@ -312,7 +323,8 @@ def test_any_name_will_do(
     assert again.run.record_folder is not None
     again.shut_down()
     accepted(bench, timedelta(0))
-    assert again.last_result() is not None
+    found = last_result(again.run.results_folder, name, name)
+    assert found is not None
 
 
 def test_the_subject_is_pen_and_cone_as_they_are_typed(start: Opened) -> None:
@@ -684,11 +696,11 @@ def test_the_page_is_there_before_the_swings_are_looked_for(
     QThreadPool.globalInstance().waitForDone()
     QApplication.processEvents()
     (panel,) = page.findChildren(InterruptedPanel)
-    assert panel.value() == ()
+    assert panel.rows() == ()
 
     page.show()
 
-    qtbot.wait_until(lambda: len(panel.value()) == 1)
+    qtbot.wait_until(lambda: len(panel.rows()) == 1)
     page.shut_down()
 
 
@@ -726,7 +738,7 @@ def test_the_swing_under_way_is_not_offered(
     start.page.show()
     qtbot.wait_until(lambda: len(start.rows()) == 1)
 
-    (record,) = start.page.findChildren(InterruptedPanel)[0].value()
+    (record,) = start.page.findChildren(InterruptedPanel)[0].value().interrupted
     assert record.folder.name == "b"
 
 
@@ -803,10 +815,149 @@ def test_a_swing_that_was_damaged_since_is_told_and_no_longer_offered(
     (folder / "journal.jsonl").write_bytes(b"{\n{\n{\n")
 
     start.press("Resume")
-    qtbot.wait_until(lambda: bool(start.notices) and start.rows() == ())
+    qtbot.wait_until(lambda: bool(start.notices))
+    qtbot.wait_until(lambda: start.rows()[0].words()[0] == "Damaged: a")
 
     assert "Line 1 of" in start.notices[-1]
     assert start.steps == []
+
+
+def cut_header(folder: Path) -> str:
+    header = folder / "header.json"
+    header.write_bytes(header.read_bytes()[:100])
+    return f"{header} is damaged. Restore it from a copy."
+
+
+def remove_camera(folder: Path) -> str:
+    (camera,) = folder.glob("camera.*")
+    camera.unlink()
+    return f"The camera file {camera} does not exist."
+
+
+def damage_line(folder: Path) -> str:
+    journal = folder / "journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")
+    lines[4] = lines[4][:50]
+    journal.write_bytes(b"\n".join(lines))
+    return f"Line 5 of {journal} is damaged. Restore the file from a copy"
+
+
+def remove_header(folder: Path) -> str:
+    (folder / "header.json").unlink()
+    return f"{folder} holds images of a swing, but no header.json."
+
+
+@pytest.mark.parametrize(
+    "damage", [cut_header, remove_camera, damage_line, remove_header]
+)
+def test_a_damaged_swing_is_told_of_until_it_is_mended(
+    show: Callable[[Bench], Opened],
+    bench: Bench,
+    qtbot: QtBot,
+    damage: Callable[[Path], str],
+    tmp_path: Path,
+) -> None:
+    folder = interrupted(bench, "a")
+    shutil.copytree(folder, tmp_path / "copy")
+    sentence = damage(folder)
+    start = show(bench)
+
+    (row,) = start.rows()
+    assert row.words()[0] == "Damaged: a"
+    assert row.words()[1].startswith(sentence)
+    assert start.buttons() == ["Discard", "Look again", "Test the sounds"]
+
+    shutil.copytree(tmp_path / "copy", folder, dirs_exist_ok=True)
+    start.press("Look again")
+    qtbot.wait_until(lambda: start.rows()[0].words()[0] != "Damaged: a")
+    assert start.buttons() == ["Resume", "Discard", "Test the sounds"]
+
+
+def test_a_damaged_swing_can_be_discarded_and_keeps_its_images(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    folder = interrupted(bench, "a")
+    remove_header(folder)
+    start = show(bench)
+
+    start.press("Discard")
+    assert start.rows()[0].words()[1] == "Discard it? Its images stay on the disk."
+    start.press("Discard")
+    qtbot.wait_until(lambda: start.rows() == ())
+
+    assert len(list((folder / "images").iterdir())) == 12
+    assert start.statuses[-1] == f"Discarded. The images stay in {folder}."
+    assert start.notices == []
+
+
+def test_the_whole_sentence_of_a_damage_is_seen(
+    show: Callable[[Bench], Opened], bench: Bench, qtbot: QtBot
+) -> None:
+    damage_line(interrupted(bench, "20260930-100000_LP-04-of-Hall-2_T-10-of-80-mm"))
+    start = show(bench)
+
+    (label,) = [
+        label
+        for label in start.rows()[0].findChildren(QLabel)
+        if label.text().startswith("Line 5")
+    ]
+
+    assert label.height() >= label.heightForWidth(label.width())
+    assert label.visibleRegion().boundingRect() == label.rect()
+    assert label.minimumSizeHint().width() <= label.width()
+
+
+def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
+    show: Callable[[Bench], Opened],
+    bench: Bench,
+    qtbot: QtBot,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    folder = interrupted(bench, "a")
+    interrupted(bench, "b", hours_ago=3)
+    other = holding(folder)
+    start = show(bench)
+
+    qtbot.wait_until(lambda: len(start.rows()) == 2)
+    assert [row.words()[1] for row in start.rows()] == [
+        "LP-04  \u00b7  T-10  \u00b7  12 images",
+        "Another program is capturing it.",
+    ]
+    assert start.buttons() == ["Resume", "Discard", "Look again", "Test the sounds"]
+
+    other.kill()
+    other.wait()
+    bench.open_camera()
+    start.press("Look again")
+    qtbot.wait_until(lambda: start.buttons().count("Resume") == 2)
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert bench.run.record_folder == folder
+
+
+def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded(
+    show: Callable[[Bench], Opened],
+    bench: Bench,
+    qtbot: QtBot,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    folder = interrupted(bench, "a")
+    bench.open_camera()
+    start = show(bench)
+    holding(folder)
+    before = (folder / "journal.jsonl").read_bytes()
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: len(start.notices) == 1)
+    start.press("Discard")
+    start.press("Discard")
+    qtbot.wait_until(lambda: len(start.notices) == 2)
+
+    sentence = f"Another program is writing to the swing in {folder}."
+    assert all(notice.startswith(sentence) for notice in start.notices)
+    assert start.steps == []
+    assert (folder / "journal.jsonl").read_bytes() == before
 
 
 def test_a_record_that_cannot_be_written_is_told(
@@ -884,6 +1035,70 @@ def test_a_discarded_swing_keeps_its_images_and_is_not_offered_again(
     assert open_record(folder).verdict == DISCARDED
     assert len(list((folder / "images").iterdir())) == 12
     assert start.statuses[-1] == f"Discarded. The images stay in {folder}."
+
+
+@pytest.mark.parametrize("also_searching", [False, True])
+@pytest.mark.parametrize(
+    ("word", "broken_part"),
+    [("Resume", "read_resumable"), ("Discard", "discard_swing")],
+)
+def test_after_a_bug_the_swing_is_offered_as_before(
+    show: Callable[[Bench], Opened],
+    bench: Bench,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+    word: str,
+    broken_part: str,
+    also_searching: bool,
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    folder = interrupted(bench, "a")
+    bench.open_camera()
+    start = show(bench)
+    broken_parts = [broken_part] + ["find_unfinished"] * also_searching
+    with monkeypatch.context() as broken:
+        for part in broken_parts:
+            broken.setattr(f"lightpen_app.pages.start.{part}", lambda *_: 1 / 0)
+        start.press(word)
+        if word == "Discard":
+            start.press(word)
+        qtbot.wait_until(lambda: len(caught) == len(broken_parts))
+        start.settle()
+    assert start.steps == start.statuses == []
+    assert open_record(folder).verdict is None
+    (row,) = start.rows()
+    buttons = [b for b in row.findChildren(QPushButton) if b.isVisibleTo(row)]
+    assert all(button.isEnabled() and not button.toolTip() for button in buttons)
+
+    start.press(word)
+    if word == "Resume":
+        qtbot.wait_until(lambda: start.steps == ["swing"])
+        return
+    if not also_searching:  # the row is a new one, which asks again
+        start.press(word)
+    qtbot.wait_until(lambda: start.rows() == ())
+    assert open_record(folder).verdict == DISCARDED
+
+
+def test_a_bug_in_the_lookup_leaves_no_result_of_another_pen(
+    show: Callable[[Bench], Opened], bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    accepted(bench, timedelta(days=12))
+    start = show(bench)
+    before = start.last()
+    with monkeypatch.context() as broken:
+        broken.setattr("lightpen_app.pages.start.last_result", lambda *_: 1 / 0)
+        start.type_into("Pen, serial number", "LP-05")
+        start.settle()
+    assert len(caught) == 1
+    assert start.last() == ("The last calibration cannot be shown.",)
+
+    start.type_into("Pen, serial number", "LP-04")
+    start.settle()
+    assert start.last() == before
 
 
 def test_buttons_wait_while_a_swing_is_read(

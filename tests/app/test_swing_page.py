@@ -17,9 +17,10 @@ from lightpen.cameras.hand import Operator
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.cameras.worker import Connection
+from lightpen.session.interrupted import found_interrupted, read_resumable
 from lightpen.session.posture import Posture
 from lightpen.session.preparation import Names, SourceChoice, SourceKind
-from lightpen.session.record import DISCARDED, Record, found_interrupted, open_record
+from lightpen.session.record import DISCARDED, Record, open_record
 from lightpen.session.sources import Surroundings
 from lightpen.session.swing_state import Pause, Phase, SwingLimits, SwingState
 from lightpen.simulator.scenes import Scene
@@ -391,6 +392,7 @@ def test_after_the_verdict_more_can_be_captured(qtbot: QtBot, at_verdict: Desk) 
 
     desk.click("Capture more")
 
+    assert desk.page.main_action().why_not == "The swing goes on."
     until(qtbot, lambda: desk.state.n_kept > n_before + 5)
     desk.finish()
     until_verdict(qtbot, desk)
@@ -661,7 +663,7 @@ def test_an_interrupted_swing_goes_on_with_all_its_images(
     capturing.window.go_to(0)
     open_camera(qtbot, capturing.bench)
 
-    capturing.run.resume_record(folder)
+    capturing.run.go_on(read_resumable(folder))
     capturing.window.go_to(1)
 
     assert capturing.state.n_kept == n_recorded

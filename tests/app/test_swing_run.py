@@ -18,15 +18,11 @@ from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import write_pen
 from lightpen.report import calibration_json
-from lightpen.session.interrupted import read_resumable
+from lightpen.session.interrupted import found_interrupted, read_resumable
 from lightpen.session.messages import Code
 from lightpen.session.preparation import Names, SourceChoice, SourceKind
-from lightpen.session.record import (
-    IMAGES,
-    JOURNAL,
-    found_interrupted,
-    open_record,
-)
+from lightpen.session.record import HEADER, IMAGES, JOURNAL, open_record
+from lightpen.session.results import Result, last_result
 from lightpen.session.solving import Solution, record_inputs, solve_record
 from lightpen.session.swing_state import Event, Happening, Pause, Phase, SwingLimits
 from lightpen.session.verdict import Grade
@@ -63,6 +59,11 @@ class Stage:
         self.bench.set_preparation(replace(self.bench.preparation, limits=limits))
         self.run.begin(self.bench.preparation)
 
+    def capture_more(self) -> None:
+        """Go on with a swing that was solved, and wait until it does."""
+        self.run.capture_more()
+        self.wait_until(lambda: self.run.is_capturing)
+
     def wait_until(self, is_so: Callable[[], bool]) -> None:
         self.qtbot.waitUntil(is_so, timeout=TIMEOUT)
 
@@ -93,6 +94,10 @@ class Stage:
         tip: list[float] = self.solution().calibration.joint.tip_pen.tolist()
         return tip
 
+    def in_force(self) -> Result | None:
+        names = self.run.names
+        return last_result(self.run.results_folder, names.pen, names.tip)
+
     def _note(self, sentence: str) -> None:
         if "computer is too slow" not in sentence:  # others may use it, too
             self.sentences.append(sentence)
@@ -100,6 +105,13 @@ class Stage:
 
 def n_kept(run: SwingRun) -> int:
     return 0 if run.state is None else run.state.n_kept
+
+
+def limit_uncertainty(folder: Path, limit: float) -> None:
+    """Have a record ask for this U at most, mm."""
+    header = json.loads((folder / HEADER).read_text("utf-8"))
+    header["settings"]["max_uncertainty_mm"] = limit
+    (folder / HEADER).write_text(json.dumps(header), "utf-8")
 
 
 @pytest.fixture
@@ -118,8 +130,9 @@ def interrupted(bench: Bench, swung: Callable[..., Path]) -> Path:
 
 @pytest.fixture
 def solved(stage: Stage, interrupted: Path) -> Stage:
-    """A swing that was solved."""
-    stage.run.resume_record(interrupted)
+    """A swing that was solved, whose tip can be accepted."""
+    limit_uncertainty(interrupted, 1.0)
+    stage.run.go_on(read_resumable(interrupted))
     stage.run.finish()
     stage.wait_for_phase(Phase.VERDICT)
     return stage
@@ -244,7 +257,7 @@ def test_a_paused_swing_goes_on_when_it_is_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     stage.run.pause()
     stage.wait_for_phase(Phase.PAUSED)
@@ -257,7 +270,7 @@ def test_a_paused_swing_goes_on_when_it_is_resumed(
 
 def test_a_paused_swing_can_be_finished(stage: Stage, interrupted: Path) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.run.pause()
     stage.run.finish()
     stage.wait_for_phase(Phase.VERDICT)
@@ -282,7 +295,7 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_is_told(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     stage.wait_for_phase(Phase.PAUSED)
@@ -302,7 +315,7 @@ def test_the_swing_goes_on_when_its_camera_is_opened_again(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     stage.open_camera()
     n_images = stage.n_recorded()
@@ -318,7 +331,7 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
     stage: Stage, interrupted: Path, wish: str
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     stage.open_camera()
     getattr(stage.run, wish)()
@@ -335,7 +348,7 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
 
 def test_a_record_that_is_gone_by_then_is_told(stage: Stage, interrupted: Path) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES)
     shutil.move(interrupted, interrupted.with_name("elsewhere"))
     stage.open_camera()
@@ -348,7 +361,7 @@ def test_another_source_leaves_the_swing_to_be_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.bench.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     source = SourceChoice(SourceKind.RECORDED, str(interrupted))
     stage.bench.set_preparation(replace(stage.bench.preparation, source=source))
 
@@ -369,7 +382,7 @@ def test_an_abandoned_swing_is_resumed_with_all_its_images(stage: Stage) -> None
     stage.bench.live.close()
     stage.bench.live.await_closed()
     n_images = len(open_record(folder).images)
-    stage.run.resume_record(folder)
+    stage.run.go_on(read_resumable(folder))
 
     assert n_kept(stage.run) == n_images >= 3
     assert stage.run.names == names
@@ -380,7 +393,7 @@ def test_a_resumed_swing_goes_by_its_own_files_and_limits(
 ) -> None:
     write_pen(SAMPLE_PENS["six"](), interrupted.parent / "other.json")
     stage.begin(replace(SHORT, max_images=77))
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     assert stage.run.setup is not None
 
     assert stage.run.setup.pen.n_leds == 10
@@ -391,7 +404,7 @@ def test_a_resumed_swing_goes_by_its_own_files_and_limits(
 def test_resuming_the_swing_that_is_under_way_changes_nothing(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     setup = stage.run.setup
     stage.run.go_on(read_resumable(interrupted))
 
@@ -403,7 +416,7 @@ def test_a_damaged_record_is_refused_and_nothing_begins(
 ) -> None:
     (interrupted / JOURNAL).write_bytes(b"{}\n{}\n")
     with pytest.raises(FileError, match="Line 1 of"):
-        stage.run.resume_record(interrupted)
+        stage.run.go_on(read_resumable(interrupted))
 
     assert stage.run.state is None
 
@@ -419,7 +432,7 @@ def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
     deadline = time.monotonic() + TIMEOUT / 1000
     while stage.bench.live.stats.delivered < delivered + 5:
         assert time.monotonic() < deadline
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
 
     assert stage.run.is_capturing
@@ -512,7 +525,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: Stage) -> No
 def test_solving_can_be_cancelled_and_done_again(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.run.finish()
     assert stage.run.is_solving
     stage.run.cancel()
@@ -555,19 +568,17 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     solved: Stage,
 ) -> None:
     first = solved.run.accept()
-    solved.run.capture_more()
+    solved.capture_more()
     solved.run.finish()
     solved.wait_for_phase(Phase.VERDICT)
     solved.run.take_out([1])
     solved.wait_until_solved()
-    names = replace(solved.bench.preparation, names=solved.run.names)
-    solved.bench.set_preparation(names)
-    in_force = solved.bench.last_result()
-    assert in_force is not None
-    assert in_force.accepted == first.accepted
+    before = solved.in_force()
+    assert before is not None
+    assert before.accepted == first.accepted
 
     second = solved.run.accept()
-    in_force = solved.bench.last_result()
+    in_force = solved.in_force()
     assert in_force is not None
     assert in_force.accepted == second.accepted
     assert in_force.tip_pen.tolist() == solved.tip()
@@ -582,6 +593,22 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(solved: Stage) -> 
     assert open_record(solved.folder()).verdict == result.grade
     assert result.record == str(solved.folder())
     assert found_interrupted(solved.run.records_folder) == ()
+
+
+def test_a_tip_that_is_to_be_repeated_is_not_accepted(
+    stage: Stage, interrupted: Path
+) -> None:
+    limit_uncertainty(interrupted, 1e-6)
+    stage.run.go_on(read_resumable(interrupted))
+    stage.run.finish()
+    stage.wait_for_phase(Phase.VERDICT)
+    assert stage.run.verdict is not None
+    assert stage.run.verdict.grade is Grade.REPEAT
+
+    with pytest.raises(ValueError, match="must not be repeat"):
+        stage.run.accept()
+    assert stage.in_force() is None
+    assert open_record(interrupted).verdict is None
 
 
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: Stage) -> None:
@@ -607,8 +634,7 @@ def test_more_images_can_be_captured_after_the_verdict(
     solved.run.take_out([3])
     solved.wait_until_solved()
     solved.open_camera()
-    solved.run.capture_more()
-    assert solved.run.is_capturing
+    solved.capture_more()
     assert solved.run.solution is None
     solved.wait_for_kept(N_IMAGES)  # one was taken out, one came
     solved.run.finish()
@@ -619,10 +645,26 @@ def test_more_images_can_be_captured_after_the_verdict(
     assert solved.tip() == command(solved.folder())["tip_pen_mm"]
 
 
+def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
+    stage: Stage,
+) -> None:
+    stage.open_camera()
+    stage.begin()
+    stage.wait_for_phase(Phase.VERDICT)
+    n_kept_first = n_kept(stage.run)
+    stage.capture_more()
+    stage.wait_for_kept(n_kept_first + 1)
+    stage.run.finish()
+    stage.wait_for_phase(Phase.VERDICT)
+
+    assert stage.run.verdict is not None
+    assert stage.run.verdict.reason.code is not Code.TOO_FEW_IMAGES
+
+
 def test_more_images_can_be_captured_while_a_wish_is_computed(solved: Stage) -> None:
     solved.run.take_out([3])
     solved.open_camera()
-    solved.run.capture_more()
+    solved.capture_more()
     solved.wait_for_kept(N_IMAGES + 2)
 
     assert open_record(solved.folder()).taken_out == {}
@@ -643,7 +685,7 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 2)
     stage.run.set_aside()
     stage.wait_until(lambda: open_record(interrupted).verdict == "discarded")
@@ -664,7 +706,7 @@ def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
     monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
     with monkeypatch.context() as broken:
         broken.setattr("lightpen_app.swing_run.solve_record", lambda *_: 1 / 0)
-        stage.run.resume_record(interrupted)
+        stage.run.go_on(read_resumable(interrupted))
         stage.run.finish()
         stage.wait_until_solved()
         stage.wait_until(lambda: len(caught) == 1)
@@ -675,13 +717,29 @@ def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
     stage.wait_for_phase(Phase.VERDICT)
 
 
+def test_a_bug_while_images_are_read_again_leaves_the_solution(
+    solved: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    before = solved.solution()
+    with monkeypatch.context() as broken:
+        broken.setattr("lightpen_app.swing_run.read_for_more", lambda _: 1 / 0)
+        solved.run.capture_more()
+        solved.wait_until(lambda: not solved.run.is_reading and len(caught) == 1)
+    assert solved.solution() is before
+
+    solved.capture_more()
+    assert n_kept(solved.run) == N_IMAGES
+
+
 # The end of the program
 
 
 def test_closing_while_a_solution_is_computed_leaves_the_swing_to_be_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.run.finish()
     assert stage.run.is_solving
     stage.bench.shut_down()
@@ -694,7 +752,7 @@ def test_closing_while_images_are_captured_keeps_all_of_them(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.resume_record(interrupted)
+    stage.run.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 2)
     stage.bench.shut_down()
     n_images = len(open_record(interrupted).images)

@@ -21,7 +21,8 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.arrays import FloatArray
-from lightpen.session.record import found_interrupted, open_record
+from lightpen.session.interrupted import found_interrupted
+from lightpen.session.record import open_record
 from lightpen.session.results import Result, last_result
 from lightpen.session.sources import Surroundings
 from lightpen.simulator.scenes import Scene

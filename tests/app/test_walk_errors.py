@@ -19,8 +19,9 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.formats.pen_files import write_pen
+from lightpen.session.interrupted import find_unfinished
 from lightpen.session.preparation import SourceChoice
-from lightpen.session.record import DISCARDED, found_interrupted, open_record
+from lightpen.session.record import DISCARDED, open_record
 from lightpen.session.sources import Surroundings, camera_of
 from lightpen.session.swing_state import Phase
 from lightpen.simulator.sample_pens import eight_led_pen
@@ -494,7 +495,8 @@ def test_a_swing_closed_in_the_middle_is_resumed_at_the_next_start(
     assert record_folder(again) == folder
     again.click_step("Start")
     again.until(lambda: not again.says("Interrupted swing"))
-    assert [each.folder for each in found_interrupted(folder.parent)] == [folder]
+    found = find_unfinished(folder.parent)
+    assert [each.folder for each in found.under_way] == [folder]
 
 
 # The window

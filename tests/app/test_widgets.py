@@ -13,6 +13,7 @@ from lightpen_app.widgets.notice_bar import NoticeBar
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.operator_view import (
     DISTANCES_M,
+    LEAST_SHARE,
     OperatorValue,
     OperatorView,
     other_screen,
@@ -172,6 +173,28 @@ def test_an_instruction_has_the_size_that_the_distance_asks_for(
     view.show()
 
     assert view.instruction_px() >= view.letters()
+
+
+@pytest.mark.parametrize("dial", [DialValue(), None])
+@pytest.mark.parametrize("distance", DISTANCES_M)
+def test_the_count_is_read_on_a_small_screen_too(
+    view: OperatorView, distance: float, dial: DialValue | None
+) -> None:
+    view.resize(960, 540)
+    view.set_distance_m(distance)
+    view.set_value(
+        OperatorValue(
+            instruction="Lean right",
+            hint="Far. Keep the tip pressed in.",
+            state=State("CAPTURING", "10 of 10 LEDs.", Sign.RECORD, Tone.GOOD),
+            count="60 of about 300",
+            fraction=0.2,
+            dial=dial,
+        )
+    )
+    view.show()
+
+    assert view.count_px() >= LEAST_SHARE * view.height()
 
 
 def test_the_operator_view_fits_every_screen_at_every_distance(

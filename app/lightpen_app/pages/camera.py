@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -36,7 +37,8 @@ from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 
-SIDE_WIDTH = 50 * GRID
+SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
+NARROW = 120 * GRID  # px; a page of less width has its panels all at the side
 
 
 class CameraPage(Page):
@@ -54,6 +56,7 @@ class CameraPage(Page):
         self._bench = services.bench
         self._live = services.bench.live
         self._is_shown = False
+        self._is_narrow = False
         self._settings = Settings()  # in force
         self._trouble = ""  # the last, of the camera or of a swing
         self._sentence = ""  # why no images come
@@ -137,6 +140,14 @@ class CameraPage(Page):
             self._reading.cancel()
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = event.size().width() < NARROW
+        if is_narrow != self._is_narrow:
+            self._is_narrow = is_narrow
+            self._use_width()
+
+    @override
     def retranslate(self) -> None:
         self._remark_swing()
         self._show_connection()
@@ -144,31 +155,41 @@ class CameraPage(Page):
 
     def _arrange(self) -> None:
         side = QWidget()
-        panels = QVBoxLayout(side)
+        self._panels = panels = QVBoxLayout(side)
         panels.setContentsMargins(0, 0, 0, 0)
         panels.setSpacing(2 * GRID)
         panels.addWidget(self._swing_remark)
         for panel in (self._source, self._intrinsics, self._stray):
             panels.addWidget(panel)
         panels.addStretch(1)
-        scroll = PageScroll()
+        self._side = scroll = PageScroll()
         scroll.setWidget(side)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setFixedWidth(SIDE_WIDTH)
 
-        foot = QHBoxLayout()
+        self._foot = foot = QHBoxLayout()
         foot.setSpacing(2 * GRID)
-        foot.addWidget(self._exposure, 3)
-        foot.addWidget(self._focus, 2)
-        layout = QGridLayout(self)
+        self._layout = layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setHorizontalSpacing(3 * GRID)
-        layout.setVerticalSpacing(2 * GRID)
         layout.addWidget(self._images, 0, 0)
         layout.addLayout(foot, 1, 0)
+        self._use_width()  # before the side: the order of the Tab key
         layout.addWidget(scroll, 0, 1, 2, 1)
         layout.setRowStretch(0, 1)
         layout.setColumnStretch(0, 1)
+
+    def _use_width(self) -> None:
+        """Put exposure and focus below the image, or at the side of a narrow page."""
+        if self._is_narrow:
+            self._panels.insertWidget(0, self._exposure)
+            self._panels.insertWidget(1, self._focus)
+        else:
+            self._foot.addWidget(self._exposure, 3)
+            self._foot.addWidget(self._focus, 2)
+        space = 2 * GRID if self._is_narrow else 3 * GRID
+        self._layout.setHorizontalSpacing(space)
+        # The layout spaces out an empty foot, too.
+        self._layout.setVerticalSpacing(0 if self._is_narrow else 2 * GRID)
+        self._side.setFixedWidth(NARROW_SIDE_WIDTH if self._is_narrow else SIDE_WIDTH)
 
     # What is chosen
 

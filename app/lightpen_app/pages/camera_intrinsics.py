@@ -6,7 +6,7 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
     QGroupBox,
-    QPushButton,
+    QLabel,
     QVBoxLayout,
     QWidget,
 )
@@ -15,6 +15,7 @@ from lightpen.camera import Camera
 from lightpen.session.preparation import CameraFile
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
@@ -42,7 +43,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
         # Widgets
         self._path = PathField()
-        self._open = QPushButton()
+        self._open = PushButton()
         self._path.add_button(self._open)
         self._problem = SignLabel()
         self._check = SignLabel()
@@ -56,7 +57,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
         grid.setColumnStretch(1, 1)
         for row, (name, fact) in enumerate(zip(self._names, self._facts, strict=True)):
             name.setWordWrap(False)
-            fact.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(fact, row, 1)
         layout = QVBoxLayout(self)
@@ -134,6 +134,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         facts = [""] * N_FACTS if camera is None else self._told(camera)
         for name, label, fact in zip(self._names, self._facts, facts, strict=True):
             label.setText(fact)
+            _let_select(label, bool(fact))
             label.setVisible(bool(fact))
             name.setVisible(bool(fact))
 
@@ -192,3 +193,11 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
     def _size_text(self, width: int, height: int) -> str:
         return self.tr("{0} x {1}").format(width, height)
+
+
+def _let_select(label: QLabel, selectable: bool) -> None:
+    """Let the words of a label be selected, or let it take no focus."""
+    flags = Qt.TextInteractionFlag
+    label.setTextInteractionFlags(
+        flags.TextSelectableByMouse if selectable else flags.NoTextInteraction
+    )

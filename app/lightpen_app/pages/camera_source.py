@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QMenu,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -19,6 +18,7 @@ from lightpen.session.preparation import SourceChoice, SourceKind
 from lightpen_app.phrases import QT_TRANSLATE_NOOP
 from lightpen_app.theme import GRID
 from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
@@ -76,15 +76,15 @@ class SourcePanel(Translated, QGroupBox):
         for _ in SOURCES:
             self._kind.addItem("")
         self._place = PathField()
-        self._pick = QPushButton()
+        self._pick = PushButton()
         self._pick.setProperty("menu", True)
         self._place.add_button(self._pick)
         menu = QMenu(self._pick)
         self._folder = menu.addAction("")
         self._file = menu.addAction("")
         self._pick.setMenu(menu)
-        self._samples = QPushButton()
-        self._retry = QPushButton()
+        self._samples = PushButton()
+        self._retry = PushButton()
 
         # Layout
         layout = QVBoxLayout(self)

@@ -8,6 +8,7 @@ from lightpen.arrays import FloatArray
 from lightpen.inspection import SEARCHED_IMAGES, StraySearch
 from lightpen.session.live import LiveImage
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
@@ -43,11 +44,11 @@ class StrayLightPanel(Translated, QGroupBox):
 
         # Widgets
         self._task = text_label(TextSize.BODY)
-        self._cover = QPushButton()
+        self._cover = PushButton()
         self._cover.setCheckable(True)
-        self._start = QPushButton()
-        self._mask = QPushButton()
-        self._clear = QPushButton()
+        self._start = PushButton()
+        self._mask = PushButton()
+        self._clear = PushButton()
         self._outcome = SignLabel()
 
         # Layout

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
@@ -24,7 +25,11 @@ from lightpen_app.pages.page import MainAction, Page
 from lightpen_app.phrases import lack_text
 from lightpen_app.services import Services
 from lightpen_app.theme import GRID
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.pen_view import PenPicture
+
+NARROW = 110 * GRID  # px; a page of less width has two panels side by side, not three
+LOW = 62 * GRID  # px; a page of less height scrolls
 
 
 class LedsPage(Page):
@@ -44,6 +49,7 @@ class LedsPage(Page):
         super().__init__(parent)
         self._bench = services.bench
         self._is_shown = False
+        self._is_narrow = False
         self._in_use: PenFile | None = None
         self._draft = self._opened = PenDraft()
         self._is_foreign = False  # opened from a file that cannot be used
@@ -57,16 +63,22 @@ class LedsPage(Page):
         self._watch = PenWatch(self)
 
         # Layout
-        panels = QHBoxLayout()
+        self._content = Squeezed()
+        self._rows = QVBoxLayout(self._content)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._rows.setSpacing(2 * GRID)
+        self._panels = panels = QHBoxLayout()
         panels.setSpacing(2 * GRID)
         panels.addWidget(self._table, 40)
-        panels.addWidget(self._space, 29)
+        self._use_width()
         panels.addWidget(self._match, 31)
+        self._rows.addWidget(self._file)
+        self._rows.addLayout(panels, 1)
+        scroll = PageScroll()
+        scroll.setWidget(self._content)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._file)
-        layout.addLayout(panels, 1)
+        layout.addWidget(scroll)
 
         # Connections
         self._file.path_chosen.connect(self._on_path_chosen)
@@ -136,8 +148,24 @@ class LedsPage(Page):
         self._watch.stop()
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._content.set_squeezed(event.size().height() >= LOW)
+        is_narrow = event.size().width() < NARROW
+        if is_narrow != self._is_narrow:
+            self._is_narrow = is_narrow
+            self._use_width()
+
+    @override
     def retranslate(self) -> None:
         self._refresh()
+
+    def _use_width(self) -> None:
+        """Put the pen in space between the others, or below them on a narrow page."""
+        if self._is_narrow:
+            self._rows.addWidget(self._space)
+        else:
+            self._panels.insertWidget(1, self._space, 29)
 
     @property
     def _is_edited(self) -> bool:
@@ -263,7 +291,7 @@ class LedsPage(Page):
                 self._file.set_problem("")
                 self._file.ask_units(path.name)
             else:
-                self._file.set_problem(str(error))
+                self._refuse(str(error))
         except FileError as error:
             self._open_to_mend(path, units, str(error))
         else:
@@ -274,10 +302,18 @@ class LedsPage(Page):
         try:
             pen = read_unchecked_pen(path, units)
         except LightpenError:
-            self._file.set_problem(sentence)
+            self._refuse(sentence)
             return
         self._open_draft(PenDraft.of(pen), foreign=True)
         self._file.set_value(str(path))
+        self._refuse(sentence)
+
+    def _refuse(self, sentence: str) -> None:
+        """Say why a file cannot be used, and which one is."""
+        in_use = self._bench.preparation.pen_file
+        if in_use is not None:
+            kept = self.tr("{0} stays in use.").format(in_use.path.name)
+            sentence = f"{sentence} {kept}"
         self._file.set_problem(sentence)
 
     def _use(self, file: PenFile) -> None:

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import (
 from lightpen.formats.pen_files import UNITS
 from lightpen_app.theme import GRID, Tone
 from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
@@ -53,10 +53,10 @@ class LedFilePanel(Translated, QWidget):
         # Widgets
         self._label = QLabel()
         self._path = PathField()
-        self._open = QPushButton()
+        self._open = PushButton()
         self._path.add_button(self._open)
-        self._save = QPushButton()
-        self._samples = QPushButton()
+        self._save = PushButton()
+        self._samples = PushButton()
         self._label.setBuddy(self._path.edit())
         self._units = _UnitsRow()
         self._problem = SignLabel()

@@ -6,7 +6,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QGridLayout,
     QGroupBox,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -14,6 +13,7 @@ from PySide6.QtWidgets import (
 from lightpen.pen_check.frame import FrameCheck, Outcome, Rule, RuleCheck
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.pen_view import PenPicture, PenView
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
@@ -48,7 +48,7 @@ class FramePanel(Translated, QGroupBox):
         self._rules = {rule: SignLabel(wraps=False) for rule in Rule}
         self._amounts = {rule: text_label(TextSize.SMALL, Tone.QUIET) for rule in LONG}
         self._layout_note = SignLabel()
-        self._move = QPushButton()
+        self._move = PushButton()
 
         # Layout
         grid = QGridLayout()

@@ -27,7 +27,6 @@ from lightpen_app.widgets.translated import Translated
 N_SMOOTHED = 20  # images that are told of together: one second
 N_FINDINGS = 4
 TALLEST = 0.9  # height of the image over its width; sensors are flatter
-ENOUGH_VIEWS = 5  # before the pen is said to fit
 
 
 class MatchPanel(Translated, QGroupBox):
@@ -177,7 +176,7 @@ class MatchPanel(Translated, QGroupBox):
                 Remark(self._words(each), Sign.WARNING, Tone.WARN)
                 for each in match.findings[:N_FINDINGS]
             ]
-        elif not match.n_labelled or match.n_views < ENOUGH_VIEWS:
+        elif not match.fits:
             words = self.tr("Lean and turn the pen, so that it is seen from all sides.")
             remarks = [Remark(words, Sign.WAIT, Tone.QUIET)]
         else:

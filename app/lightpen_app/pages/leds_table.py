@@ -22,6 +22,7 @@ from lightpen.pen_check.draft import PenDraft
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.led_table import LedTable
 from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
@@ -63,9 +64,9 @@ class LedTablePanel(Translated, QGroupBox):
         # Widgets
         self._table = LedTable()
         self._flaw = SignLabel()
-        self._add = QPushButton()
-        self._remove = QPushButton()
-        self._discard = QPushButton()
+        self._add = PushButton()
+        self._remove = PushButton()
+        self._discard = PushButton()
         self._normals = QCheckBox()
         self._diameter_label, self._diameter = QLabel(), EnterEdit()
         self._diameter_label.setBuddy(self._diameter)

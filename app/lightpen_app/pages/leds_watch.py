@@ -81,9 +81,13 @@ class PenWatch(QObject):
 
         # Connections
         job.succeeded.connect(self._on_compared)
-        job.crashed.connect(self._drop_job)
+        job.crashed.connect(self._on_crashed)
         job.start()
 
     def _on_compared(self, match: object) -> None:
         self._job = None
         self.value_changed.emit(match)
+
+    def _on_crashed(self) -> None:
+        self._job = None
+        self.value_changed.emit(None)  # the views after these are compared again

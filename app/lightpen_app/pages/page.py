@@ -30,6 +30,9 @@ class MainAction:
 class Page(QWidget):
     """Base of the pages; what raises NotImplementedError here, each page says.
 
+    A page takes the room that it is given: what needs more scrolls in it, or is
+    arranged otherwise.
+
     The rules behind `is_complete` and `why_closed` live in the core, where they are
     tested without Qt. A page touches no other page and no window: it emits.
 

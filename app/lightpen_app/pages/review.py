@@ -1,6 +1,7 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
 from PySide6.QtCore import QTimer, Slot
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -12,13 +13,11 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.errors import FileError, LightpenError
+from lightpen.errors import FileError
 from lightpen.report import warnings_of
-from lightpen.session.interrupted import Resumable, read_for_more
 from lightpen.session.results import Result, last_result
 from lightpen.session.solving import Solution
 from lightpen.session.verdict import USUAL_CHANGE, Grade, NextStep, Verdict
-from lightpen_app.job import Job
 from lightpen_app.pages.page import MainAction, Page
 from lightpen_app.pages.review_images import ImagesPanel
 from lightpen_app.pages.review_plots import (
@@ -31,7 +30,8 @@ from lightpen_app.pages.review_result import Outcome, ResultPanel
 from lightpen_app.phrases import grade_text, phrase
 from lightpen_app.services import Services
 from lightpen_app.theme import GRID, TextSize, Tone
-from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.remark_list import RemarkList
 from lightpen_app.widgets.sign_label import Remark
@@ -40,6 +40,8 @@ from lightpen_app.widgets.state_banner import State, StateBanner
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
+NARROW = 112 * GRID  # px; a page of less width has the result in a tab
+TAB_WIDTH = 64 * GRID  # of the result in a tab
 MARKS = {
     Grade.PASS: (Sign.CHECK, Tone.GOOD),
     Grade.CHECK: (Sign.WARNING, Tone.WARN),
@@ -60,25 +62,26 @@ class ReviewPage(Page):
     def __init__(self, services: Services, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._run = services.bench.run
+        self._is_narrow = False
         self._solution: Solution | None = None
         self._last: Result | None = None
         self._told: tuple[object, ...] = ()
-        self._job: Job | None = None
+        self._wants_more = False
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
         self._question = QuestionBar()
         self._progress = QProgressBar()
-        self._cancel = QPushButton()
+        self._cancel = PushButton()
         self._solving = QWidget()
         self._patience = QTimer(self, singleShot=True, interval=PATIENCE_MS)
         self._acceptance = QTimer(self, singleShot=True)
         self._remarks = RemarkList()
         self._result = ResultPanel()
         self._scroll = PageScroll()
-        self._repeat = QPushButton()
-        self._capture_more = QPushButton()
+        self._repeat = PushButton()
+        self._capture_more = PushButton()
         self._images = ImagesPanel()
         self._panels: tuple[ImagesPanel | PlotsPanel, ...] = (
             self._images,
@@ -87,8 +90,11 @@ class ReviewPage(Page):
             MethodsPanel(),
         )
         self._tabs = QTabWidget()
-        for panel in self._panels:
-            self._tabs.addTab(panel, "")
+        self._tab_of = {panel: PageScroll() for panel in self._panels}
+        for panel, tab in self._tab_of.items():
+            tab.setWidget(Squeezed(panel))
+            self._tabs.addTab(tab, "")
+        self._result_side = QWidget()
 
         # Layout
         self._arrange()
@@ -186,8 +192,14 @@ class ReviewPage(Page):
     @override
     def shut_down(self) -> None:
         self._images.shut_down()
-        if self._job is not None:
-            self._job.cancel()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = event.size().width() < NARROW
+        if is_narrow != self._is_narrow:
+            self._is_narrow = is_narrow
+            self._use_width()
 
     @override
     def retranslate(self) -> None:
@@ -197,8 +209,10 @@ class ReviewPage(Page):
             self.tr("Uncertainty"),
             self.tr("Two-stage"),
         )
-        for index, name in enumerate(names):
-            self._tabs.setTabText(index, name)
+        for tab, name in zip(self._tab_of.values(), names, strict=True):
+            self._tabs.setTabText(self._tabs.indexOf(tab), name)
+        if self._is_narrow:
+            self._tabs.setTabText(0, self.tr("Result"))
         self._scroll.setAccessibleName(self.tr("Result"))
         self._tabs.setAccessibleName(self.tr("Details"))
         self._progress.setAccessibleName(self.tr("Progress of the computation"))
@@ -227,17 +241,15 @@ class ReviewPage(Page):
         buttons.setSpacing(GRID)
         buttons.addWidget(self._repeat, 1)
         buttons.addWidget(self._capture_more, 1)
-        left = QWidget()
-        left.setFixedWidth(RESULT_WIDTH)
-        column = QVBoxLayout(left)
+        column = QVBoxLayout(self._result_side)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GRID)
         column.addWidget(self._scroll, 1)
         column.addLayout(buttons)
 
-        columns = QHBoxLayout()
+        self._columns = columns = QHBoxLayout()
         columns.setSpacing(2 * GRID)
-        columns.addWidget(left)
+        self._use_width()  # before the tabs: the order of the Tab key
         columns.addWidget(self._tabs, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -248,12 +260,25 @@ class ReviewPage(Page):
         layout.addWidget(self._remarks)
         layout.addLayout(columns, 1)
 
+    def _use_width(self) -> None:
+        """Put the result beside the tabs, or make it the first of a narrow page."""
+        side = self._result_side
+        if self._is_narrow:
+            side.setFixedWidth(TAB_WIDTH)
+            self._tabs.insertTab(0, side, self.tr("Result"))
+            self._tabs.setCurrentIndex(0)
+        else:
+            side.setFixedWidth(RESULT_WIDTH)
+            self._columns.insertWidget(0, side)
+            if side.parentWidget() is not None:  # else it would be a window
+                side.show()  # a tab that is not the current one is hidden
+
     def _why_not_accepted(self) -> str:
         if self._run.solution is None or self._run.verdict is None:
             return self.tr("Swing the pen first.")
         if self._run.is_solving:
             return self.tr("The tip is being computed.")
-        if self._job is not None:
+        if self._run.is_reading:
             return self.tr("The swing goes on.")
         if not self._run.verdict.can_be_accepted:
             return self.tr("Not good enough: capture more images, or repeat the swing.")
@@ -262,7 +287,10 @@ class ReviewPage(Page):
     @Slot()
     def _on_run_changed(self) -> None:
         run = self._run
-        told = (run.solution, run.verdict, run.result, run.is_solving)
+        told = (
+            *(run.solution, run.verdict, run.result),
+            *(run.is_solving, run.is_reading),
+        )
         if told == self._told:
             return  # a swing that is captured changes twenty times a second
         self._told = told
@@ -275,6 +303,10 @@ class ReviewPage(Page):
         if self.isVisible():
             self._refresh()
         self.changed.emit()
+        if self._wants_more and not run.is_reading:
+            self._wants_more = False
+            if run.is_capturing:
+                self.step_requested.emit("swing")
 
     def _refresh(self) -> None:
         """Show what there is now."""
@@ -292,9 +324,10 @@ class ReviewPage(Page):
 
     def _fill_tab(self) -> None:
         """Show the solution in the tab that is seen; the others wait until they are."""
-        panel = self._panels[self._tabs.currentIndex()]
-        if panel.value() is not self._solution:
-            panel.set_value(self._solution)
+        for panel, tab in self._tab_of.items():
+            is_seen = tab is self._tabs.currentWidget()
+            if is_seen and panel.value() is not self._solution:
+                panel.set_value(self._solution)
 
     def _last_accepted(self) -> Result | None:
         names = self._run.names
@@ -313,7 +346,8 @@ class ReviewPage(Page):
             why_locked = self.tr("The tip is accepted; start the next calibration.")
         elif run.solution is None:
             why_locked = self.tr("Swing the pen first.")
-        self._images.set_locked(why_locked)
+        goes_on = self.tr("The swing goes on.") if run.is_reading else ""
+        self._images.set_locked(why_locked or goes_on)
         for button, step, what in (
             (
                 self._capture_more,
@@ -365,32 +399,8 @@ class ReviewPage(Page):
         self._progress.setValue(round(100 * fraction))
 
     def _on_capture_more_clicked(self) -> None:
-        folder = self._run.record_folder
-        if folder is None or self._job is not None:
-            return
-        self._run.cancel()
-        self._job = job = Job(lambda report: read_for_more(folder), self)
-
-        # Connections
-        job.succeeded.connect(self._on_swing_read)
-        job.failed.connect(self.notice_raised)
-        job.ended.connect(self._on_reading_ended)
-        job.start()
-        self.changed.emit()
-
-    def _on_swing_read(self, swing: Resumable) -> None:
-        try:
-            self._run.go_on(swing)
-        except LightpenError as error:
-            self.notice_raised.emit(str(error))
-            return
-        self.step_requested.emit("swing")
-
-    def _on_reading_ended(self) -> None:
-        job, self._job = self._job, None
-        if job is not None:
-            job.deleteLater()
-        self.changed.emit()
+        self._wants_more = True
+        self._run.capture_more()
 
     def _on_repeat_agreed(self) -> None:
         try:

@@ -20,11 +20,13 @@ from lightpen_app.widgets.image_table import ImageTable
 from lightpen_app.widgets.image_view import Marker, pooled
 from lightpen_app.widgets.plot_card import PlotCard
 from lightpen_app.widgets.plots import Axes
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.residual_plots import MisfitPlot, arrow_scale
 from lightpen_app.widgets.residual_view import NO_ARROWS, Arrows, ResidualView
 from lightpen_app.widgets.translated import Translated
 
 TABLE_WIDTH = 40 * GRID
+LEAST_HEIGHT = 22 * GRID  # px, of the image
 RING = 10.0  # image px about an LED
 
 
@@ -66,10 +68,11 @@ class ImagesPanel(Translated, QWidget):
 
         # Widgets
         self._table = ImageTable()
-        self._take_out = QPushButton()
-        self._put_back = QPushButton()
+        self._take_out = PushButton()
+        self._put_back = PushButton()
         self._count = text_label(TextSize.SMALL, Tone.QUIET)
         self._view = ResidualView()
+        self._view.setMinimumHeight(LEAST_HEIGHT)
         self._caption = text_label(TextSize.SMALL, Tone.QUIET)
         self._misfits = MisfitPlot(Axes(""))
         self._card = PlotCard(self._misfits, "misfit-of-images")
@@ -276,7 +279,7 @@ class ImagesPanel(Translated, QWidget):
         self._view.set_message(sentence)
 
     def _on_crashed(self) -> None:
-        self._on_undecoded("")
+        self._on_undecoded(self.tr("The image cannot be shown."))
 
     def _wanted(self) -> tuple[RecordSource, int] | None:
         """Return the image that is chosen, and whose it is."""

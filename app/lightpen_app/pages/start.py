@@ -6,14 +6,20 @@ from pathlib import Path
 from typing import TypeVar
 
 from PySide6.QtCore import QTimer
-from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.errors import LightpenError
-from lightpen.session.interrupted import Resumable, discard_swing, read_resumable
+from lightpen.session.interrupted import (
+    Resumable,
+    Unfinished,
+    discard_damaged,
+    discard_swing,
+    find_unfinished,
+    read_resumable,
+)
 from lightpen.session.preparation import Preparation, recorded_names
-from lightpen.session.record import Record, found_interrupted
 from lightpen.session.results import Result, last_result
 from lightpen_app.job import Job, Report
 from lightpen_app.pages.page import MainAction, Page
@@ -29,6 +35,7 @@ from lightpen_app.words import PARTED, shortened
 
 T = TypeVar("T")
 
+NARROW = 100 * GRID  # px; a page of less width has one column
 TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
 
@@ -73,7 +80,7 @@ class StartPage(Page):
         right.addWidget(self._sound_test)
         right.addStretch(1)
         content = QWidget()
-        columns = QHBoxLayout(content)
+        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
         columns.setContentsMargins(0, 0, 0, 0)
         columns.setSpacing(3 * GRID)
         columns.addLayout(left, 5)
@@ -94,6 +101,7 @@ class StartPage(Page):
         self._searching.timeout.connect(self._search_interrupted)
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
+        self._interrupted.search_requested.connect(self._search_interrupted)
         bench.changed.connect(self._on_bench_changed)
 
         self._show_changes(None, self._shown)
@@ -141,6 +149,15 @@ class StartPage(Page):
         for job in (self._lookup, self._search, self._work):
             if job is not None:
                 job.cancel()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction = QBoxLayout.Direction
+        is_narrow = event.size().width() < NARROW
+        self._columns.setDirection(
+            direction.TopToBottom if is_narrow else direction.LeftToRight
+        )
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
@@ -246,12 +263,16 @@ class StartPage(Page):
             lambda _: last_result(folder, pen, tip), self._on_looked_up
         )
         self._lookup.failed.connect(self._on_lookup_failed)
+        self._lookup.crashed.connect(self._on_lookup_crashed)
 
     def _on_looked_up(self, result: Result | None) -> None:
         self._last.set_value(LastResult(result))
 
     def _on_lookup_failed(self, sentence: str) -> None:
         self._last.set_value(LastResult(trouble=sentence))
+
+    def _on_lookup_crashed(self) -> None:
+        self._on_lookup_failed(self.tr("The last calibration cannot be shown."))
 
     # Interrupted swings
 
@@ -260,13 +281,18 @@ class StartPage(Page):
             self._search.cancel()
         folder = self._bench.run.records_folder
         self._search = self._started(
-            lambda _: found_interrupted(folder), self._on_interrupted_found
+            lambda _: find_unfinished(folder), self._on_interrupted_found
         )
         self._search.failed.connect(self.notice_raised)
 
-    def _on_interrupted_found(self, records: tuple[Record, ...]) -> None:
+    def _on_interrupted_found(self, swings: Unfinished) -> None:
         present = self._bench.run.record_folder
-        self._interrupted.set_value([r for r in records if r.folder != present])
+        others = Unfinished(
+            tuple(r for r in swings.interrupted if r.folder != present),
+            tuple(r for r in swings.under_way if r.folder != present),
+            swings.damaged,
+        )
+        self._interrupted.set_value(others)
 
     def _on_resume_requested(self, folder: Path) -> None:
         self._interrupted.set_waiting(self.tr("The swing is being read."))
@@ -274,7 +300,7 @@ class StartPage(Page):
             lambda _: read_resumable(folder), self._on_swing_read
         )
         self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._search_interrupted)
+        self._work.crashed.connect(self._on_work_crashed)
 
     def _on_swing_read(self, swing: Resumable) -> None:
         self._interrupted.set_waiting("")
@@ -325,11 +351,13 @@ class StartPage(Page):
 
     def _on_discard_requested(self, folder: Path) -> None:
         self._interrupted.set_waiting(self.tr("The swing is being discarded."))
+        damaged = {swing.folder for swing in self._interrupted.value().damaged}
+        discard = discard_damaged if folder in damaged else discard_swing
         self._work = self._started(
-            lambda _: discard_swing(folder), lambda _: self._on_discarded(folder)
+            lambda _: discard(folder), lambda _: self._on_discarded(folder)
         )
         self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._search_interrupted)
+        self._work.crashed.connect(self._on_work_crashed)
 
     def _on_discarded(self, folder: Path) -> None:
         self.status_changed.emit(
@@ -339,6 +367,10 @@ class StartPage(Page):
 
     def _on_work_failed(self, sentence: str) -> None:
         self.notice_raised.emit(sentence)
+        self._on_work_crashed()
+
+    def _on_work_crashed(self) -> None:
+        self._interrupted.set_waiting("")
         self._search_interrupted()
 
     def _started(

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
@@ -23,6 +23,7 @@ from lightpen_app.services import Services
 from lightpen_app.sounds import Sound
 from lightpen_app.theme import GRID
 from lightpen_app.widgets.live_markers import live_markers
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
@@ -66,8 +67,8 @@ class SwingPage(Page):
         self._on_yes: Callable[[], object] = self._run.finish
 
         # Widgets
-        self._act = QPushButton()
-        self._start_over = QPushButton()
+        self._act = PushButton()
+        self._start_over = PushButton()
         self._face = SwingFace((self._act, self._start_over), self)
         self._hand = HandPanel(self._live, self)
         self._question = QuestionBar()
@@ -203,6 +204,8 @@ class SwingPage(Page):
     def _why_no_review(self, state: SwingState) -> str:
         if self._run.is_solving:
             return self.tr("The tip is being computed.")
+        if self._run.is_reading:
+            return self.tr("The swing goes on.")
         if self._run.solution is not None:
             return ""
         if state.phase is Phase.VERDICT:
@@ -283,7 +286,7 @@ class SwingPage(Page):
             return self.tr("Stop computing"), self._run.cancel
         if state.phase is Phase.SOLVING:
             return self.tr("Compute again"), self._run.solve
-        return self.tr("Capture more"), self._flow.capture_more
+        return self.tr("Capture more"), self._run.capture_more
 
     def _plot(self) -> None:
         state, setup = self._run.state, self._run.setup

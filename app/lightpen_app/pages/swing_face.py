@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -12,6 +13,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen.session.swing_state import SwingState
@@ -21,10 +23,14 @@ from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.leaning_dial import LeaningDial
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.state_banner import StateBanner
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 PROGRESS_STEPS = 1000
+NARROW, LOW = 100 * GRID, 56 * GRID  # px; less has its plots below the dial
+PLOTS_HEIGHT = 32 * GRID  # px, there
+ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 
 
 class SwingFace(QWidget):
@@ -45,14 +51,18 @@ class SwingFace(QWidget):
     ) -> None:
         super().__init__(parent)
         self._value = OperatorValue()
+        self._is_small = False
 
         # Widgets
         self._instruction = FittedText(TextSize.HUGE)
-        self._instruction.setMinimumHeight(7 * GRID)
         self._hint = FittedText(TextSize.LEAD)
         self._verdict = StateBanner(TextSize.DISPLAY)
         self._verdict.setMinimumHeight(10 * GRID)
         self.dial = LeaningDial()
+        # As high as its place is; it draws itself as large as it can.
+        self.dial.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
         self._count = FittedText(TextSize.DISPLAY)
         self._note = text_label(TextSize.SMALL, Tone.QUIET)
         self._progress = QProgressBar()
@@ -72,40 +82,54 @@ class SwingFace(QWidget):
         head.addWidget(self._instruction, 1)
         for button in buttons:
             head.addWidget(button)
-        numbers = QVBoxLayout()
+        self._numbers = numbers = QVBoxLayout()
         numbers.setSpacing(GRID)
         numbers.addWidget(self._count)
         numbers.addWidget(self._progress)
         numbers.addWidget(self._note)
         numbers.addStretch(1)
-        numbers.addWidget(self._banner)
-        side = QGridLayout()
+        self._side = side = QGridLayout()
         side.setSpacing(2 * GRID)
         side.addLayout(numbers, 0, 0)
         side.addWidget(self._image, 0, 1)
-        side.addWidget(self._plots, 1, 0, 1, 2)
         side.setColumnStretch(0, 1)
         side.setColumnStretch(1, 1)
         side.setRowStretch(0, 1)
-        side.setRowStretch(1, 2)
+        self._content = Squeezed()
+        self._body = QGridLayout(self._content)
+        self._body.setContentsMargins(0, 0, 0, 0)
+        self._body.setHorizontalSpacing(3 * GRID)
+        self._body.setVerticalSpacing(GRID)
+        self._body.addWidget(self.dial, 0, 0)
+        self._body.addLayout(side, 0, 1)
+        self._body.setRowStretch(0, 1)
+        self._body.setColumnStretch(0, DIAL_SHARE)
+        self._body.setColumnStretch(1, SIDE_SHARE)
+        self._scroll = PageScroll()
+        self._scroll.setWidget(self._content)
         layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.setHorizontalSpacing(3 * GRID)
         layout.setVerticalSpacing(GRID)
-        layout.addWidget(self._hint, 1, 0, 1, 2)
-        layout.addWidget(self._verdict, 2, 0, 1, 2)
-        layout.addWidget(self.dial, 3, 0)
-        layout.addLayout(side, 3, 1)
+        layout.addWidget(self._hint, 1, 0)
+        layout.addWidget(self._verdict, 2, 0)
+        layout.addWidget(self._scroll, 3, 0)
         # The last in the order of the Tab key: Enter must press a button of these only
         # if somebody has chosen it.
-        layout.addLayout(head, 0, 0, 1, 2)
+        layout.addLayout(head, 0, 0)
         layout.setRowStretch(0, 1)
         layout.setRowStretch(3, 10)
-        layout.setColumnStretch(0, DIAL_SHARE)
-        layout.setColumnStretch(1, SIDE_SHARE)
+
+        # Connections
+        self._scroll.height_changed.connect(self._hold_first_row)
 
         self._verdict.hide()
+        self._use_room(QSize())
         self.retranslate()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._use_room(event.size())
 
     def value(self) -> OperatorValue:
         """Return what is shown."""
@@ -146,3 +170,27 @@ class SwingFace(QWidget):
         self._plots.retranslate()
         self._image.set_message(self.tr("No image yet."))
         self._progress.setAccessibleName(self.tr("Progress"))
+
+    def _use_room(self, size: QSize) -> None:
+        """Put the plots beside the dial, or below it where there is little room."""
+        is_small = size.width() < NARROW or size.height() < LOW
+        if is_small == self._is_small:
+            return
+        self._is_small = is_small
+        if is_small:
+            self._side.addWidget(self._banner, 1, 0, 1, 2)
+            self._body.addWidget(self._plots, 1, 0, 1, 2)
+        else:
+            self._numbers.addWidget(self._banner)
+            self._side.addWidget(self._plots, 1, 0, 1, 2)
+        self._side.setRowStretch(1, 0 if is_small else 2)
+        self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
+        self._hold_first_row(self._scroll.viewport().height())
+        self._plots.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
+        self._plots.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
+        self._content.set_squeezed(not is_small)
+        self._instruction.setMinimumHeight((5 if is_small else 7) * GRID)
+
+    def _hold_first_row(self, height: int) -> None:
+        """Let the dial and what is beside it be seen whole above the plots."""
+        self._body.setRowMinimumHeight(0, height if self._is_small else 0)

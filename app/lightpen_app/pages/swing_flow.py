@@ -1,11 +1,9 @@
 """When a swing begins, waits, goes on and is left, without its user pressing a key."""
 
-import numpy as np
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.cameras.worker import Connection
 from lightpen.errors import FileError, LightpenError
-from lightpen.session.preparation import Preparation
 from lightpen.session.swing_state import Pause
 from lightpen_app.bench import Bench
 from lightpen_app.phrases import lack_text
@@ -62,9 +60,8 @@ class SwingFlow(QObject):
     @property
     def has_other_choices(self) -> bool:
         """Whether something else was chosen since the swing began, or was kept."""
-        return self._run.is_capturing and _differ(
-            self._begun_with, self._bench.preparation
-        )
+        goes_on = self._begun_with.swings_like(self._bench.preparation)
+        return self._run.is_capturing and not goes_on
 
     def keep_choices(self) -> None:
         """Go on with what the swing began with: `has_other_choices` is settled."""
@@ -92,13 +89,6 @@ class SwingFlow(QObject):
             self._resume()
         elif self._run.is_capturing:
             self._pause()
-
-    def capture_more(self) -> None:
-        """Go on with the images of a swing that was solved."""
-        try:
-            self._run.capture_more()
-        except LightpenError as error:
-            self.troubled.emit(str(error))
 
     def start_over(self) -> None:
         """Set the swing aside and begin anew, with what is chosen now."""
@@ -166,13 +156,3 @@ class SwingFlow(QObject):
         if self._is_paused and not self._pause_is_wished:
             self._is_troubled = True
             self.changed.emit()
-
-
-def _differ(one: Preparation, other: Preparation) -> bool:
-    return (
-        one.camera_file is not other.camera_file
-        or one.pen_file is not other.pen_file
-        or one.names != other.names
-        or one.limits != other.limits
-        or not np.array_equal(one.mask, other.mask)
-    )

@@ -1,15 +1,19 @@
 """Buttons for the simulated operator, where the pen is simulated."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QToolButton, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
+from typing_extensions import override
 
 from lightpen.cameras.hand import Operator
 from lightpen.session.posture import Posture
 from lightpen_app.live_view import LiveView
 from lightpen_app.theme import GRID
+from lightpen_app.widgets.push_button import PushButton
 
 SLIP_MM, SLIP_S = 0.5, 1.5
 COVER_S = 2.0
+NARROW = 100 * GRID  # px; a panel of less width has its buttons closer together
 
 
 class HandPanel(QFrame):
@@ -35,7 +39,7 @@ class HandPanel(QFrame):
         self._led: Operator | None = None  # who was told to seat the tip and follow
 
         # Widgets
-        self._follow = QPushButton()
+        self._follow = PushButton()
         self._follow.setCheckable(True)
         self._follow.setProperty("inviting", True)
         self._seat = QToolButton()
@@ -47,9 +51,9 @@ class HandPanel(QFrame):
         self._cover = QToolButton()
 
         # Layout
-        layout = QHBoxLayout(self)
+        self._layout = layout = QHBoxLayout(self)
         layout.setContentsMargins(GRID, GRID // 2, GRID, GRID // 2)
-        layout.setSpacing(GRID)
+        layout.setSpacing(GRID // 2)
         layout.addWidget(self._follow)
         layout.addStretch(1)
         for button in self._commands():
@@ -68,6 +72,12 @@ class HandPanel(QFrame):
 
         self.retranslate()
         self._on_connection_changed()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = event.size().width() < NARROW
+        self._layout.setSpacing(GRID // 2 if is_narrow else GRID)
 
     def lean(self, posture: Posture) -> None:
         """Hold the pen as the user wants, who leads it from now on."""

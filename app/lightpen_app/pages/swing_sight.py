@@ -6,12 +6,11 @@ from dataclasses import replace
 from PySide6.QtCore import QObject, Signal
 
 from lightpen.session.live import LiveImage
-from lightpen.session.swing import feed
+from lightpen.session.swing import feed, stillness
 from lightpen.session.swing_state import Phase, SwingSetup, SwingState
 from lightpen_app.live_view import Shown
 from lightpen_app.swing_run import SwingRun
 
-STILL_S = 3.0  # upright and still after the verdict: continue
 RATE_S = 2.0  # over which the images are counted
 
 
@@ -69,10 +68,7 @@ class SwingSight(QObject):
 
     def stillness(self) -> float:
         """Return how long the pen is upright and still: 1 is long enough."""
-        watched = self._watched
-        if watched is None or watched.still_since is None:
-            return 0.0
-        return min((watched.time - watched.still_since) / STILL_S, 1.0)
+        return 0.0 if self._watched is None else stillness(self._watched)
 
     def _watch(self, seen: LiveImage, time: float) -> None:
         state, setup = self._run.state, self._run.setup

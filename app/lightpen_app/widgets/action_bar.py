@@ -1,11 +1,16 @@
 """The foot of the window: the status line, Back, and the main button."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from lightpen_app.pages.page import MainAction
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.room import Room
 from lightpen_app.widgets.translated import Translated
+
+MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border
+HEIGHT, LOW_HEIGHT = 9 * GRID, 8 * GRID  # px, at least
 
 
 class ActionBar(Translated, QFrame):
@@ -23,13 +28,12 @@ class ActionBar(Translated, QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("bottom_bar")
-        self.setMinimumHeight(9 * GRID)
 
         # Widgets
         self._why_not = text_label(TextSize.BODY, Tone.WARN)
         self._status = text_label(TextSize.SMALL, Tone.QUIET)
-        self._back = QPushButton()
-        self._main = QPushButton()
+        self._back = PushButton()
+        self._main = PushButton(MAIN_WIDTH)
         self._main.setObjectName("main_button")
 
         # Layout
@@ -39,8 +43,7 @@ class ActionBar(Translated, QFrame):
         words.addWidget(self._why_not)
         words.addWidget(self._status)
         words.addStretch(1)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(4 * GRID, GRID, 4 * GRID, GRID)
+        self._layout = layout = QHBoxLayout(self)
         layout.setSpacing(2 * GRID)
         layout.addLayout(words, 1)
         layout.addWidget(self._back)
@@ -50,6 +53,7 @@ class ActionBar(Translated, QFrame):
         self._back.clicked.connect(self.back_pressed)
         self._main.clicked.connect(self.main_pressed)
 
+        self.set_room(Room())
         self.set_status("")
         self._retranslate()
 
@@ -67,6 +71,12 @@ class ActionBar(Translated, QFrame):
         self._status.setText(text)
         self._status.setAccessibleName(text)
         self._status.setVisible(bool(text))
+
+    def set_room(self, room: Room) -> None:
+        """Take less of a window that has little."""
+        self.setMinimumHeight(LOW_HEIGHT if room.is_low else HEIGHT)
+        side = room.margin
+        self._layout.setContentsMargins(side, GRID, side, GRID)
 
     def words(self) -> tuple[str, str]:
         """Return why the main button cannot be pressed, and the status."""

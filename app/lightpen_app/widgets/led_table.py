@@ -37,6 +37,7 @@ N_COORDINATES = 3
 MISFIT = 1 + len(COLUMNS)  # the last column; the first is the LED's number
 N_COLUMNS = MISFIT + 1
 ROW_HEIGHT = 27
+LEAST_HEIGHT = 22 * GRID  # px; the head and five rows
 SHOWN_DECIMALS = 3
 NUMBER_WIDTH, MISFIT_WIDTH = 6 * GRID, 8 * GRID
 SIGN_SIDE = 14
@@ -86,6 +87,7 @@ class LedTable(QTableView):
         columns.setHighlightSections(False)
         columns.setMinimumSectionSize(6 * GRID)
         self.setWordWrap(False)
+        self.setMinimumHeight(LEAST_HEIGHT)
 
         # Connections
         self._model.typed.connect(self.value_changed)

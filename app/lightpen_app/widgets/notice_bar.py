@@ -1,9 +1,10 @@
 """A sentence above the page that waits to be read, and stops nothing."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
@@ -25,7 +26,7 @@ class NoticeBar(Translated, QFrame):
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._close = QPushButton()
+        self._close = PushButton()
 
         # Layout
         layout = QHBoxLayout(self)

@@ -15,7 +15,8 @@ from lightpen_app.widgets.translated import Translated
 
 DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
-INSTRUCTION_SHARE, HINT_SHARE = 0.26, 0.12  # of the height, at most
+# Of the height, at most:
+INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.22
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
 CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not tell its size
@@ -144,6 +145,10 @@ class OperatorView(Translated, QWidget):
         """Return the size at which the instruction is drawn, px."""
         return self._instruction.size_px()
 
+    def count_px(self) -> float:
+        """Return the size at which the count is drawn, px."""
+        return self._count.size_px()
+
     def open_beside(self, window: QWidget) -> None:
         """Fill a screen on which the given window is not, if there is one."""
         other = other_screen(window.screen(), QGuiApplication.screens())
@@ -183,15 +188,18 @@ class OperatorView(Translated, QWidget):
         self._hint.set_largest(letters * 0.6)
         is_digit = len(self._value.count) == 1
         self._count.set_largest(letters * (2.4 if is_digit else 1.2))
-        # Else the dial, which wants to be square, would take the room of the words.
-        for text, share in (
-            (self._instruction, INSTRUCTION_SHARE),
-            (self._hint, HINT_SHARE),
-        ):
-            wanted = text.sizeHint().height()
-            text.setMinimumHeight(min(wanted, round(self.height() * share)))
         has_room = self._value.dial is None
         self._banner.set_word_size(letters * (1.6 if has_room else 0.8))
+        # Else the dial, which wants to be square, would take the room of the words, and
+        # of these one that of another.
+        for widget, share in (
+            (self._instruction, INSTRUCTION_SHARE),
+            (self._hint, HINT_SHARE),
+            (self._count, COUNT_SHARE),
+            (self._banner, STATE_SHARE),
+        ):
+            wanted = widget.sizeHint().height()
+            widget.setMinimumHeight(min(wanted, round(self.height() * share)))
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Operator view"))

@@ -1,8 +1,8 @@
 """The part of a page that scrolls when the window is small."""
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QScrollArea, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 from typing_extensions import override
 
 
@@ -10,7 +10,14 @@ class PageScroll(QScrollArea):
     """Scrolls to the control that has the focus, and takes no key for itself.
 
     The page keys, which a presenter's remote sends, are left to the window.
+
+    Signals
+    -------
+    height_changed(int)
+        Of what is seen at once, px.
     """
+
+    height_changed = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -25,5 +32,43 @@ class PageScroll(QScrollArea):
         self.viewport().setAutoFillBackground(False)
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.height_changed.emit(event.size().height())
+
+    @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         event.ignore()
+
+
+class Squeezed(QWidget):
+    """Content that scrolls only once it cannot be made smaller.
+
+    Other content with words that wrap, and this where it is not to be squeezed, scrolls
+    as soon as it has less than the height for which it asks.
+
+    Parameters
+    ----------
+    content : QWidget, optional
+        Fills it; without one, the caller lays it out.
+    """
+
+    def __init__(self, content: QWidget | None = None) -> None:
+        super().__init__()
+        self._is_squeezed = True
+        if content is not None:
+            # Layout
+            layout = QVBoxLayout(self)
+            layout.setContentsMargins(0, 0, 0, 0)
+            layout.addWidget(content)
+
+    def set_squeezed(self, squeezed: bool) -> None:
+        """Let it be made as small as it can be, or give it all that it asks for."""
+        self._is_squeezed = squeezed
+        self.updateGeometry()
+
+    @override
+    def heightForWidth(self, width: int) -> int:
+        if self._is_squeezed:
+            return self.minimumSizeHint().height()
+        return super().heightForWidth(width)

@@ -152,7 +152,7 @@ class Plot(QWidget):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(160, 120)
+        return QSize(160, 152)
 
     @override
     def changeEvent(self, event: QEvent) -> None:

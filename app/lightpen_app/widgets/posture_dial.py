@@ -7,14 +7,21 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtGui import (
+    QColor,
+    QPainter,
+    QPainterPath,
+    QPaintEvent,
+    QPen,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import IntArray
 from lightpen.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.session.posture import Posture
-from lightpen_app.theme import GRID, Colors, TextSize, colors_of, font
+from lightpen_app.theme import Colors, TextSize, colors_of, font
+from lightpen_app.widgets.camera_mark import Stand, draw_camera
 from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
 
 MAX_TILT = math.radians(36)  # drawn at the rim
@@ -24,6 +31,7 @@ GAP = math.radians(1.6)  # half the gap between sectors
 RING_EDGES = (0.24, 0.62, 1.0)  # of upright, leaning, leaning far; rim = 1
 RIM_SHARE = 0.435  # of the side, from the middle to the rim
 BAR_SHARE = 0.12  # of the side, for the bar of the turn
+LEAST_BAR = 36  # px; its words are no smaller than can be read
 SECTOR = 2 * math.pi / N_DIRECTIONS
 
 
@@ -132,11 +140,11 @@ class PostureDial(QWidget):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(240, self.heightForWidth(240))
+        return QSize(176, self.heightForWidth(176))
 
     @override
     def heightForWidth(self, width: int) -> int:
-        return round(width * (1 + BAR_SHARE))
+        return round(width + _bar_height(width))
 
     def _describe(self) -> None:
         self.setAccessibleName(self.tr("Postures"))
@@ -158,7 +166,13 @@ class PostureDial(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colors = colors_of(self.palette())
         middle, rim, bar = self._places()
-        self._draw_camera(painter, middle, rim, colors)
+        draw_camera(
+            painter,
+            QRectF(0, 0, self.width(), bar.top()),
+            Stand(middle, rim, self._value.heading - math.pi / 2),
+            self.tr("camera"),
+            QColor(colors.muted),
+        )
         target = self._value.target
         marked = _Field(*field_of(target)) if target else None
         for place in _fields():
@@ -173,12 +187,14 @@ class PostureDial(QWidget):
 
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""
-        side = min(self.width(), self.height() / (1 + BAR_SHARE))
-        left = (self.width() - side) / 2
-        top = (self.height() - side * (1 + BAR_SHARE)) / 2
+        width, height = self.width(), self.height()
+        side = max(min(width, height / (1 + BAR_SHARE), height - LEAST_BAR), 0.0)
+        bar_height = _bar_height(side)
+        left = (width - side) / 2
+        top = (height - side - bar_height) / 2
         middle = QPointF(left + side / 2, top + side / 2)
         rim = RIM_SHARE * side
-        bar = QRectF(middle.x() - rim, top + side, 2 * rim, BAR_SHARE * side)
+        bar = QRectF(middle.x() - rim, top + side, 2 * rim, bar_height)
         return middle, rim, bar
 
     def _images(self, place: _Field) -> tuple[int, int]:
@@ -244,30 +260,6 @@ class PostureDial(QWidget):
         painter.setPen(QPen(halo, 0.03 * rim))
         painter.setBrush(QColor(colors.text))
         painter.drawEllipse(here, 0.06 * rim, 0.06 * rim)
-
-    def _draw_camera(
-        self, painter: QPainter, middle: QPointF, rim: float, colors: Colors
-    ) -> None:
-        """Draw where the camera stands, so that the dial cannot be misread."""
-        angle = self._value.heading - math.pi / 2
-        towards = QPointF(math.cos(angle), -math.sin(angle))
-        body = 0.055 * rim
-        painter.save()
-        painter.translate(middle + towards * (rim * 1.085))
-        painter.rotate(math.degrees(-angle) + 90)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(colors.muted))
-        painter.drawRoundedRect(
-            QRectF(-1.5 * body, -0.5 * body, 3 * body, 1.6 * body), 3, 3
-        )
-        painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
-        painter.restore()
-        size = max(0.075 * rim, TextSize.SMALL)
-        painter.setPen(QColor(colors.muted))
-        painter.setFont(font(size))
-        beside = middle + towards * (rim * 1.085) + QPointF(2 * body + GRID / 2, 0)
-        box = QRectF(beside.x(), beside.y() - size, rim, 2 * size)
-        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, self.tr("camera"))
 
     def _draw_turn(self, painter: QPainter, box: QRectF, colors: Colors) -> None:
         value = self._value
@@ -362,6 +354,11 @@ def _outline(
 
 def _square(middle: QPointF, radius: float) -> QRectF:
     return QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
+
+
+def _bar_height(side: float) -> float:
+    """Return the height of the bar of the turn below a dial, px."""
+    return max(BAR_SHARE * side, LEAST_BAR)
 
 
 def _turn_x(box: QRectF, turn: float) -> float:

@@ -1,9 +1,10 @@
 """A question in the page that waits for an answer, and stops nothing else."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.widgets.push_button import PushButton
 
 
 class QuestionBar(QFrame):
@@ -25,8 +26,8 @@ class QuestionBar(QFrame):
 
         # Widgets
         self._text = text_label(TextSize.BODY)
-        self._decline = QPushButton()
-        self._agree = QPushButton()
+        self._decline = PushButton()
+        self._agree = PushButton()
 
         # Layout
         layout = QHBoxLayout(self)

@@ -1,10 +1,11 @@
 """A button that plays all sounds, each with its word."""
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from lightpen_app.sounds import Mute, Sound, Sounds
 from lightpen_app.theme import GRID
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
@@ -31,7 +32,7 @@ class SoundTest(Translated, QWidget):
         self._waiting: list[Sound] = []
 
         # Widgets
-        self._button = QPushButton()
+        self._button = PushButton()
         self._button.setSizePolicy(FIXED, FIXED)
         self._words = SignLabel()
         self._timer = QTimer(self)

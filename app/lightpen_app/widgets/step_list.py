@@ -12,7 +12,8 @@ from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_sign
 
 SIGN_SIZE = 2 * GRID
-TEXT_LEFT = 6 * GRID
+SIGN_LEFT, NARROW_SIGN_LEFT = 5 * GRID // 2, 3 * GRID // 2
+TEXT_LEFT, NARROW_TEXT_LEFT = 6 * GRID, 9 * GRID // 2
 WRAPPED = int(Qt.TextFlag.TextWordWrap)
 MARKS = {
     StepState.DONE: (Sign.CHECK, Tone.GOOD),
@@ -28,6 +29,7 @@ class StepButton(QAbstractButton):
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._step = step
+        self._is_narrow = False
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -47,9 +49,16 @@ class StepButton(QAbstractButton):
             self.updateGeometry()
             self.update()
 
+    def set_narrow(self, narrow: bool) -> None:
+        """Draw the sign and the words nearer to the edge and to each other."""
+        self._is_narrow = narrow
+        self.updateGeometry()
+        self.update()
+
     @override
     def sizeHint(self) -> QSize:
-        return QSize(28 * GRID, self.heightForWidth(28 * GRID))
+        width = (16 if self._is_narrow else 28) * GRID
+        return QSize(width, self.heightForWidth(width))
 
     @override
     def heightForWidth(self, width: int) -> int:
@@ -71,7 +80,8 @@ class StepButton(QAbstractButton):
         sign, tone = MARKS[step.state]
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        box = QRectF(self.rect()).adjusted(GRID, 0, -GRID, 0)
+        edge = GRID / 2 if self._is_narrow else GRID
+        box = QRectF(self.rect()).adjusted(edge, 0, -edge, 0)
         if step.state is StepState.NOW or self.underMouse():
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(colors.raised))
@@ -80,24 +90,34 @@ class StepButton(QAbstractButton):
             painter.setPen(QPen(QColor(colors.accent), 2))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(box.adjusted(1, 1, -1, -1), 6, 6)
-        mark = QRectF(2.5 * GRID, 1.5 * GRID, SIGN_SIZE, SIGN_SIZE)
+        left = NARROW_SIGN_LEFT if self._is_narrow else SIGN_LEFT
+        mark = QRectF(left, 1.5 * GRID, SIGN_SIZE, SIGN_SIZE)
         draw_sign(painter, mark, sign, colors.tone(tone))
         now = step.state is StepState.NOW
         bright = step.state in (StepState.NOW, StepState.DONE)
         painter.setPen(QColor(colors.text if bright else colors.muted))
         painter.setFont(font(TextSize.BODY, bold=now))
-        name = QRectF(TEXT_LEFT, 0, self.width() - TEXT_LEFT - GRID, 5 * GRID)
+        name = QRectF(
+            self._text_left, 0, self.width() - self._text_left - GRID, 5 * GRID
+        )
         painter.drawText(name, Qt.AlignmentFlag.AlignVCenter, step.title)
         if step.why_closed:
             painter.setPen(QColor(colors.muted))
             painter.setFont(font(TextSize.SMALL))
             reason = QRectF(
-                TEXT_LEFT, 4.5 * GRID, self._reason_width(self.width()), self.height()
+                self._text_left,
+                4.5 * GRID,
+                self._reason_width(self.width()),
+                self.height(),
             )
             painter.drawText(reason, WRAPPED, step.why_closed)
 
+    @property
+    def _text_left(self) -> int:
+        return NARROW_TEXT_LEFT if self._is_narrow else TEXT_LEFT
+
     def _reason_width(self, width: int) -> float:
-        return width - TEXT_LEFT - 2 * GRID
+        return width - self._text_left - (1 if self._is_narrow else 2) * GRID
 
     def _reason_height(self, width: int) -> float:
         metrics = QFontMetricsF(font(TextSize.SMALL))
@@ -129,6 +149,7 @@ class StepList(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._buttons: list[StepButton] = []
+        self._is_narrow = False
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(GRID // 2)
@@ -138,12 +159,19 @@ class StepList(QWidget):
         """Return the steps shown."""
         return tuple(button.value() for button in self._buttons)
 
+    def set_narrow(self, narrow: bool) -> None:
+        """Show the steps where there is little width, or where there is enough."""
+        self._is_narrow = narrow
+        for button in self._buttons:
+            button.set_narrow(narrow)
+
     def set_steps(self, steps: Sequence[Step]) -> None:
         """Show these steps."""
         for button, step in zip(self._buttons, steps, strict=False):
             button.set_value(step)
         for index in range(len(self._buttons), len(steps)):
             button = StepButton(steps[index], self)
+            button.set_narrow(self._is_narrow)
             button.clicked.connect(lambda _=False, at=index: self.step_chosen.emit(at))
             self._buttons.append(button)
             self._layout.addWidget(button)

@@ -477,6 +477,10 @@
         <source>Image {0}: the pen is not found. {1}</source>
         <translation>图像 {0}：未找到光笔。{1}</translation>
     </message>
+    <message>
+        <source>The image cannot be shown.</source>
+        <translation>无法显示该图像。</translation>
+    </message>
 </context>
 <context>
     <name>InterruptedPanel</name>
@@ -491,6 +495,10 @@
     <message>
         <source>Resumed, it has all its images and the files it began with.</source>
         <translation>继续时保留全部图像，并使用开始时的文件。</translation>
+    </message>
+    <message>
+        <source>Look again</source>
+        <translation>重新查找</translation>
     </message>
 </context>
 <context>
@@ -526,6 +534,14 @@
     <message>
         <source>Keep the swing of {0}</source>
         <translation>保留 {0} 的摆动</translation>
+    </message>
+    <message>
+        <source>Damaged: {0}</source>
+        <translation>已损坏：{0}</translation>
+    </message>
+    <message>
+        <source>Another program is capturing it.</source>
+        <translation>另一个程序正在采集。</translation>
     </message>
     <message>
         <source>1 image</source>
@@ -859,6 +875,10 @@
     <message>
         <source>Discard them</source>
         <translation>放弃修改</translation>
+    </message>
+    <message>
+        <source>{0} stays in use.</source>
+        <translation>仍使用 {0}。</translation>
     </message>
     <message>
         <source>The LEDs are saved as {0} and in use.</source>
@@ -1716,6 +1736,10 @@
         <translation>锥孔 {0}</translation>
     </message>
     <message>
+        <source>The last calibration cannot be shown.</source>
+        <translation>无法显示上次校准。</translation>
+    </message>
+    <message>
         <source>The swing is being read.</source>
         <translation>正在读取摆动。</translation>
     </message>
@@ -1909,6 +1933,10 @@
     <message>
         <source>The tip is being computed.</source>
         <translation>正在计算测头。</translation>
+    </message>
+    <message>
+        <source>The swing goes on.</source>
+        <translation>摆动继续进行。</translation>
     </message>
     <message>
         <source>There is no tip to review: capture more, or start over.</source>
@@ -2320,8 +2348,8 @@
         <translation>丢弃图像过多</translation>
     </message>
     <message>
-        <source>{0} of {1} images do not take part. Look at their reasons below, and repeat the swing if the tip slipped.</source>
-        <translation>{1} 幅图像中有 {0} 幅未参与计算。原因见下方；若测头滑动过，请重做摆动。</translation>
+        <source>{0} of {1} images do not take part. Review has their reasons; repeat the swing if the tip slipped.</source>
+        <translation>{1} 幅图像中有 {0} 幅未参与计算。原因见“复核”步骤；若测头滑动过，请重做摆动。</translation>
     </message>
     <message>
         <source>The residuals are {0} px, {1} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>

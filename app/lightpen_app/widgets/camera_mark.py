@@ -1,0 +1,91 @@
+"""The mark that says where the camera stands about a dial."""
+
+import math
+from dataclasses import dataclass
+
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QTransform
+
+from lightpen_app.theme import GRID, TextSize, font
+
+TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the rim, degrees
+FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)
+DISTANCE = 1.085  # from the middle of the dial to that of the mark; rim = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """Where a camera stands.
+
+    Attributes
+    ----------
+    middle : QPointF
+        Of the dial, px.
+    rim : float
+        Radius of the dial, px.
+    angle : float
+        In which direction from the middle, counter-clockwise from the right, rad.
+    """
+
+    middle: QPointF
+    rim: float
+    angle: float
+
+    @property
+    def place(self) -> QPointF:
+        """Middle of the mark, px."""
+        towards = QPointF(math.cos(self.angle), -math.sin(self.angle))
+        return self.middle + towards * (self.rim * DISTANCE)
+
+
+def draw_camera(
+    painter: QPainter, room: QRectF, stand: Stand, words: str, color: QColor
+) -> None:
+    """Draw a camera that looks at a dial, and words beside it that stay in a room."""
+    rim = stand.rim
+    body = 0.055 * rim
+    painter.save()
+    painter.translate(stand.place)
+    painter.rotate(math.degrees(-stand.angle) + 90)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(color)
+    painter.drawRoundedRect(
+        QRectF(-1.5 * body, -0.5 * body, 3 * body, 1.6 * body), 3, 3
+    )
+    painter.drawRect(QRectF(-0.6 * body, -1.1 * body, 1.2 * body, 0.7 * body))
+    painter.restore()
+
+    size = max(0.075 * rim, TextSize.SMALL)
+    painter.save()
+    painter.setPen(color)
+    painter.setFont(font(size))
+    length = QFontMetricsF(painter.font()).horizontalAdvance(words) + 1
+    away = 2 * body + GRID / 2
+    right = QRectF(away, -size / 2, length, size)
+    left = right.translated(-2 * away - length, 0)
+    along = 90 - math.degrees(stand.angle % math.pi)  # the rim; never upside down
+    turns = (0.0, along, *(along + each for each in TURNS))
+    turn, box = min(
+        ((turn, box) for turn in turns for box in (right, left)),
+        key=lambda each: _lack(each[0], each[1], room, stand),
+    )
+    painter.translate(stand.place)
+    painter.rotate(turn)
+    painter.drawText(box, FLAGS, words)
+    painter.restore()
+
+
+def _lack(turn: float, box: QRectF, room: QRectF, stand: Stand) -> float:
+    """Return by how much words leave their room or cover the dial, px.
+
+    Their box is about the mark and is turned by an angle in degrees, clockwise.
+    """
+    place = QTransform.fromTranslate(stand.place.x(), stand.place.y()).rotate(turn)
+    both = place.mapRect(box).united(room)
+    outside = both.width() - room.width() + both.height() - room.height()
+    back, _ = place.inverted()
+    middle = back.map(stand.middle)
+    x = min(max(middle.x(), box.left()), box.right())
+    y = min(max(middle.y(), box.top()), box.bottom())
+    covered = stand.rim - math.hypot(x - middle.x(), y - middle.y())
+    return outside + max(covered, 0.0)

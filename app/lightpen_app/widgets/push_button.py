@@ -1,0 +1,32 @@
+"""A button that is never narrower than its words."""
+
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QPushButton, QWidget
+from typing_extensions import override
+
+from lightpen_app.theme import GRID
+
+LEAST_WIDTH = 8 * GRID + 34  # px; with the padding and the border
+
+
+class PushButton(QPushButton):
+    """A push button.
+
+    A style sheet cannot say how narrow it may be: its min-width replaces the width that
+    the words need, and a layout short of room would clip them.
+
+    Parameters
+    ----------
+    least_width : int
+        For which it asks with short words, px.
+    """
+
+    def __init__(
+        self, least_width: int = LEAST_WIDTH, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._least_width = least_width
+
+    @override
+    def sizeHint(self) -> QSize:
+        return super().sizeHint().expandedTo(QSize(self._least_width, 0))

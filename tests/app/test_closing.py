@@ -1,0 +1,261 @@
+"""Closing the window ends in time, whatever is under way, and loses nothing."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
+
+import pytest
+from PySide6.QtCore import QThreadPool
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen.cameras.hand import Operator
+from lightpen.cameras.protocol import Settings as CameraSettings
+from lightpen.cameras.simulated import SimulatedCamera
+from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.record import Record, open_record
+from lightpen.session.recording import RecordWriter
+from lightpen.session.solving import Solution, solve_record
+from lightpen_app.bench import Bench
+from lightpen_app.job import Report
+from lightpen_app.live_view import CLOSING_TIME
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard
+
+TIMEOUT = 20_000  # ms until a test gives up
+SOON = 1.0  # s that is given to what does not end
+AT_ONCE = 0.5  # s beyond, on a machine that does other things besides
+N_IMAGES = 20  # of the record that is resumed
+
+STUCK = """
+import sys, time
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+from lightpen_app.application import run
+from lightpen_app.job import Job
+from lightpen_app.wizard_pages import make_pages
+
+def close():
+    Job(lambda report: time.sleep(600)).start()
+    print("closing", flush=True)
+    QApplication.closeAllWindows()
+
+def pages(services):
+    QTimer.singleShot(500, close)
+    return make_pages(services)
+
+sys.exit(run(pages))
+"""
+
+
+class Stuck:
+    """A computation, a camera or a disk from which no call comes back until the end."""
+
+    def __init__(self) -> None:
+        self.is_reached, self.may_end = Event(), Event()
+
+    def wait(self) -> None:
+        self.is_reached.set()
+        self.may_end.wait(TIMEOUT / 1000)
+
+
+@pytest.fixture
+def stuck(bench: Bench) -> Iterator[Stuck]:
+    stuck = Stuck()
+    yield stuck
+    stuck.may_end.set()
+    bench.shut_down()
+    assert QThreadPool.globalInstance().waitForDone(TIMEOUT)
+
+
+@pytest.fixture
+def interrupted(bench: Bench, swung: Callable[..., Path]) -> Path:
+    """An interrupted swing among the records of the bench."""
+    folder = bench.run.records_folder / "interrupted"
+    shutil.copytree(swung(), folder)
+    return folder
+
+
+class StuckCamera(SimulatedCamera):
+    """A camera that does not come back from being closed."""
+
+    stuck: Stuck
+
+    @override
+    def close(self) -> None:
+        self.stuck.wait()
+        super().close()
+
+
+def swing_before(bench: Bench, stuck: Stuck) -> None:
+    """Swing before a camera that will not close."""
+    around = bench.around
+    camera = StuckCamera(
+        around.scene, around.clock, Operator(around.clock, seated=True)
+    )
+    camera.stuck = stuck
+    bench.live.open(camera, CameraSettings(), around.clock)
+    bench.live.set_following(True)
+
+
+def n_kept(bench: Bench) -> int:
+    state = bench.run.state
+    return 0 if state is None else state.n_kept
+
+
+def closing_time(bench: Bench) -> float:
+    """Give what is under way `SOON` to end, and return how long it took, s."""
+    began = time.monotonic()
+    assert not bench.shut_down(SOON)
+    return time.monotonic() - began
+
+
+def assert_whole(folder: Path, n_images: int) -> None:
+    """Assert that an interrupted swing has all its images and can be gone on with."""
+    (record,) = found_interrupted(folder.parent)
+    assert record.folder == folder
+    assert len(record.images) >= n_images
+    assert read_resumable(folder).state.n_kept == len(record.used_images)
+
+
+def test_closing_waits_for_all_that_is_under_way_together(
+    bench: Bench,
+    stuck: Stuck,
+    interrupted: Path,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def solve(record: Record, report: Report) -> Solution:
+        stuck.wait()
+        return solve_record(record, report)
+
+    monkeypatch.setattr("lightpen_app.swing_run.solve_record", solve)
+    swing_before(bench, stuck)
+    bench.run.go_on(read_resumable(interrupted))
+    qtbot.waitUntil(lambda: n_kept(bench) >= N_IMAGES + 2, timeout=TIMEOUT)
+    bench.run.finish()
+    qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
+
+    assert closing_time(bench) < SOON + AT_ONCE
+    assert_whole(interrupted, N_IMAGES + 2)
+
+
+def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
+    bench: Bench,
+    stuck: Stuck,
+    interrupted: Path,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    around, append = bench.around, RecordWriter.append
+    camera = SimulatedCamera(
+        around.scene, around.clock, Operator(around.clock, seated=True)
+    )
+    bench.live.open(camera, CameraSettings(), around.clock)
+    bench.live.set_following(True)
+    bench.run.go_on(read_resumable(interrupted))
+    qtbot.waitUntil(lambda: n_kept(bench) >= N_IMAGES + 2, timeout=TIMEOUT)
+
+    def write(writer: RecordWriter, *image: object) -> int:
+        stuck.wait()
+        return append(writer, *image)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(RecordWriter, "append", write)
+    qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
+    n_acknowledged = n_kept(bench)
+
+    assert closing_time(bench) < SOON + AT_ONCE
+    assert len(open_record(interrupted).images) >= n_acknowledged
+    stuck.may_end.set()
+    assert bench.shut_down()
+    assert_whole(interrupted, n_acknowledged)
+
+
+def test_a_solution_that_ends_in_time_is_waited_for(
+    bench: Bench,
+    interrupted: Path,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    began, ended = Event(), Event()
+
+    def solve(record: Record, report: Report) -> Solution:
+        began.set()
+        time.sleep(0.5)  # as in a step that cannot be cancelled
+        solution = solve_record(record)
+        ended.set()
+        return solution
+
+    monkeypatch.setattr("lightpen_app.swing_run.solve_record", solve)
+    bench.run.go_on(read_resumable(interrupted))
+    bench.run.finish()
+    qtbot.waitUntil(began.is_set, timeout=TIMEOUT)
+
+    assert bench.shut_down()
+    assert ended.is_set()
+    assert bench.run.solution is None
+    assert_whole(interrupted, N_IMAGES)
+
+
+def test_the_window_closes_in_time_and_the_swing_is_offered_again(
+    open_wizard: "OpenWizard",
+    swung: Callable[..., Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stuck = Stuck()
+
+    def solve(record: Record, report: Report) -> Solution:
+        stuck.wait()
+        return solve_record(record, report)
+
+    walker = open_wizard()
+    run = walker.bench.run
+    folder = run.records_folder / "interrupted"
+    shutil.copytree(swung(), folder)
+    with monkeypatch.context() as slow:
+        slow.setattr("lightpen_app.swing_run.solve_record", solve)
+        run.go_on(read_resumable(folder))
+        run.finish()
+        walker.until(stuck.is_reached.is_set)
+
+    began = time.monotonic()
+    with walker.answering() as asked:
+        walker.window.close()
+    took = time.monotonic() - began
+    stuck.may_end.set()
+
+    assert "The swing is not finished." in asked[0]
+    assert took < CLOSING_TIME + 2 * AT_ONCE
+    assert_whole(folder, N_IMAGES)
+    again = open_wizard()
+    again.until_says("Interrupted swing")
+    again.click("Resume")
+    again.until_shows("Swing")
+    assert n_kept(again.bench) == N_IMAGES
+
+
+def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:
+    folders = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "APPDATA", "LOCALAPPDATA")
+    environment = dict.fromkeys(folders, str(tmp_path))
+    with subprocess.Popen(
+        [sys.executable, "-c", STUCK],
+        stdout=subprocess.PIPE,
+        env=os.environ | environment | {"QT_QPA_PLATFORM": "offscreen"},
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"closing\n"
+        began = time.monotonic()
+        try:
+            status = process.wait(2 * CLOSING_TIME)
+        finally:
+            process.kill()
+
+    assert status == 0
+    assert time.monotonic() - began < CLOSING_TIME + 2 * AT_ONCE
