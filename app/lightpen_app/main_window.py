@@ -35,6 +35,7 @@ from lightpen_app.theme import (
 from lightpen_app.widgets.about import About
 from lightpen_app.widgets.action_bar import ActionBar
 from lightpen_app.widgets.help_window import HelpWindow
+from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.notice_bar import NoticeBar
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.options_menu import OptionsMenu
@@ -42,7 +43,6 @@ from lightpen_app.widgets.room import Room
 from lightpen_app.widgets.sidebar import Sidebar
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
-ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class MainWindow(QMainWindow):

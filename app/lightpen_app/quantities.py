@@ -2,6 +2,8 @@
 
 import math
 
+AXES = ("x", "y", "z")
+MICROMETRES = 1000.0  # in a millimetre
 MAX_DECIMALS = 6
 DIGITS = 2  # of an uncertainty, as the GUM recommends
 

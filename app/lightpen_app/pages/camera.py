@@ -93,7 +93,7 @@ class CameraPage(Page):
         self._live.troubled.connect(self._on_troubled)
         self._live.failed.connect(self._on_failed)
 
-        self.retranslate()
+        self._retranslate()
         self._on_bench_changed()
 
     @override
@@ -148,7 +148,7 @@ class CameraPage(Page):
             self._use_width()
 
     @override
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         self._remark_swing()
         self._show_connection()
         self.changed.emit()

@@ -20,8 +20,8 @@ from lightpen.session.exposure import Advice, advise
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.exposure_bar import ExposureBar
 from lightpen_app.widgets.focus_meter import N_TRACED, FocusMeter
+from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.number_field import NumberField
-from lightpen_app.widgets.path_field import ENTER_KEYS
 from lightpen_app.widgets.translated import Translated
 
 US_PER_MS = 1000.0

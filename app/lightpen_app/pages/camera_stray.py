@@ -2,7 +2,7 @@
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QGroupBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QGroupBox, QVBoxLayout, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.inspection import SEARCHED_IMAGES, StraySearch
@@ -169,9 +169,9 @@ class StrayLightPanel(Translated, QGroupBox):
             why_not_start = self.tr("No images come.")
         elif is_searching:
             why_not_start = self.tr("The search is on.")
-        _allow(self._start, why_not_start)
-        _allow(self._mask, "" if n_found else self.tr("Nothing was found to mask."))
-        _allow(self._clear, "" if self._n_masked else self.tr("Nothing is masked."))
+        self._start.set_why_not(why_not_start)
+        self._mask.set_why_not("" if n_found else self.tr("Nothing was found to mask."))
+        self._clear.set_why_not("" if self._n_masked else self.tr("Nothing is masked."))
         self._outcome.set_value(self._told())
 
     def _told(self) -> Remark:
@@ -210,9 +210,3 @@ class StrayLightPanel(Translated, QGroupBox):
                 "be told from stray light."
             )
         return Remark(words.format(n_found), Sign.WARNING, Tone.WARN)
-
-
-def _allow(button: QPushButton, why_not: str) -> None:
-    button.setEnabled(not why_not)
-    button.setToolTip(why_not)
-    button.setAccessibleDescription(why_not)

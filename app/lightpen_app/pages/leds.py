@@ -157,7 +157,7 @@ class LedsPage(Page):
             self._use_width()
 
     @override
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         self._refresh()
 
     def _use_width(self) -> None:

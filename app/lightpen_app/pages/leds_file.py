@@ -124,7 +124,6 @@ class LedFilePanel(Translated, QWidget):
         """Tell whether there is something to save, and as what it is best saved."""
         self._suffix = suffix
         self._why_no_save = why_not
-        self._save.setEnabled(not why_not)
         self._refresh_save_words()
 
     def set_has_samples(self, has_samples: bool) -> None:
@@ -194,9 +193,8 @@ class LedFilePanel(Translated, QWidget):
         self._refresh_save_words()
 
     def _refresh_save_words(self) -> None:
-        told = self._why_no_save or self.tr("Save the LEDs and use that file.")
-        self._save.setToolTip(told)
-        self._save.setAccessibleDescription(told)
+        told = self.tr("Save the LEDs and use that file.")
+        self._save.set_why_not(self._why_no_save, told)
 
 
 class _UnitsRow(Translated, QWidget):

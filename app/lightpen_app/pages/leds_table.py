@@ -12,13 +12,13 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
 from lightpen.pen import MAX_LEDS, MIN_LEDS
 from lightpen.pen_check.draft import PenDraft
+from lightpen_app.quantities import AXES
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.led_table import LedTable
 from lightpen_app.widgets.path_field import EnterEdit
@@ -26,8 +26,6 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
-
-AXES = ("x", "y", "z")
 
 
 class Changes(Enum):
@@ -190,7 +188,7 @@ class LedTablePanel(Translated, QGroupBox):
         else:
             why_not = ""
         told = self.tr("Remove LED {0}; later ones get lower numbers.").format(chosen)
-        _explain(self._remove, why_not, told)
+        self._remove.set_why_not(why_not, told)
         unchanged = self._changes is Changes.NONE
         why_not = self.tr("Nothing is changed.") if unchanged else ""
         told = (
@@ -198,7 +196,7 @@ class LedTablePanel(Translated, QGroupBox):
             if self._changes is Changes.EDITED
             else self.tr("Go back to the file in use.")
         )
-        _explain(self._discard, why_not, told)
+        self._discard.set_why_not(why_not, told)
         text = self.tr("In force is the nominal tip of the step Start: {0} mm.")
         self._override_label.setText(text.format(self._override))
         self._override_label.setVisible(bool(self._override))
@@ -224,9 +222,3 @@ def _show(edit: QLineEdit, text: str) -> None:
     """Show a text, but leave what the user types as it is typed."""
     if edit.text().strip() != text:
         edit.setText(text)
-
-
-def _explain(button: QPushButton, why_not: str, told: str) -> None:
-    button.setEnabled(not why_not)
-    button.setToolTip(why_not or told)
-    button.setAccessibleDescription(why_not or told)

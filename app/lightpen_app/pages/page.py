@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QEvent, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
+
+from lightpen_app.widgets.translated import Translated
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class MainAction:
     at_screen: bool = False
 
 
-class Page(QWidget):
+class Page(Translated, QWidget):
     """Base of the pages; what raises NotImplementedError here, each page says.
 
     A page takes the room that it is given: what needs more scrolls in it, or is
@@ -120,14 +122,6 @@ class Page(QWidget):
     def shut_down(self) -> None:
         """Cancel jobs, stop threads, close cameras: the window closes."""
 
-    def retranslate(self) -> None:
-        """Set every text anew, in the language that is now chosen.
-
-        The page calls it once in its constructor; later changes call it by themselves.
-        """
-
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self.retranslate()
+    def _retranslate(self) -> None:
+        """Set every text anew; by default there is none."""

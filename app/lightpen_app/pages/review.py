@@ -17,7 +17,8 @@ from lightpen.errors import FileError
 from lightpen.report import warnings_of
 from lightpen.session.results import Result, last_result
 from lightpen.session.solving import Solution
-from lightpen.session.verdict import USUAL_CHANGE, Grade, NextStep, Verdict
+from lightpen.session.verdict import USUAL_CHANGE, NextStep, Verdict
+from lightpen_app.grades import GRADE_MARKS
 from lightpen_app.pages.page import MainAction, Page
 from lightpen_app.pages.review_images import ImagesPanel
 from lightpen_app.pages.review_plots import (
@@ -42,11 +43,6 @@ PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
 NARROW = 112 * GRID  # px; a page of less width has the result in a tab
 TAB_WIDTH = 64 * GRID  # of the result in a tab
-MARKS = {
-    Grade.PASS: (Sign.CHECK, Tone.GOOD),
-    Grade.CHECK: (Sign.WARNING, Tone.WARN),
-    Grade.REPEAT: (Sign.CROSS, Tone.BAD),
-}
 
 
 class ReviewPage(Page):
@@ -116,7 +112,7 @@ class ReviewPage(Page):
             panel.saved.connect(self.status_changed)
             panel.failed.connect(self.notice_raised)
 
-        self.retranslate()
+        self._retranslate()
 
     @override
     def title(self) -> str:
@@ -202,7 +198,7 @@ class ReviewPage(Page):
             self._use_width()
 
     @override
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         names = (
             self.tr("Images"),
             self.tr("Residuals"),
@@ -360,9 +356,7 @@ class ReviewPage(Page):
                 self.tr("Swing anew without these images"),
             ),
         ):
-            button.setEnabled(not why_locked)
-            button.setToolTip(why_locked or what)
-            button.setAccessibleDescription(why_locked or what)
+            button.set_why_not(why_locked, what)
             _recommend(button, not why_locked and _is_next(run.verdict, step))
 
     def _state(self) -> State:
@@ -376,7 +370,7 @@ class ReviewPage(Page):
             return State(self.tr("NO TIP YET"), text, Sign.WAIT, Tone.QUIET)
         heading = None if run.state is None else run.state.heading
         said = phrase(run.verdict.reason, heading)
-        sign, tone = MARKS[run.verdict.grade]
+        sign, tone = GRADE_MARKS[run.verdict.grade]
         word = self.tr("{0}: {1}").format(grade_text(run.verdict.grade), said.short)
         return State(word, said.hint, sign, tone)
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from lightpen.arrays import Image
 from lightpen.session.record import RecordSource
@@ -189,13 +189,11 @@ class ImagesPanel(Translated, QWidget):
             why_not_out = why_not_out or self.tr("It does not take part already.")
         if not why_not_back and not any(row.is_taken_out for row in rows):
             why_not_back = self._why_not_back(rows[0])
-        _enable(
-            self._take_out,
+        self._take_out.set_why_not(
             why_not_out,
             self.tr("Leave the selected images out and solve again (Delete)"),
         )
-        _enable(
-            self._put_back,
+        self._put_back.set_why_not(
             why_not_back,
             self.tr("Let the selected images take part again (Insert)"),
         )
@@ -315,9 +313,3 @@ def _ring(x: float, y: float, led: int, fits: bool, takes_part: bool) -> Marker:
     """Return the marker of an LED; one that the fit left out is crossed."""
     tone = (Tone.GOOD if fits else Tone.WARN) if takes_part else Tone.ACTIVE
     return Marker(x, y, RING, str(led), tone, crossed=not fits)
-
-
-def _enable(button: QPushButton, why_not: str, what: str) -> None:
-    button.setEnabled(not why_not)
-    button.setToolTip(why_not or what)
-    button.setAccessibleDescription(why_not or what)

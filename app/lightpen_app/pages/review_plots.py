@@ -11,7 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.report import result_of
 from lightpen.session.solving import Solution
 from lightpen.uncertainty import COVERAGE_FACTOR
-from lightpen_app.quantities import decimals_for, number_text
+from lightpen_app.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plot_card import PlotCard, PlotGrid
@@ -22,10 +22,8 @@ from lightpen_app.widgets.residual_plots import (
     Histogram,
 )
 from lightpen_app.widgets.series_plots import BarPlot, LinePlot, PosturePlot
-from lightpen_app.widgets.tip_readout import AXES
 from lightpen_app.widgets.translated import Translated
 
-MICROMETRES = 1000.0  # in a millimetre
 SETTLED = 1e-5  # mm; later steps of the iteration cannot be told apart on a plot
 
 

@@ -8,15 +8,14 @@ from lightpen.arrays import FloatArray
 from lightpen.session.results import Result
 from lightpen.session.solving import Solution
 from lightpen.session.verdict import Change, change_since, halves_agree
-from lightpen_app.quantities import decimals_for, number_text
+from lightpen_app.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
-from lightpen_app.widgets.tip_readout import AXES, TipReadout, TipValue
+from lightpen_app.widgets.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.translated import Translated
 
-MICROMETRES = 1000.0  # in a millimetre
 BLANK = ("", "", "")
 
 

@@ -105,7 +105,7 @@ class StartPage(Page):
         bench.changed.connect(self._on_bench_changed)
 
         self._show_changes(None, self._shown)
-        self.retranslate()
+        self._retranslate()
 
     @override
     def title(self) -> str:
@@ -166,7 +166,7 @@ class StartPage(Page):
             self._searching.start()  # when the window is on the screen
 
     @override
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         self._tell_subject()
         self.changed.emit()
 

@@ -31,7 +31,7 @@ BREAK = "\u200b"  # where a line may end, though no blank is there
 NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
-class InterruptedRow(QFrame):
+class InterruptedRow(Translated, QFrame):
     """One swing without a verdict.
 
     Parameters
@@ -102,7 +102,7 @@ class InterruptedRow(QFrame):
         if isinstance(swing, DamagedSwing):
             set_tone(self._when, Tone.BAD)
         self.setMinimumHeight(ROW_HEIGHT)
-        self.retranslate()
+        self._retranslate()
 
     def words(self) -> tuple[str, str]:
         """Return what the row says."""
@@ -111,10 +111,9 @@ class InterruptedRow(QFrame):
     def set_waiting(self, why: str) -> None:
         """Disable the buttons for a reason, or enable them for none."""
         for button in (self._resume, self._discard, self._keep, self._confirm):
-            button.setEnabled(not why)
-            button.setToolTip(why)
+            button.set_why_not(why)
 
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         """Set the texts in the language that is chosen."""
         when = self._heading()
         self._when.setText(when)
@@ -164,7 +163,7 @@ class InterruptedRow(QFrame):
     def _ask(self, asks: bool) -> None:
         self._question.setVisible(asks)
         self._offer.setVisible(not asks)
-        self.retranslate()
+        self._retranslate()
 
 
 class InterruptedPanel(Translated, QGroupBox):
@@ -264,8 +263,6 @@ class InterruptedPanel(Translated, QGroupBox):
             self.tr("Resumed, it has all its images and the files it began with.")
         )
         self._again.setText(self.tr("Look again"))
-        for row in self._rows:
-            row.retranslate()
 
 
 def _breakable(sentence: str) -> str:

@@ -16,21 +16,16 @@ from PySide6.QtWidgets import (
 
 from lightpen.session.results import OLD, Result
 from lightpen.session.verdict import Grade
+from lightpen_app.grades import GRADE_MARKS
 from lightpen_app.phrases import grade_text
-from lightpen_app.quantities import decimals_for, number_text
+from lightpen_app.quantities import AXES, decimals_for, number_text
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.words import PARTED, moment_text, shortened
 
-AXES = ("x", "y", "z")
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
-MARKS = {
-    Grade.PASS: (Sign.CHECK, Tone.GOOD),
-    Grade.CHECK: (Sign.WARNING, Tone.WARN),
-    Grade.REPEAT: (Sign.CROSS, Tone.BAD),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +198,7 @@ def _grade_remark(grade: str) -> Remark:
         known = Grade(grade)
     except ValueError:  # of a later version
         return Remark(grade)
-    return Remark(grade_text(known), *MARKS[known])
+    return Remark(grade_text(known), *GRADE_MARKS[known])
 
 
 def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:

@@ -103,7 +103,7 @@ class SwingPage(Page):
         self._showing.timeout.connect(self._show)
         self._plotting.timeout.connect(self._plot)
 
-        self.retranslate()
+        self._retranslate()
 
     @override
     def title(self) -> str:
@@ -190,9 +190,7 @@ class SwingPage(Page):
         self._showing.stop()
 
     @override
-    def retranslate(self) -> None:
-        self._face.retranslate()
-        self._hand.retranslate()
+    def _retranslate(self) -> None:
         self._question.hide()
         self._start_over.setText(self.tr("Start over"))
         self._start_over.setToolTip(

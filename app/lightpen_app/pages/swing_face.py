@@ -25,6 +25,7 @@ from lightpen_app.widgets.leaning_dial import LeaningDial
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 PROGRESS_STEPS = 1000
@@ -33,7 +34,7 @@ PLOTS_HEIGHT = 32 * GRID  # px, there
 ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 
 
-class SwingFace(QWidget):
+class SwingFace(Translated, QWidget):
     """Shows a swing at one moment.
 
     Parameters
@@ -124,7 +125,7 @@ class SwingFace(QWidget):
 
         self._verdict.hide()
         self._use_room(QSize())
-        self.retranslate()
+        self._retranslate()
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -165,9 +166,8 @@ class SwingFace(QWidget):
         """Return the plots."""
         return self._plots
 
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         """Set the texts anew."""
-        self._plots.retranslate()
         self._image.set_message(self.tr("No image yet."))
         self._progress.setAccessibleName(self.tr("Progress"))
 

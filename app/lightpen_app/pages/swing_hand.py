@@ -10,13 +10,14 @@ from lightpen.session.posture import Posture
 from lightpen_app.live_view import LiveView
 from lightpen_app.theme import GRID
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
 
 SLIP_MM, SLIP_S = 0.5, 1.5
 COVER_S = 2.0
 NARROW = 100 * GRID  # px; a panel of less width has its buttons closer together
 
 
-class HandPanel(QFrame):
+class HandPanel(Translated, QFrame):
     """Lets the simulated operator do things; hidden with a real pen.
 
     Parameters
@@ -70,7 +71,7 @@ class HandPanel(QFrame):
         self._cover.clicked.connect(self._on_cover_clicked)
         live.connection_changed.connect(self._on_connection_changed)
 
-        self.retranslate()
+        self._retranslate()
         self._on_connection_changed()
 
     @override
@@ -89,7 +90,7 @@ class HandPanel(QFrame):
         """Return whether the operator does what the swing asks for."""
         return self._follow.isChecked()
 
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         """Set the texts anew."""
         self.setAccessibleName(self.tr("Simulated pen"))
         for button, text, tip in (

@@ -13,6 +13,7 @@ from lightpen.session.progress import Shortfall, turn_range
 from lightpen.session.swing import COUNTDOWN
 from lightpen.session.swing_state import Pause, Phase, SwingSetup, SwingState
 from lightpen.session.verdict import Grade, Verdict
+from lightpen_app.grades import GRADE_MARKS
 from lightpen_app.phrases import Phrase, grade_text, lean_phrase, phase_text, phrase
 from lightpen_app.theme import Tone
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -33,11 +34,6 @@ _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
     Phase.PAUSED: (Sign.PAUSE, Tone.WARN),
     Phase.SOLVING: (Sign.WAIT, Tone.ACTIVE),
     Phase.VERDICT: (Sign.CROSS, Tone.BAD),
-}
-_GRADES: dict[Grade, tuple[Sign, Tone]] = {
-    Grade.PASS: (Sign.CHECK, Tone.GOOD),
-    Grade.CHECK: (Sign.WARNING, Tone.WARN),
-    Grade.REPEAT: (Sign.CROSS, Tone.BAD),
 }
 
 
@@ -204,7 +200,7 @@ class SwingWords(QObject):
             )
         told = phrase(moment.verdict.reason, moment.state.heading)
         grade = moment.verdict.grade
-        sign, tone = _GRADES[grade]
+        sign, tone = GRADE_MARKS[grade]
         word = grade_text(grade)
         return State(word, told.hint, sign, tone, moment.stillness or None)
 

@@ -6,15 +6,16 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from lightpen.arrays import FloatArray
 from lightpen.session.seat import tip_offsets
 from lightpen.session.swing_state import SwingState
+from lightpen_app.quantities import MICROMETRES
 from lightpen_app.theme import GRID
 from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+from lightpen_app.widgets.translated import Translated
 
-UM = 1000.0  # um per mm; what is told apart here is smaller than a millimetre
 TAIL = 0.75  # of the estimates; the first ones are far off
 LEAST_HEIGHT = 10 * GRID
 
 
-class SwingPlots(QWidget):
+class SwingPlots(Translated, QWidget):
     """Misfit and tip of each image, the estimate of the tip, and its uncertainty."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -45,7 +46,7 @@ class SwingPlots(QWidget):
         for plot in self.plots():
             plot.setMinimumHeight(LEAST_HEIGHT)
 
-        self.retranslate()
+        self._retranslate()
 
     def plots(self) -> tuple[TracePlot, ...]:
         """Return the plots: misfit, scatter, estimate and uncertainty."""
@@ -59,16 +60,16 @@ class SwingPlots(QWidget):
         offsets: FloatArray = np.zeros((len(kept), 3))
         if kept.seat is not None:
             offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
-        self._scatter.set_data(numbers, *(UM * offsets.T))
+        self._scatter.set_data(numbers, *(MICROMETRES * offsets.T))
         counts = trace.n_images.astype(np.float64)
         changes = trace.tips - trace.tips[-1:]
-        self._estimate.set_data(counts, *(UM * changes.T))
-        limit = UM * max_uncertainty
+        self._estimate.set_data(counts, *(MICROMETRES * changes.T))
+        limit = MICROMETRES * max_uncertainty
         self._uncertainty.set_limit(limit, self.tr("limit {0}").format(f"{limit:g}"))
         finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
-        self._uncertainty.set_data(counts, UM * finite)
+        self._uncertainty.set_data(counts, MICROMETRES * finite)
 
-    def retranslate(self) -> None:
+    def _retranslate(self) -> None:
         """Set the titles anew."""
         self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))

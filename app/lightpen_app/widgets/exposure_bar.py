@@ -1,6 +1,6 @@
 """How brightly the LEDs are exposed: too dark, good, or saturated."""
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -9,18 +9,19 @@ from lightpen.inspection import DARK_PEAK, Exposure
 from lightpen.spots import SATURATED_LEVEL
 from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_sign
+from lightpen_app.widgets.translated import Translated
 
 BAR_HEIGHT = 2 * GRID
 
 
-class ExposureBar(QWidget):
+class ExposureBar(Translated, QWidget):
     """A scale with one tick per LED, and the verdict in words."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = Exposure()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._describe()
+        self._retranslate()
 
     def value(self) -> Exposure:
         """Return what is shown."""
@@ -29,8 +30,7 @@ class ExposureBar(QWidget):
     def set_value(self, value: Exposure) -> None:
         """Show another image's LEDs."""
         self._value = value
-        self._describe()
-        self.update()
+        self._retranslate()
 
     def verdict(self) -> str:
         """Return what the bar says, in words."""
@@ -66,13 +66,6 @@ class ExposureBar(QWidget):
         return QSize(160, 9 * GRID)
 
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self.update()
-
-    @override
     def paintEvent(self, event: QPaintEvent) -> None:
         value = self._value
         colors = colors_of(self.palette())
@@ -101,7 +94,9 @@ class ExposureBar(QWidget):
             painter.drawLine(QPointF(x, bar.top() - 3), QPointF(x, bar.bottom() + 3))
         self._draw_scale(painter, bar, QColor(colors.muted))
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
+        self.update()
         self.setAccessibleName(self.tr("Exposure of the LEDs"))
         self.setAccessibleDescription(self.verdict())
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -19,20 +19,21 @@ from lightpen_app.theme import (
     font,
 )
 from lightpen_app.widgets.signs import Sign, draw_sign
+from lightpen_app.widgets.translated import Translated
 
 LEAST_TRACE = 5 * GRID  # px of width; less shows nothing
 N_TRACED = 120  # images: six seconds
 LEAST_TOP = 1.5 * SHARP_EDGE  # px, of the trace
 
 
-class FocusMeter(QWidget):
+class FocusMeter(Translated, QWidget):
     """The width of the rims, px: the smaller, the sharper."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value: tuple[float, ...] = ()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self._describe()
+        self._retranslate()
 
     def value(self) -> tuple[float, ...]:
         """Return the widths shown, px, the present one last."""
@@ -41,8 +42,7 @@ class FocusMeter(QWidget):
     def set_value(self, value: Sequence[float]) -> None:
         """Show other widths, px, the present one last; NaN where no LED was seen."""
         self._value = tuple(value)[-N_TRACED:]
-        self._describe()
-        self.update()
+        self._retranslate()
 
     def verdict(self) -> str:
         """Return what is shown, in words."""
@@ -63,13 +63,6 @@ class FocusMeter(QWidget):
     @override
     def minimumSizeHint(self) -> QSize:
         return QSize(160, 9 * GRID)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self.update()
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -138,6 +131,8 @@ class FocusMeter(QWidget):
             line = [QPointF(x[i], y[i]) for i in kept]
             painter.drawPolyline(QPolygonF(line))
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
+        self.update()
         self.setAccessibleName(self.tr("Width of the LEDs' rims"))
         self.setAccessibleDescription(f"{self.verdict()} {self.number()}".strip())

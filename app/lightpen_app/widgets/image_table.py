@@ -5,7 +5,6 @@ from typing import Any
 
 from PySide6.QtCore import (
     QAbstractTableModel,
-    QEvent,
     QItemSelection,
     QItemSelectionModel,
     QModelIndex,
@@ -20,6 +19,7 @@ from lightpen.session.review import ImageRow
 from lightpen_app.phrases import reason_text
 from lightpen_app.quantities import decimals_for, number_text
 from lightpen_app.theme import GRID
+from lightpen_app.widgets.translated import Translated
 
 Index = QModelIndex | QPersistentModelIndex
 NUMBER, MISFIT, LEDS, STATE = range(4)
@@ -99,7 +99,7 @@ class ImageModel(QAbstractTableModel):
         return number_text(row.misfit, self._decimals) if known else ""
 
 
-class ImageTable(QTableView):
+class ImageTable(Translated, QTableView):
     """Shows the images; the current one and the selected ones are kept over changes.
 
     Signals
@@ -137,7 +137,7 @@ class ImageTable(QTableView):
         chosen.currentRowChanged.connect(self._on_current_row_changed)
         chosen.selectionChanged.connect(self.selection_changed)
 
-        self._describe()
+        self._retranslate()
 
     def value(self) -> tuple[ImageRow, ...]:
         """Return the images in their order."""
@@ -192,14 +192,9 @@ class ImageTable(QTableView):
                 return
 
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self.viewport().update()
-            self.horizontalHeader().viewport().update()
-
-    def _describe(self) -> None:
+    def _retranslate(self) -> None:
+        self.viewport().update()
+        self.horizontalHeader().viewport().update()
         self.setAccessibleName(self.tr("Images, the worst first"))
 
     def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:

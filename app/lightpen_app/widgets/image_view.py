@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -21,6 +21,7 @@ from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen_app.theme import DARK, GRID, TextSize, Tone, font
+from lightpen_app.widgets.translated import Translated
 
 MAX_ZOOM = 16.0
 ZOOM_STEP = 1.25
@@ -80,7 +81,7 @@ def pooled(image: Image, bits: int = 8) -> Image:
     return (half >> max(bits - 8, 0)).astype(np.uint8)
 
 
-class ImageView(QWidget):
+class ImageView(Translated, QWidget):
     """Shows the newest image whole, or enlarged about a place.
 
     The wheel, or + and -, enlarge; the mouse, or the arrow keys, move; 0 shows all.
@@ -108,7 +109,7 @@ class ImageView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
-        self._describe()
+        self._retranslate()
 
     def set_half(
         self, half: Image, size: QSize, markers: Sequence[Marker] = ()
@@ -138,7 +139,7 @@ class ImageView(QWidget):
     def set_message(self, text: str) -> None:
         """Say why there is no image; shown in its place."""
         self._message = text
-        self._describe()
+        self._retranslate()
         self.update()
 
     def image_size(self) -> QSize:
@@ -175,12 +176,6 @@ class ImageView(QWidget):
     @override
     def minimumSizeHint(self) -> QSize:
         return QSize(160, 128)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -286,7 +281,8 @@ class ImageView(QWidget):
         if QRectF(-0.5, -0.5, self._size.width(), self._size.height()).contains(pixel):
             self.pixel_clicked.emit(pixel.x(), pixel.y())
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("Live image"))
         self.setAccessibleDescription(self._message if self._shown.isNull() else "")
 
@@ -304,7 +300,7 @@ class ImageView(QWidget):
             grey = QImage.Format.Format_Grayscale8
             self._shown = QImage(half.data, width, height, half.strides[0], grey)
         if was_empty is not (half is None):
-            self._describe()
+            self._retranslate()
         self.update()
 
     def _target(self) -> tuple[QRectF, float]:

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
@@ -64,7 +64,7 @@ class LeaningDial(PostureDial):
         self._is_interactive = interactive
         policy = Qt.FocusPolicy.StrongFocus if interactive else Qt.FocusPolicy.NoFocus
         self.setFocusPolicy(policy)
-        self._explain()
+        self._retranslate()
 
     def forget_wish(self) -> None:
         """Begin from where the pen is seen, as after somebody else has led it."""
@@ -143,12 +143,8 @@ class LeaningDial(PostureDial):
         self.update()
 
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._explain()
-
-    def _explain(self) -> None:
+    def _retranslate(self) -> None:
+        super()._retranslate()
         self.setToolTip(
             self.tr(
                 "Drag to lean the simulated pen, or use the arrow keys. The wheel, or "

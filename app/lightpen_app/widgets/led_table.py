@@ -5,7 +5,6 @@ from typing import TypeAlias
 
 from PySide6.QtCore import (
     QAbstractTableModel,
-    QEvent,
     QItemSelectionModel,
     QModelIndex,
     QPersistentModelIndex,
@@ -28,8 +27,9 @@ from typing_extensions import override
 from lightpen.pen_check.draft import COLUMNS, CellFlaw, PenDraft
 from lightpen_app.quantities import number_text
 from lightpen_app.theme import GRID, Tone, colors_of
-from lightpen_app.widgets.path_field import ENTER_KEYS
+from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.signs import Sign, draw_sign
+from lightpen_app.widgets.translated import Translated
 
 Index: TypeAlias = QModelIndex | QPersistentModelIndex
 
@@ -45,7 +45,7 @@ SIGN_ROLE = Qt.ItemDataRole.UserRole
 ANYWHERE = QModelIndex()
 
 
-class LedTable(QTableView):
+class LedTable(Translated, QTableView):
     """Shows a draft; cells without a number, and LEDs that do not fit, are marked.
 
     Signals
@@ -94,7 +94,7 @@ class LedTable(QTableView):
         self.selectionModel().currentChanged.connect(self._on_current_changed)
 
         self.show_normals(False)
-        self._describe()
+        self._retranslate()
 
     def value(self) -> PenDraft:
         """Return what is shown."""
@@ -148,20 +148,15 @@ class LedTable(QTableView):
         else:
             super().keyPressEvent(event)
 
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self._model.retranslate()
-
     def _on_current_changed(self, current: Index, previous: Index) -> None:
         led = current.row() + 1 if current.isValid() else 0
         before = previous.row() + 1 if previous.isValid() else 0
         if led != before:
             self.led_chosen.emit(led)
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
+        self._model.retranslate()
         self.setAccessibleName(self.tr("LEDs of the pen, in mm"))
 
 

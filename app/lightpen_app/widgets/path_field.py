@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen_app.theme import GRID, Tone, set_tone
+from lightpen_app.widgets.keys import ENTER_KEYS
 
 QUOTES = "\"'"
-ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class EnterEdit(QLineEdit):

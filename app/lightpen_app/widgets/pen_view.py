@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QKeyEvent,
@@ -20,6 +20,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.pen import MAX_COORDINATE, Pen
 from lightpen_app.theme import GRID, Colors, TextSize, Tone, colors_of, font
+from lightpen_app.widgets.translated import Translated
 
 START_YAW, START_PITCH = math.radians(-20), math.radians(16)
 MAX_PITCH = math.radians(88)
@@ -80,7 +81,7 @@ class _Sight:
         ]
 
 
-class PenView(QWidget):
+class PenView(Translated, QWidget):
     """Draws a pen; the mouse or the arrow keys turn it, 0 puts it back.
 
     Signals
@@ -101,7 +102,7 @@ class PenView(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         policy = QSizePolicy.Policy.Expanding
         self.setSizePolicy(policy, policy)
-        self._describe()
+        self._retranslate()
 
     def value(self) -> PenPicture:
         """Return what is shown."""
@@ -116,8 +117,7 @@ class PenView(QWidget):
         if pen is not None and np.abs(pen.leds).max(initial=0.0) > MAX_COORDINATE:
             value = PenPicture()
         self._value = value
-        self._describe()
-        self.update()
+        self._retranslate()
 
     def chosen(self) -> int:
         """Return the number of the LED that is picked out, 0 for none."""
@@ -147,13 +147,6 @@ class PenView(QWidget):
     @override
     def minimumSizeHint(self) -> QSize:
         return QSize(22 * GRID, 22 * GRID)
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self.update()
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -350,7 +343,9 @@ class PenView(QWidget):
         self._pitch = min(max(self._pitch + pitch, -MAX_PITCH), MAX_PITCH)
         self.update()
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
+        self.update()
         self.setAccessibleName(self.tr("The LEDs in space"))
         pen = self._value.pen
         n_leds = 0 if pen is None else pen.n_leds

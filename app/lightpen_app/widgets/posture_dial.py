@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QColor,
     QPainter,
@@ -23,6 +23,7 @@ from lightpen.session.posture import Posture
 from lightpen_app.theme import Colors, TextSize, colors_of, font
 from lightpen_app.widgets.camera_mark import Stand, draw_camera
 from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
+from lightpen_app.widgets.translated import Translated
 
 MAX_TILT = math.radians(36)  # drawn at the rim
 TILTS = (0.0, *TILT_RINGS, MAX_TILT)
@@ -113,7 +114,7 @@ def posture_at(place: tuple[float, float], turn: float, heading: float) -> Postu
     return Posture(tilt, direction, turn)
 
 
-class PostureDial(QWidget):
+class PostureDial(Translated, QWidget):
     """Two rings of eight directions, a middle, and a bar for the turn."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -132,7 +133,6 @@ class PostureDial(QWidget):
         """Show other postures."""
         self._value = value
         self._describe()
-        self.update()
 
     @override
     def sizeHint(self) -> QSize:
@@ -146,19 +146,17 @@ class PostureDial(QWidget):
     def heightForWidth(self, width: int) -> int:
         return round(width + _bar_height(width))
 
+    @override
+    def _retranslate(self) -> None:
+        self._describe()
+
     def _describe(self) -> None:
+        self.update()
         self.setAccessibleName(self.tr("Postures"))
         text = self.tr("{0} of {1} postures are done.")
         self.setAccessibleDescription(
             text.format(self._value.n_full, self._value.n_fields)
         )
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-            self.update()
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:

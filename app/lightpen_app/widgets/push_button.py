@@ -27,6 +27,12 @@ class PushButton(QPushButton):
         super().__init__(parent)
         self._least_width = least_width
 
+    def set_why_not(self, why_not: str, told: str = "") -> None:
+        """Disable it and say why not, or enable it and tell what it does."""
+        self.setEnabled(not why_not)
+        self.setToolTip(why_not or told)
+        self.setAccessibleDescription(why_not or told)
+
     @override
     def sizeHint(self) -> QSize:
         return super().sizeHint().expandedTo(QSize(self._least_width, 0))

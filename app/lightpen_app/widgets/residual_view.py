@@ -84,6 +84,6 @@ class ResidualView(ImageView):
         painter.drawLines(lines)
 
     @override
-    def _describe(self) -> None:
-        super()._describe()
+    def _retranslate(self) -> None:
+        super()._retranslate()
         self.setAccessibleName(self.tr("Recorded image"))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QAbstractButton, QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -10,6 +10,7 @@ from typing_extensions import override
 from lightpen_app.steps import Step, StepState
 from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.signs import Sign, draw_sign
+from lightpen_app.widgets.translated import Translated
 
 SIGN_SIZE = 2 * GRID
 SIGN_LEFT, NARROW_SIGN_LEFT = 5 * GRID // 2, 3 * GRID // 2
@@ -23,7 +24,7 @@ MARKS = {
 }
 
 
-class StepButton(QAbstractButton):
+class StepButton(Translated, QAbstractButton):
     """One step: its sign, its name, and why it is closed."""
 
     def __init__(self, step: Step, parent: QWidget | None = None) -> None:
@@ -35,7 +36,7 @@ class StepButton(QAbstractButton):
         self.setSizePolicy(policy)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
-        self._describe()
+        self._retranslate()
 
     def value(self) -> Step:
         """Return the step shown."""
@@ -45,7 +46,7 @@ class StepButton(QAbstractButton):
         """Show another state of the step."""
         if step != self._step:
             self._step = step
-            self._describe()
+            self._retranslate()
             self.updateGeometry()
             self.update()
 
@@ -66,12 +67,6 @@ class StepButton(QAbstractButton):
         if self._step.why_closed:
             height += round(self._reason_height(width)) + GRID
         return height
-
-    @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -124,7 +119,8 @@ class StepButton(QAbstractButton):
         room = QRectF(0, 0, self._reason_width(width), 1e4)
         return metrics.boundingRect(room, WRAPPED, self._step.why_closed).height()
 
-    def _describe(self) -> None:
+    @override
+    def _retranslate(self) -> None:
         words = {
             StepState.DONE: self.tr("done"),
             StepState.NOW: self.tr("now"),
@@ -135,7 +131,7 @@ class StepButton(QAbstractButton):
         self.setAccessibleDescription(self._step.why_closed)
 
 
-class StepList(QWidget):
+class StepList(Translated, QWidget):
     """All steps; a click, Space or Enter asks for one.
 
     Signals
@@ -153,7 +149,7 @@ class StepList(QWidget):
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(GRID // 2)
-        self._describe()
+        self._retranslate()
 
     def steps(self) -> tuple[Step, ...]:
         """Return the steps shown."""
@@ -181,10 +177,5 @@ class StepList(QWidget):
             button.deleteLater()
 
     @override
-    def changeEvent(self, event: QEvent) -> None:
-        super().changeEvent(event)
-        if event.type() == QEvent.Type.LanguageChange:
-            self._describe()
-
-    def _describe(self) -> None:
+    def _retranslate(self) -> None:
         self.setAccessibleName(self.tr("Steps"))

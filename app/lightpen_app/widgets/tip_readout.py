@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from lightpen_app.quantities import decimals_for, number_text
+from lightpen_app.quantities import AXES, decimals_for, number_text
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
