@@ -48,9 +48,9 @@ from lightpen.simulator.swings import simulate_centers
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.languages import Language
 from lightpen_app.live_view import Shown
+from lightpen_app.pooling import pooled
 from lightpen_app.settings import Preferences, Settings
 from lightpen_app.theme import GRID, Appearance
-from lightpen_app.widgets.image_view import pooled
 from lightpen_app.wizard_pages import make_pages
 
 FOLDER = Path(__file__).resolve().parent / "screens"

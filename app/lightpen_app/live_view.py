@@ -28,7 +28,7 @@ from lightpen.session.live import Aim, Live, LiveImage, Swinging
 from lightpen.session.swing import Fed, finish, pause, resume
 from lightpen.session.swing_state import Event, Phase, SwingState
 from lightpen_app.mailbox import Mailbox
-from lightpen_app.widgets.image_view import pooled
+from lightpen_app.pooling import pooled
 
 CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
 
@@ -40,7 +40,7 @@ class Shown:
     Attributes
     ----------
     half : (H // 2, W // 2) array of uint8
-        The image at half its size, see `lightpen_app.widgets.image_view.pooled`.
+        The image at half its size, see `lightpen_app.pooling.pooled`.
     size : QSize
         Of the whole image, px.
     seen : LiveImage

@@ -8,14 +8,9 @@ from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
-    QBoxLayout,
-    QFrame,
     QGridLayout,
     QMainWindow,
     QMessageBox,
-    QSizePolicy,
-    QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
@@ -28,17 +23,15 @@ from lightpen_app.steps import Status, Step, list_steps
 from lightpen_app.theme import (
     GRID,
     RESOURCES,
-    TextSize,
     Tone,
-    text_label,
 )
 from lightpen_app.widgets.about import About
 from lightpen_app.widgets.action_bar import ActionBar
 from lightpen_app.widgets.help_window import HelpWindow
 from lightpen_app.widgets.keys import ENTER_KEYS
-from lightpen_app.widgets.notice_bar import NoticeBar
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.options_menu import OptionsMenu
+from lightpen_app.widgets.page_area import PageArea
 from lightpen_app.widgets.room import Room
 from lightpen_app.widgets.sidebar import Sidebar
 
@@ -93,15 +86,8 @@ class MainWindow(QMainWindow):
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
-        self._notice = NoticeBar()
-        self._title = text_label(TextSize.TITLE)
-        self._title.setWordWrap(False)
-        self._lead = text_label(TextSize.BODY, Tone.QUIET)
-        self._stack = QStackedWidget()
-        self._stack.setMinimumSize(1, 1)  # the pages ask for none: they scroll
-        for page in self._pages:
-            self._stack.addWidget(page)
-        self._show_page()
+        self._area = PageArea(self._pages)
+        self._notice = self._area.notice()
         self._action_bar = ActionBar()
         self._operator_view = OperatorView()
         self._operator_view.set_distance_m(preferences.distance_m)
@@ -154,7 +140,7 @@ class MainWindow(QMainWindow):
         self._action_bar.set_status("")
         if self._notice_is_of_page:
             self._notice.clear()
-        self._show_page()
+        self._area.show_page(self.page())
         self.page().entered()
         self._refresh()
         self._focus_page()
@@ -201,9 +187,7 @@ class MainWindow(QMainWindow):
         """Return what the window itself says now, besides the page."""
         said = (
             self._sidebar.subject(),
-            self._notice.text(),
-            self._title.text(),
-            self._lead.text(),
+            *self._area.words(),
             *self._action_bar.words(),
         )
         return tuple(filter(None, said))
@@ -310,52 +294,21 @@ class MainWindow(QMainWindow):
 
     def _arranged(self) -> QWidget:
         """Return all widgets in their places."""
-        area = QFrame()
-        area.setObjectName("page_area")
-        self._page_layout = page = QVBoxLayout(area)
-        page.setSpacing(GRID)
-        page.addWidget(self._notice)
-        page.addSpacing(GRID)
-        self._heading = QBoxLayout(QBoxLayout.Direction.TopToBottom)
-        self._heading.setSpacing(GRID)
-        self._heading.addWidget(self._title)
-        self._heading.addWidget(self._lead, 1)
-        page.addLayout(self._heading)
-        page.addSpacing(GRID)
-        page.addWidget(self._stack, 1)
-
         central = QWidget()
         layout = QGridLayout(central)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
         layout.addWidget(self._sidebar, 0, 0, 2, 1)
-        layout.addWidget(area, 0, 1)
+        layout.addWidget(self._area, 0, 1)
         layout.addWidget(self._action_bar, 1, 1)
         layout.setRowStretch(0, 1)
         return central
 
     def _use_room(self) -> None:
         """Arrange what is about the page as the size of the window allows."""
-        room = self._room
-        side = room.margin
-        if room.is_low:
-            self._page_layout.setContentsMargins(side, 0, side, GRID)
-            self._heading.setDirection(QBoxLayout.Direction.LeftToRight)
-            self._heading.setSpacing(3 * GRID)
-        else:
-            self._page_layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
-            self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
-            self._heading.setSpacing(GRID)
-        self._sidebar.set_room(room)
-        self._action_bar.set_room(room)
-
-    def _show_page(self) -> None:
-        """Show the present page; only that one may ask for room."""
-        for page in self._pages:
-            shown = page is self.page()
-            wish = QSizePolicy.Policy.Preferred if shown else QSizePolicy.Policy.Ignored
-            page.setSizePolicy(wish, wish)
-        self._stack.setCurrentWidget(self.page())
+        self._area.set_room(self._room)
+        self._sidebar.set_room(self._room)
+        self._action_bar.set_room(self._room)
 
     def _refresh(self) -> None:
         """Show what the pages say of themselves now."""
@@ -365,9 +318,7 @@ class MainWindow(QMainWindow):
             for each in self._pages
         ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
-        self._title.setText(page.title())
-        self._lead.setText(page.lead())
-        self._lead.setVisible(bool(page.lead()))
+        self._area.set_heading(page.title(), page.lead())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())

@@ -7,8 +7,9 @@ from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.mailbox import Mailbox
+from lightpen_app.pooling import pooled
 from lightpen_app.theme import DARK, Tone
-from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker, pooled
+from lightpen_app.widgets.image_view import MAX_ZOOM, ImageView, Marker
 
 WIDTH, HEIGHT = 2448, 2048
 

@@ -15,9 +15,10 @@ from lightpen.session.review import ImageRow, count_left_out, worst_first
 from lightpen.session.solving import Solution, load_image
 from lightpen_app.job import Job, Report
 from lightpen_app.phrases import reason_text
+from lightpen_app.pooling import pooled
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.image_table import ImageTable
-from lightpen_app.widgets.image_view import Marker, pooled
+from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.plot_card import PlotCard
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton

@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from PySide6.QtCore import QPoint, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -20,6 +19,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import Image
+from lightpen_app.pooling import pooled
 from lightpen_app.theme import DARK, GRID, TextSize, Tone, font
 from lightpen_app.widgets.translated import Translated
 
@@ -56,29 +56,6 @@ class Marker:
     tone: Tone = Tone.GOOD
     label_angle: float = -math.pi / 4
     crossed: bool = False
-
-
-def pooled(image: Image, bits: int = 8) -> Image:
-    """Return an image of half the size, each pixel the brightest of four.
-
-    A small LED stays as bright as it was, which averaging would not leave it.
-
-    Parameters
-    ----------
-    image : (H, W) array of uint8 or uint16
-    bits : int
-        Bits in use; more than 8 are shifted down.
-
-    Returns
-    -------
-    (H // 2, W // 2) array of uint8
-    """
-    height, width = (size // 2 * 2 for size in image.shape)
-    rows = np.maximum(image[0:height:2], image[1:height:2])
-    half = np.maximum(rows[:, 0:width:2], rows[:, 1:width:2])
-    if half.dtype == np.uint8:
-        return half
-    return (half >> max(bits - 8, 0)).astype(np.uint8)
 
 
 class ImageView(Translated, QWidget):

@@ -340,16 +340,18 @@ class Live:
             self._become(swinging, Fed(pause(before)))
             self._listener.on_trouble(error)
             return
-        if fed.state.phase is Phase.CAPTURING and self._is_played_out(fed):
-            ended = finish(fed.state)
-            fed = Fed(ended.state, (*fed.events, *ended.events))
+        if fed.state.phase is Phase.CAPTURING:
+            is_kept = any(event.what is Happening.KEPT for event in fed.events)
+            self._n_since_kept = 0 if is_kept else self._n_since_kept + 1
+            if self._is_played_out:
+                ended = finish(fed.state)
+                fed = Fed(ended.state, (*fed.events, *ended.events))
         self._become(swinging, fed)
 
-    def _is_played_out(self, fed: Fed) -> bool:
-        """Return whether a recording was played from end to end in vain."""
+    @property
+    def _is_played_out(self) -> bool:
+        """Whether a recording was played from end to end in vain."""
         n_images = self._worker.caps.n_images if self._worker.caps else None
-        kept = any(event.what is Happening.KEPT for event in fed.events)
-        self._n_since_kept = 0 if kept else self._n_since_kept + 1
         return n_images is not None and self._n_since_kept >= n_images
 
     def _take_aim(self, aim: Aim) -> None:
