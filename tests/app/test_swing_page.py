@@ -423,6 +423,20 @@ def test_computing_can_be_stopped_and_begun_again(
     until_verdict(qtbot, desk)
 
 
+def test_a_swing_that_begins_behind_another_step_waits_for_its_own(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.let_operator_swing()
+    desk.click("Capture more")
+    desk.window.go_to(0)
+    until(qtbot, lambda: desk.run.is_capturing)
+    until(qtbot, lambda: desk.state.pause is Pause.BY_USER)
+
+    desk.window.go_to(1)
+    keep_on(qtbot, desk)
+
+
 # A long swing, disturbed
 
 

@@ -148,6 +148,9 @@ class SwingFlow(QObject):
             self._known_swing = folder
             self._begun_with = self._bench.preparation
             self._paused_by_leaving = self._pause_is_wished = False
+        if self._run.is_capturing and not (self._is_shown or self._pause_is_wished):
+            self._paused_by_leaving = True
+            self._pause()
         if self._is_troubled and not self._is_paused:
             self._is_troubled = False
             self.changed.emit()
