@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.session.interrupted import found_interrupted
+from lightpen.session.interrupted import find_unfinished
 from lightpen.session.record import Record, open_record
 from lightpen.session.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
@@ -66,7 +66,7 @@ def killed_rows() -> list[Row]:
         return [Row(f"{what}images that survived", "needs SIGKILL")]
     with tempfile.TemporaryDirectory(prefix="lightpen-killed-") as folder:
         tally = _killed_again_and_again(Path(folder))
-        (record,) = found_interrupted(Path(folder) / "records")
+        (record,) = find_unfinished(Path(folder) / "records").interrupted
         n_left = len(tally.acknowledged & _on_disk(record))
         calibration = solve_record(record).calibration
     n_kept = len(tally.acknowledged)
@@ -102,10 +102,10 @@ def _killed_again_and_again(folder: Path) -> Tally:
     rng = np.random.default_rng(SEED)
     tally = Tally()
     for n_images in rng.integers(1, MOST_IMAGES + 1, N_KILLS).tolist():
-        before = found_interrupted(folder / "records")
+        before = find_unfinished(folder / "records").interrupted
         kept, resumed = _killed_once(folder, n_images, rng.uniform(0, SOON))
         tally.acknowledged |= kept
-        found = found_interrupted(folder / "records")
+        found = find_unfinished(folder / "records").interrupted
         tally.n_opened += len(found) == 1 and kept <= _on_disk(found[0])
         tally.n_resumed += bool(before) and resumed == len(before[0].images)
     return tally

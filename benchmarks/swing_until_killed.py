@@ -16,7 +16,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.preparation import Names
 from lightpen.session.swing_state import Event, Happening, SwingLimits
 from lightpen_app.bench import Bench
@@ -45,7 +45,7 @@ def main() -> int:
     if operator is not None:
         operator.seat()
     bench.live.set_following(True)
-    offered = found_interrupted(run.records_folder)
+    offered = find_unfinished(run.records_folder).interrupted
     if offered:
         record = offered[0]
         run.go_on(read_resumable(record.folder))

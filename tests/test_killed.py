@@ -14,7 +14,7 @@ from time import sleep
 import numpy as np
 import pytest
 
-from lightpen.session.interrupted import found_interrupted
+from lightpen.session.interrupted import find_unfinished
 from lightpen.session.record import Record, is_record, open_record
 from lightpen.session.solving import solve_record
 from lightpen.simulator.swings import PAPER_TIP
@@ -34,7 +34,7 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.cameras.hand import Operator
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.preparation import Names
 from lightpen.session.sources import Surroundings
 from lightpen.session.swing_state import Happening, SwingLimits
@@ -80,7 +80,7 @@ def swing(folder):
     camera = SimulatedCamera(around.scene, clock, Operator(clock, seated=True))
     bench.live.open(camera, CameraSettings(), clock)
     bench.live.set_following(True)
-    offered = found_interrupted(run.records_folder)
+    offered = find_unfinished(run.records_folder).interrupted
     if offered:
         run.go_on(read_resumable(offered[0].folder))
         tell("resumed", offered[0].folder.name, run.state.n_kept)
@@ -176,7 +176,7 @@ def test_killed_at_any_moment_the_swing_keeps_what_it_acknowledged_and_goes_on(
     n_resumed = 0
     with program(tmp_path) as victim:
         for i in range(N_KILLS):
-            offered = found_interrupted(records)
+            offered = find_unfinished(records).interrupted
             if i % 3 == 2:
                 life = victim.live(0, rng.uniform(0, STARTING))
             else:
@@ -193,7 +193,7 @@ def test_killed_at_any_moment_the_swing_keeps_what_it_acknowledged_and_goes_on(
             }
             assert acknowledged <= on_disk
 
-    (record,) = found_interrupted(records)
+    (record,) = find_unfinished(records).interrupted
     assert len(acknowledged) >= FEWEST
     assert n_resumed >= N_KILLS / 2
     calibration = solve_record(record).calibration

@@ -266,7 +266,7 @@ class MainWindow(QMainWindow):
         self._operator_action = QAction(self, checkable=True)
         self._operator_action.setShortcut(Qt.Key.Key_F11)
         self._operator_action.toggled.connect(self._on_operator_toggled)
-        self._options_action = self._action(Qt.Key.Key_F10, self._show_options)
+        self._action(Qt.Key.Key_F10, self._show_options)
         # A presenter's remote sends the page keys.
         self._hands_free_actions = (
             self._action(Qt.Key.Key_Space, self._on_pause_pressed),

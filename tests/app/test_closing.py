@@ -18,7 +18,7 @@ from typing_extensions import override
 from lightpen.cameras.hand import Operator
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.record import Record, open_record
 from lightpen.session.recording import RecordWriter
 from lightpen.session.solving import Solution, solve_record
@@ -119,7 +119,7 @@ def closing_time(bench: Bench) -> float:
 
 def assert_whole(folder: Path, n_images: int) -> None:
     """Assert that an interrupted swing has all its images and can be gone on with."""
-    (record,) = found_interrupted(folder.parent)
+    (record,) = find_unfinished(folder.parent).interrupted
     assert record.folder == folder
     assert len(record.images) >= n_images
     assert read_resumable(folder).state.n_kept == len(record.used_images)

@@ -17,7 +17,7 @@ from lightpen.cameras.hand import Operator
 from lightpen.cameras.protocol import Settings as CameraSettings
 from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.cameras.worker import Connection
-from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.posture import Posture
 from lightpen.session.preparation import Names, SourceChoice, SourceKind
 from lightpen.session.record import DISCARDED, Record, open_record
@@ -178,7 +178,7 @@ def asked(desk: Desk) -> str:
 
 
 def interrupted(desk: Desk) -> tuple[Record, ...]:
-    return found_interrupted(desk.run.records_folder)
+    return find_unfinished(desk.run.records_folder).interrupted
 
 
 def until(qtbot: QtBot, happened: Callable[[], bool]) -> None:

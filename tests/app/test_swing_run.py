@@ -18,7 +18,7 @@ from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import write_pen
 from lightpen.report import calibration_json
-from lightpen.session.interrupted import found_interrupted, read_resumable
+from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.messages import Code
 from lightpen.session.preparation import Names, SourceChoice, SourceKind
 from lightpen.session.record import HEADER, IMAGES, JOURNAL, open_record
@@ -366,7 +366,9 @@ def test_another_source_leaves_the_swing_to_be_resumed(
     stage.bench.set_preparation(replace(stage.bench.preparation, source=source))
 
     assert stage.run.state is None
-    assert found_interrupted(stage.run.records_folder)[0].folder == interrupted
+    assert (
+        find_unfinished(stage.run.records_folder).interrupted[0].folder == interrupted
+    )
 
 
 # An interrupted swing
@@ -586,13 +588,13 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
 
 
 def test_an_accepted_swing_is_concluded_and_no_longer_offered(solved: Stage) -> None:
-    assert len(found_interrupted(solved.run.records_folder)) == 1
+    assert len(find_unfinished(solved.run.records_folder).interrupted) == 1
     result = solved.run.accept()
 
     assert solved.run.result is result
     assert open_record(solved.folder()).verdict == result.grade
     assert result.record == str(solved.folder())
-    assert found_interrupted(solved.run.records_folder) == ()
+    assert find_unfinished(solved.run.records_folder).interrupted == ()
 
 
 def test_a_tip_that_is_to_be_repeated_is_not_accepted(
@@ -678,7 +680,7 @@ def test_a_solved_swing_is_set_aside_with_its_images(solved: Stage) -> None:
     assert solved.run.state is None
     assert open_record(folder).verdict == "discarded"
     assert len(open_record(folder).images) == N_IMAGES
-    assert found_interrupted(solved.run.records_folder) == ()
+    assert find_unfinished(solved.run.records_folder).interrupted == ()
 
 
 def test_a_swing_that_is_captured_is_set_aside_for_good(
@@ -744,7 +746,9 @@ def test_closing_while_a_solution_is_computed_leaves_the_swing_to_be_resumed(
     assert stage.run.is_solving
     stage.bench.shut_down()
 
-    assert found_interrupted(stage.run.records_folder)[0].folder == interrupted
+    assert (
+        find_unfinished(stage.run.records_folder).interrupted[0].folder == interrupted
+    )
     assert solve_record(open_record(interrupted)).calibration.used.all()
 
 
@@ -760,4 +764,6 @@ def test_closing_while_images_are_captured_keeps_all_of_them(
 
     assert n_images >= N_IMAGES + 2
     assert len(open_record(interrupted).images) == n_images
-    assert found_interrupted(stage.run.records_folder)[0].folder == interrupted
+    assert (
+        find_unfinished(stage.run.records_folder).interrupted[0].folder == interrupted
+    )

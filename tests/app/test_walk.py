@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.arrays import FloatArray
-from lightpen.session.interrupted import found_interrupted
+from lightpen.session.interrupted import find_unfinished
 from lightpen.session.record import open_record
 from lightpen.session.results import Result, last_result
 from lightpen.session.sources import Surroundings
@@ -132,7 +132,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     np.testing.assert_allclose(result.tip_pen, shown.tip, atol=1e-4)
     record = open_record(Path(result.record))
     assert record.verdict == "pass"
-    assert found_interrupted(record.folder.parent) == ()
+    assert find_unfinished(record.folder.parent).interrupted == ()
     assert _calibrated(lightpen, record.folder) == result.tip_pen.tolist()
     walker.until(walker.main_button().isEnabled)
     walker.click("Start the next calibration")

@@ -16,7 +16,6 @@ from lightpen.session.interrupted import (
     discard_damaged,
     discard_swing,
     find_unfinished,
-    found_interrupted,
     read_resumable,
 )
 from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
@@ -56,7 +55,7 @@ def recorded(
 
 
 def names_found(root: Path) -> list[str]:
-    return [record.folder.name for record in found_interrupted(root)]
+    return [record.folder.name for record in find_unfinished(root).interrupted]
 
 
 def test_swings_without_a_verdict_are_found_the_newest_first(
@@ -149,7 +148,7 @@ def test_a_folder_that_cannot_be_read_is_told(
     monkeypatch.setattr(Path, "iterdir", refuse)  # root may read everything
 
     with pytest.raises(FileError, match="cannot be read: Permission denied"):
-        found_interrupted(tmp_path)
+        find_unfinished(tmp_path)
 
 
 def test_a_thousand_concluded_swings_cost_little(

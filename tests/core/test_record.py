@@ -18,7 +18,7 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.pen_files import write_pen
 from lightpen.images import decode_image
-from lightpen.session.interrupted import found_interrupted
+from lightpen.session.interrupted import find_unfinished
 from lightpen.session.record import (
     FileCopy,
     Header,
@@ -150,7 +150,7 @@ def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
         np.testing.assert_array_equal(
             image.pixels, np.full((10, 2), image.number + 0.1)
         )
-    assert found_interrupted(tmp_path)[0].folder == folder
+    assert find_unfinished(tmp_path).interrupted[0].folder == folder
 
 
 def test_a_torn_line_and_an_orphan_image_are_passed_over(
@@ -196,7 +196,7 @@ def test_damage_in_the_middle_is_refused_and_located(
 
     with pytest.raises(FileError, match=r"Line 2 of .* is damaged"):
         open_record(folder)
-    assert found_interrupted(tmp_path) == ()
+    assert find_unfinished(tmp_path).interrupted == ()
 
 
 def test_one_program_at_a_time_writes_to_a_record(
@@ -309,13 +309,13 @@ def test_only_swings_without_a_verdict_are_offered_newest_first(
         writer.conclude("pass")
     (tmp_path / "swings" / "no record").mkdir()
 
-    found = found_interrupted(tmp_path / "swings")
+    found = find_unfinished(tmp_path / "swings").interrupted
     assert [record.folder.name for record in found] == ["b", "a"]
     assert open_record(tmp_path / "swings" / "c").verdict == "pass"
     with RecordWriter.resume(open_record(tmp_path / "swings" / "c")) as writer:
         append(writer)  # "Capture more" takes the verdict back
     assert open_record(tmp_path / "swings" / "c").verdict is None
-    assert found_interrupted(tmp_path / "nothing here") == ()
+    assert find_unfinished(tmp_path / "nothing here").interrupted == ()
 
 
 FULL_DISK = """

@@ -122,17 +122,6 @@ def find_unfinished(root: Path) -> Unfinished:
     )
 
 
-def found_interrupted(root: Path) -> tuple[Record, ...]:
-    """Return the swings in a folder that wait to be gone on with, the newest first.
-
-    Raises
-    ------
-    FileError
-        As `find_unfinished`.
-    """
-    return find_unfinished(root).interrupted
-
-
 def read_resumable(folder: Path) -> Resumable:
     """Read an interrupted swing and fit its images anew.
 
