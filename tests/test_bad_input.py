@@ -10,7 +10,7 @@ import struct
 import subprocess
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -1030,6 +1030,23 @@ def test_images_that_do_not_exist_are_refused_by_name(
 ) -> None:
     outcome = swing.calibrate(lightpen, images=tmp_path / name)
     assert_refused(outcome, "nowhere")
+    assert outcome.returncode == 2
+
+
+def test_a_folder_that_may_not_be_looked_into_is_refused_by_name(
+    obedient: Sequence[str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "swing"
+    folder.mkdir(mode=0)
+    program = Path(sys.executable).with_name("lightpen")
+    outcome = subprocess.run(
+        [*obedient, program, "calibrate", folder],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert_refused(outcome, re.escape(f"{folder} cannot be read: Permission denied."))
+    assert "printed" not in outcome.stderr
     assert outcome.returncode == 2
 
 

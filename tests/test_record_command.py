@@ -220,6 +220,8 @@ def test_an_empty_record_says_what_to_do(lightpen: Run, folder: Path) -> None:
 
     assert outcome.returncode == 1
     assert outcome.stderr == (
+        f"lightpen: {N_IMAGES} images, the first images/000001.png, are in the folder "
+        "but not in the journal; they were not acknowledged and take no part.\n"
         "lightpen: The record swing 1 holds no images. Resume the swing, or begin a "
         "new one.\n"
     )
@@ -267,6 +269,54 @@ def test_what_a_crash_left_behind_is_passed_over(
     (folder / image_name(21)).write_bytes(b"half an image")
 
     assert calibrated(folder)[0]["tip_pen_mm"] == before
+
+
+@pytest.mark.parametrize(
+    ("numbers", "note"),
+    [
+        ([21], "images/000021.png is in the folder but not in the journal; it was"),
+        ([22, 21], "images/000021.png, images/000022.png are in the folder"),
+        ([24, 23, 22, 21], "4 images, the first images/000021.png, are in the folder"),
+    ],
+)
+def test_images_that_the_journal_does_not_name_are_told(
+    lightpen: Run, folder: Path, numbers: list[int], note: str
+) -> None:
+    for number in numbers:
+        shutil.copy(folder / image_name(1), folder / image_name(number))
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 0
+    assert f"{N_IMAGES} of {N_IMAGES} used" in outcome.stdout
+    assert outcome.stderr.startswith(f"lightpen: {note}")
+    assert outcome.stderr.count("lightpen:") == 1
+
+
+def test_a_whole_record_has_nothing_to_be_told(lightpen: Run, folder: Path) -> None:
+    (folder / "images" / ".0123456789abcdef.part").write_bytes(b"torn")
+
+    assert lightpen("calibrate", folder).stderr == ""
+
+
+@pytest.mark.parametrize("name", [HEADER, JOURNAL])
+def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> None:
+    (folder / name).unlink()
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 2
+    assert f"swing 1 is not a whole one: it lacks {name}. Restore" in outcome.stderr
+
+
+def test_a_record_of_a_later_version_is_refused(lightpen: Run, folder: Path) -> None:
+    header = json.loads((folder / HEADER).read_text("utf-8"))
+    (folder / HEADER).write_text(json.dumps(header | {"format": 2}), "utf-8")
+    outcome = lightpen("calibrate", folder)
+
+    assert outcome.returncode == 2
+    assert outcome.stderr.endswith(
+        "header.json was written by a later version of the program (format 2; this "
+        "version reads 1). Open the record with that version.\n"
+    )
 
 
 def test_a_folder_that_is_no_record_still_needs_its_files(

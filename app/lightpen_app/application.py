@@ -24,6 +24,7 @@ from lightpen.session.sources import Surroundings
 from lightpen_app.bench import Bench
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
+from lightpen_app.end_signals import EndSignals
 from lightpen_app.languages import LanguageSwitch
 from lightpen_app.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.pages.page import Page
@@ -79,6 +80,8 @@ class Wizard(QObject):
         # Connections
         self.bench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.bench.shut_down)
+        for part in (self.bench.live, self.bench.run):
+            part.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
@@ -124,8 +127,10 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
             "or give a command; lightpen --help lists them."
         )
     application = make_application(arguments)
-    wizard = Wizard(application, make_pages, Settings(settings_file()), data_folder())
-    status = _shown(application, wizard)
+    with EndSignals(application) as signals:
+        settings = Settings(settings_file())
+        wizard = Wizard(application, make_pages, settings, data_folder())
+        status = _shown(application, wizard, signals)
     return _ended(wizard, status)
 
 
@@ -140,7 +145,10 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         qInstallMessageHandler(_tell_but_hints)
     application = make_application(arguments)
-    with TemporaryDirectory(prefix="lightpen-demo-") as folder:
+    with (
+        EndSignals(application) as signals,
+        TemporaryDirectory(prefix="lightpen-demo-") as folder,
+    ):
         settings = Settings(Path(folder) / "lightpen.ini")
         users = Settings(settings_file()).preferences()
         settings.set_preferences(users)
@@ -151,9 +159,9 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
             demo.ended.connect(partial(_print_tip, wizard.bench.run))
             demo.ended.connect(wizard.window.close)
         QTimer.singleShot(0, demo.start)
-        status = _shown(application, wizard)
+        status = _shown(application, wizard, signals)
         if not is_seen and wizard.bench.run.result is None:
-            status = 1
+            status = status or 1
     return _ended(wizard, status)
 
 
@@ -165,7 +173,8 @@ def has_display() -> bool:
     return any(os.environ.get(name) for name in names)
 
 
-def _shown(application: QApplication, wizard: Wizard) -> int:
+def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> int:
+    signals.came.connect(partial(_end, application, wizard))
     wizard.crash_hook.install()
     wizard.window.show()
     wizard.bench.start()
@@ -173,6 +182,12 @@ def _shown(application: QApplication, wizard: Wizard) -> int:
         return application.exec()
     finally:
         wizard.crash_hook.remove()
+
+
+def _end(application: QApplication, wizard: Wizard, number: int) -> None:
+    """Close the window at a signal, and all that waits above it for an answer."""
+    wizard.window.close_unasked()
+    application.exit(128 + number)  # the exit status by which shells know a signal
 
 
 def _ended(wizard: Wizard, status: int) -> int:

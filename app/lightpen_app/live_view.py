@@ -26,7 +26,7 @@ from lightpen.errors import LightpenError
 from lightpen.session.following import Follower
 from lightpen.session.live import Aim, Live, LiveImage, Swinging
 from lightpen.session.swing import Fed, finish, pause, resume
-from lightpen.session.swing_state import Event, Phase, SwingState
+from lightpen.session.swing_state import Event, Happening, Phase, SwingState
 from lightpen_app.mailbox import Mailbox
 from lightpen_app.pooling import pooled
 
@@ -69,6 +69,8 @@ class LiveView(QObject):
         The camera has these in force.
     troubled(str)
         A sentence to be read; the camera or the swing carries on.
+    relieved(str)
+        The sentence of `troubled` whose cause is gone: images are recorded again.
     failed(str)
         A sentence to be read; no more images come until another `open`.
     """
@@ -80,6 +82,7 @@ class LiveView(QObject):
     connection_changed = Signal(object)
     settings_applied = Signal(object)
     troubled = Signal(str)
+    relieved = Signal(str)
     failed = Signal(str)
     _stopped_looking = Signal(object, object)
 
@@ -94,8 +97,10 @@ class LiveView(QObject):
         self._closing: list[Thread] = []
         self._leaving: Live | None = None  # whose swing is on its way from it
         self._missed: list[Callable[[], None]] = []  # wishes meanwhile
+        self._trouble = ""  # of a record
 
         # Connections
+        self.happened.connect(self._on_happened)
         self._stopped_looking.connect(self._on_stopped_looking)
 
     def open(
@@ -311,7 +316,13 @@ class LiveView(QObject):
             case Troubled(trouble):
                 self.troubled.emit(str(trouble))
             case LightpenError():
-                self.troubled.emit(str(what))
+                self._trouble = str(what)
+                self.troubled.emit(self._trouble)
+
+    def _on_happened(self, event: Event) -> None:
+        if self._trouble and event.what is Happening.KEPT:
+            trouble, self._trouble = self._trouble, ""
+            self.relieved.emit(trouble)
 
 
 class _Teller(QObject):

@@ -4,7 +4,14 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QIcon, QKeyEvent, QResizeEvent
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QGuiApplication,
+    QIcon,
+    QKeyEvent,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
@@ -18,6 +25,7 @@ from typing_extensions import override
 from lightpen.errors import FileError
 from lightpen_app.crash import versions
 from lightpen_app.pages.page import Page
+from lightpen_app.placement import FRAME, fitted_place
 from lightpen_app.settings import Preferences, Settings
 from lightpen_app.steps import Status, Step, list_steps
 from lightpen_app.theme import (
@@ -36,6 +44,7 @@ from lightpen_app.widgets.room import Room
 from lightpen_app.widgets.sidebar import Sidebar
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
+FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 
 
 class MainWindow(QMainWindow):
@@ -83,6 +92,7 @@ class MainWindow(QMainWindow):
         self._now = 0
         self._room = Room()
         self._notice_is_of_page = False
+        self._asks = True
 
         # Widgets: the order of making them is the order of the Tab key
         self._sidebar = Sidebar()
@@ -117,8 +127,11 @@ class MainWindow(QMainWindow):
 
         self._use_room()
         self._retranslate()
-        if not settings.restore_geometry(self):
-            self.resize(160 * GRID, 100 * GRID)
+        if settings.restore_geometry(self):
+            self._fit_screen()
+        else:
+            available = self.screen().availableGeometry()
+            self.resize(FIRST_SIZE.boundedTo(available.size() - FRAME))
         self._pages[0].entered()
         self._refresh()
         self._focus_page()
@@ -164,6 +177,11 @@ class MainWindow(QMainWindow):
         self._notice_is_of_page = False
         self._notice.show_text(text, tone)
 
+    def drop_notice(self, text: str) -> None:
+        """Take a sentence away whose cause is gone, and no other."""
+        if self._notice.text() == text:
+            self._notice.clear()
+
     def show_crash_report(self, path: str) -> None:
         """Tell that the program met a bug of its own; path "" if none is written."""
         if path:
@@ -178,6 +196,11 @@ class MainWindow(QMainWindow):
                 "yours to write."
             )
         self.show_notice(text)
+
+    def close_unasked(self) -> None:
+        """Close without a question, as there may be nobody to answer."""
+        self._asks = False
+        self.close()
 
     def steps(self) -> tuple[Step, ...]:
         """Return the list of steps as it is shown."""
@@ -228,7 +251,7 @@ class MainWindow(QMainWindow):
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
         questions = [page.unsaved() for page in self._pages if page.unsaved()]
-        if questions and not self._confirmed("\n\n".join(questions)):
+        if self._asks and questions and not self._confirmed("\n\n".join(questions)):
             event.ignore()
             return
         self._settings.save_geometry(self)
@@ -303,6 +326,16 @@ class MainWindow(QMainWindow):
         layout.addWidget(self._action_bar, 1, 1)
         layout.setRowStretch(0, 1)
         return central
+
+    def _fit_screen(self) -> None:
+        """Keep the window within its screen, its buttons with it."""
+        if self.isMaximized() or self.isFullScreen():
+            return
+        place = self.geometry()
+        screen = QGuiApplication.screenAt(place.center()) or self.screen()
+        fitted = fitted_place(place, screen.availableGeometry())
+        if fitted != place:
+            self.setGeometry(fitted)
 
     def _use_room(self) -> None:
         """Arrange what is about the page as the size of the window allows."""
@@ -406,4 +439,4 @@ class MainWindow(QMainWindow):
         return box.clickedButton() is not stay
 
     def _retranslate(self) -> None:
-        self.setWindowTitle(self.tr("Lightpen: pen tip calibration"))
+        self.setWindowTitle(self.tr("Pen tip calibration"))

@@ -82,8 +82,8 @@ _PHRASES: dict[Code, tuple[str, str]] = {
         QT_TRANSLATE_NOOP("phrases", "Show the LEDs"),
         QT_TRANSLATE_NOOP(
             "phrases",
-            "{0} LEDs are seen, {1} are needed. A finger may cover them; or lean back "
-            "a little.",
+            "LEDs seen: {0}, needed: {1}. A finger may cover them; or lean back a "
+            "little.",
         ),
     ),
     Code.TOO_FAST: (
@@ -101,7 +101,7 @@ _PHRASES: dict[Code, tuple[str, str]] = {
     Code.TIP_SLIPPED: (
         QT_TRANSLATE_NOOP("phrases", "Tip slipped"),
         QT_TRANSLATE_NOOP(
-            "phrases", "{0} images dropped. Press the tip into the cone again."
+            "phrases", "Images dropped: {0}. Press the tip into the cone again."
         ),
     ),
     Code.PEN_LOST: (
@@ -132,19 +132,19 @@ _PHRASES: dict[Code, tuple[str, str]] = {
     ),
     Code.TOO_FEW_IMAGES: (
         QT_TRANSLATE_NOOP("phrases", "More images"),
-        QT_TRANSLATE_NOOP("phrases", "{0} images of at least {1} are kept."),
+        QT_TRANSLATE_NOOP("phrases", "Images kept: {0} of at least {1}."),
     ),
     Code.TOO_LITTLE_TILT: (
         QT_TRANSLATE_NOOP("phrases", "Lean further"),
         QT_TRANSLATE_NOOP(
             "phrases",
-            "Too little tilt {1}. Lean the pen further that way: about {0} more "
-            "images.",
+            "Too little tilt {1}. Lean the pen further that way. Images still "
+            "needed: about {0}.",
         ),
     ),
     Code.NOT_UPRIGHT: (
         QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
-        QT_TRANSLATE_NOOP("phrases", "{0} more images of the upright pen are needed."),
+        QT_TRANSLATE_NOOP("phrases", "Images of the upright pen still needed: {0}."),
     ),
     Code.UNKNOWN: (
         QT_TRANSLATE_NOOP("phrases", "Not known yet"),
@@ -177,6 +177,22 @@ _PHRASES: dict[Code, tuple[str, str]] = {
             "swing if the tip slipped.",
         ),
     ),
+    Code.LEDS_OFF: (
+        QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+        QT_TRANSLATE_NOOP(
+            "phrases",
+            "The LED file is off by {0} mm a coordinate, which alone makes U (k = 2) "
+            "{1} mm. Is this the LED file of this pen? More images hardly help.",
+        ),
+    ),
+    Code.LED_DISPLACED: (
+        QT_TRANSLATE_NOOP("phrases", "LED out of place"),
+        QT_TRANSLATE_NOOP(
+            "phrases",
+            "LED {0} sits {1} mm off its place in the LED file. Is this the LED file "
+            "of this pen?",
+        ),
+    ),
     Code.LEDS_MISFIT: (
         QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
         QT_TRANSLATE_NOOP(
@@ -198,6 +214,8 @@ _DECIMALS: dict[Code, tuple[int, ...]] = {
     Code.TIP_ELSEWHERE: (2,),
     Code.UNCERTAIN: (4, 4),
     Code.HALVES_DIFFER: (4, 4),
+    Code.LEDS_OFF: (3, 4),
+    Code.LED_DISPLACED: (0, 2),
     Code.LEDS_MISFIT: (2, 2),
     Code.GOOD: (4,),
 }

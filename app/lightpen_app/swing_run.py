@@ -62,12 +62,15 @@ class SwingRun(QObject):
         Of solving, 0 to 1.
     troubled(str)
         A sentence to be read: nothing is lost.
+    relieved(str)
+        The sentence of `troubled` whose cause is gone.
     """
 
     changed = Signal()
     happened = Signal(object)
     progressed = Signal(float)
     troubled = Signal(str)
+    relieved = Signal(str)
 
     def __init__(
         self, live: LiveView, folder: Path, parent: QObject | None = None
@@ -87,6 +90,7 @@ class SwingRun(QObject):
         self._tried: Mapping[int, str] = {}
         self._job: Job | None = None
         self._reading: Job | None = None
+        self._trouble = ""
 
         # Connections
         live.swing_changed.connect(self._on_swing_changed)
@@ -195,6 +199,8 @@ class SwingRun(QObject):
         folder = self._record_folder
         if folder is None:
             raise ValueError("`capture_more` needs a swing.")
+        if self._result is not None:
+            raise ValueError("The tip of this swing is in force: begin another one.")
         if self.is_reading:
             return
         self.cancel()
@@ -286,7 +292,7 @@ class SwingRun(QObject):
             try:
                 writer.conclude(verdict.grade)
             except FileError as error:  # the swing is offered again, which is no harm
-                self.troubled.emit(str(error))
+                self._trouble_with(str(error))
         self.changed.emit()
         return result
 
@@ -318,6 +324,7 @@ class SwingRun(QObject):
         self._setup, self._state = swinging.setup, swinging.state
         self._solution = self._verdict = self._result = None
         self._wanted = {}
+        self._relieve()
         self._live.swing(swinging)
         self.changed.emit()
 
@@ -367,7 +374,7 @@ class SwingRun(QObject):
             writer = RecordWriter.resume(open_record(folder))
         except FileError as error:
             self.abandon()
-            self.troubled.emit(str(error))
+            self._trouble_with(str(error))
             return
         self._live.swing(replace(left, writer=writer))
 
@@ -380,7 +387,7 @@ class SwingRun(QObject):
 
     def _on_unread(self, sentence: str) -> None:
         self._reading = None
-        self.troubled.emit(sentence)
+        self._trouble_with(sentence)
         self.changed.emit()
 
     def _on_solved(self, solution: Solution) -> None:
@@ -391,8 +398,9 @@ class SwingRun(QObject):
             try:
                 note_taken_out(self._record_folder, solution.taken_out)
             except FileError as error:
-                self._on_unsolved(str(error))
+                self._keep_solution(str(error))
                 return
+        self._relieve()
         self._job, self._solution, self._result = None, solution, None
         self._verdict = judge(solution.calibration, self._limits)
         self._conclude(self._verdict.reason, self._verdict.grade is not Grade.REPEAT)
@@ -400,15 +408,34 @@ class SwingRun(QObject):
             self._solve_again()
 
     def _on_unsolved(self, sentence: str) -> None:
+        if self._solution is not None:
+            if set(self._tried) > set(self._solution.taken_out):
+                sentence = self.tr(
+                    "Without these images there is no tip, so they stay in. {0}"
+                ).format(sentence)
+            self._keep_solution(sentence)
+            return
         self._job = None
-        if self._solution is None:
-            self._conclude(Message(Code.NO_TIP, (sentence,)), passed=False)
-        elif self._wanted != self._tried:  # the user went on meanwhile
+        self._conclude(Message(Code.NO_TIP, (sentence,)), passed=False)
+
+    def _keep_solution(self, sentence: str) -> None:
+        """Leave the images as they were, and say why they cannot be as wanted."""
+        self._job = None
+        if self._wanted != self._tried:  # the user went on meanwhile
             self._solve_again()
-        else:
-            self._wanted = self._solution.taken_out
-            self.troubled.emit(sentence)
-            self.changed.emit()
+            return
+        self._wanted = self._require_solution().taken_out
+        self._trouble_with(sentence)
+        self.changed.emit()
+
+    def _trouble_with(self, sentence: str) -> None:
+        self._trouble = sentence
+        self.troubled.emit(sentence)
+
+    def _relieve(self) -> None:
+        trouble, self._trouble = self._trouble, ""
+        if trouble:
+            self.relieved.emit(trouble)
 
     def _conclude(self, reason: Message, passed: bool) -> None:
         state = self._state

@@ -1,16 +1,36 @@
 """Names and moments as they are shown."""
 
+import re
 from datetime import datetime
 
 from PySide6.QtCore import QDateTime, QLocale
 
 LONGEST_SHOWN = 32  # characters
+LONGEST_WORD = 24  # characters; what is longer may be parted
+BREAK = "\u200b"  # where a line may end, though no blank is there
 PARTED = "  \u00b7  "  # between things told in one line
 
 
 def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
     """Return a name that fits into a line; its end is left out if it is long."""
     return name if len(name) <= longest else f"{name[: longest - 1]}\u2026"
+
+
+def breakable(text: str) -> str:
+    """Let words without a blank, as paths, take more than one line."""
+    long_word = rf"\S{{{LONGEST_WORD},}}"
+    return re.sub(long_word, lambda word: _parted(word.group()), text)
+
+
+def unbroken(text: str) -> str:
+    """Return a text as it was before `breakable`."""
+    return text.replace(BREAK, "")
+
+
+def _parted(word: str) -> str:
+    """Part a long word behind its marks; a part without any, where it must be."""
+    parts = re.findall(rf"[^/\\_,;.]{{1,{LONGEST_WORD}}}[/\\_,;.]?|[/\\_,;.]", word)
+    return BREAK.join(parts)
 
 
 def moment_text(moment: datetime, pattern: str) -> str:

@@ -41,11 +41,18 @@ from lightpen.report import (
     pivot_json,
     pivot_text,
 )
-from lightpen.session.record import is_record, open_record, record_files
+from lightpen.session.record import (
+    is_record,
+    missing_parts,
+    open_record,
+    record_files,
+    unacknowledged_images,
+)
 from lightpen.session.solving import record_inputs, solve_record
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
+MAX_NAMED = 3  # images; of more the first is named
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 
 
@@ -285,6 +292,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         )
     record = open_record(folder)
     _require_other_file(options.json, *record_files(record))
+    _note_unacknowledged(unacknowledged_images(record))
     with _progress("Finding LEDs") as report:
         solution = solve_record(record, report)
     return _Calibrated(
@@ -294,10 +302,44 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     )
 
 
+def _note_unacknowledged(names: Sequence[str]) -> None:
+    """Tell of images that take no part because no journal names them."""
+    if not names:
+        return
+    if len(names) == 1:
+        text = (
+            f"{names[0]} is in the folder but not in the journal; it was not "
+            "acknowledged and takes no part."
+        )
+    else:
+        which = (
+            ", ".join(names)
+            if len(names) <= MAX_NAMED
+            else f"{len(names)} images, the first {names[0]},"
+        )
+        text = (
+            f"{which} are in the folder but not in the journal; they were not "
+            "acknowledged and take no part."
+        )
+    print(f"lightpen: {text}", file=sys.stderr)
+
+
+def _lacking(option: str, images: Sequence[str]) -> UsageError:
+    """Return that an option is missing, and why the images are not a record."""
+    missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
+    if not missing:
+        return UsageError(f"{option} FILE is missing. Only a record needs none.")
+    return UsageError(
+        f"{option} FILE is missing. Only a record needs none, and {images[0]} is not a "
+        f"whole one: it lacks {', '.join(missing)}. Restore what it lacks from a copy, "
+        "or give --camera FILE and --pen FILE."
+    )
+
+
 def _from_observations(options: argparse.Namespace) -> _Calibrated:
     for name, file in (("--camera", options.camera), ("--pen", options.pen)):
         if file is None:
-            raise UsageError(f"{name} FILE is missing. Only a record needs none.")
+            raise _lacking(name, options.images)
     camera = read_camera(options.camera)
     nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
     pen = read_pen(options.pen, options.units, options.led_diameter, nominal_tip)

@@ -54,10 +54,7 @@ def read_bytes(path: Path, what: str, limit: int) -> bytes:
             f"{shown} does not exist. Check the name and the folder."
         ) from error
     except OSError as error:
-        raise FileError(
-            f"{shown} cannot be read: {_strerror(error)}. Check that it is yours to "
-            "read and that its disk is connected."
-        ) from error
+        raise unreadable(path, what, error) from error
     if len(data) > limit:
         raise _too_large(shown, len(data), limit)
     return data
@@ -137,6 +134,14 @@ def write_whole(path: Path, data: bytes) -> None:
             f"{printable(str(path))} cannot be written: {reason} What was there "
             "before is unchanged."
         ) from error
+
+
+def unreadable(path: Path, what: str, error: OSError) -> FileError:
+    """Return the error of a file or folder, ``what`` it is, that cannot be read."""
+    return FileError(
+        f"The {what} {printable(str(path))} cannot be read: {_strerror(error)}. Check "
+        "that it is yours to read and that its disk is connected."
+    )
 
 
 def sha256(path: Path) -> str:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.files import read_bytes
+from lightpen.files import read_bytes, unreadable
 
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
@@ -62,30 +62,15 @@ def find_images(*places: str) -> ImageSource:
     Raises
     ------
     FileError
-        There is nothing there, or no image.
+        There is nothing there, or no image, or it may not be looked at.
     """
     if len(places) > 1:
         return image_files(sorted(map(Path, places), key=_natural_order))
-    where = places[0]
-    path = Path(where)
-    if path.is_dir():
-        files = [p for p in path.iterdir() if p.suffix.lower() in SUFFIXES]
-        if not files:
-            raise FileError(
-                f"The folder {where} holds no images ({', '.join(SUFFIXES)}). "
-                "Name the folder that the images are in."
-            )
-    elif path.is_file():
-        if path.suffix.lower() in VIDEO_SUFFIXES:
-            return _video(path)
-        files = [path]
-    else:
-        files = [Path(name) for name in glob.glob(where)]  # noqa: PTH207 - any root
-        if not files:
-            raise FileError(
-                f"There is no folder, video or image at {where}. Check the name."
-            )
-    return image_files(sorted(files, key=_natural_order))
+    path = Path(places[0])
+    try:
+        return _images_at(path, places[0])
+    except OSError as error:
+        raise unreadable(path, "source of images", error) from error
 
 
 def image_files(files: list[Path]) -> ImageSource:
@@ -143,6 +128,27 @@ def decode_image(data: bytes, name: str) -> Image:
     if image is None:
         raise FileError(f"{name} is damaged or no image. Capture or copy it again.")
     return _grey(np.asarray(image), name)
+
+
+def _images_at(path: Path, where: str) -> ImageSource:
+    if path.is_dir():
+        files = [p for p in path.iterdir() if p.suffix.lower() in SUFFIXES]
+        if not files:
+            raise FileError(
+                f"The folder {where} holds no images ({', '.join(SUFFIXES)}). "
+                "Name the folder that the images are in."
+            )
+    elif path.is_file():
+        if path.suffix.lower() in VIDEO_SUFFIXES:
+            return _video(path)
+        files = [path]
+    else:
+        files = [Path(name) for name in glob.glob(where)]  # noqa: PTH207 - any root
+        if not files:
+            raise FileError(
+                f"There is no folder, video or image at {where}. Check the name."
+            )
+    return image_files(sorted(files, key=_natural_order))
 
 
 def _grey(image: npt.NDArray[Any], name: str) -> Image:

@@ -118,7 +118,7 @@ def check_leds(leds: FloatArray, diameter: float) -> None:
         raise FileError(
             f"The LEDs span only {extent:.4g} mm, less than one disc of "
             f"{diameter:g} mm. Are the coordinates in metres? Then name the units: "
-            "--units m, or x_m, y_m, z_m in the header."
+            "x_m, y_m, z_m in the header, or --units m on the command line."
         )
     _check_separation(leds, diameter)
     _check_not_in_line(leds, extent)

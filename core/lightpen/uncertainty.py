@@ -73,6 +73,12 @@ class Budget:
         return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
 
     @property
+    def led_uncertainty(self) -> float:
+        """U (k = 2) of the tip by the LED geometry alone, where it is largest, mm."""
+        largest = np.linalg.eigvalsh(self.leds[:3, :3])[-1]
+        return float(COVERAGE_FACTOR * np.sqrt(max(largest, 0.0)))
+
+    @property
     def weakest_direction(self) -> FloatArray:
         """Unit vector of the pen frame along which the tip is known least."""
         _, vectors = np.linalg.eigh(self.covariance[:3, :3])

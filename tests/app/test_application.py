@@ -1,5 +1,9 @@
 """The application starts fast, changes language and theme, and remembers both."""
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,10 +14,32 @@ from typing_extensions import override
 
 from lightpen_app.application import Wizard
 from lightpen_app.languages import Language
+from lightpen_app.main_window import LEAST_SIZE
 from lightpen_app.pages.page import MainAction, Page
 from lightpen_app.services import Services
 from lightpen_app.settings import Preferences, Settings
 from lightpen_app.theme import LIGHT, Appearance, colors_of
+
+OPENING = """
+import sys
+from PySide6.QtCore import QPoint, QTimer
+from PySide6.QtWidgets import QApplication, QPushButton
+from lightpen_app.application import run
+from lightpen_app.wizard_pages import make_pages
+
+def tell():
+    (window,) = [w for w in QApplication.topLevelWidgets() if w.objectName() == "main"]
+    button = window.findChild(QPushButton, "main_button")
+    corner = button.mapToGlobal(QPoint(button.width(), button.height()))
+    print(window.width(), window.height(), corner.x(), corner.y())
+    QApplication.quit()
+
+def pages(services):
+    QTimer.singleShot(500, tell)
+    return make_pages(services)
+
+sys.exit(run(pages))
+"""
 
 
 class Only(Page):
@@ -89,6 +115,21 @@ def test_a_crash_is_shown_in_the_window(qtbot: QtBot, settings: Settings) -> Non
     wizard.setParent(None)
 
 
+@pytest.mark.parametrize("part", ["live", "run"])
+def test_a_trouble_that_is_over_is_no_longer_told(
+    qtbot: QtBot, settings: Settings, part: str
+) -> None:
+    wizard = open_wizard(qtbot, settings)
+    teller = getattr(wizard.bench, part)
+
+    teller.troubled.emit("The disk is full.")
+    assert "The disk is full." in wizard.window.words()
+    teller.relieved.emit("The disk is full.")
+
+    assert "The disk is full." not in wizard.window.words()
+    wizard.setParent(None)
+
+
 @pytest.mark.parametrize("folder_exists", [True, False])
 def test_a_first_start_needs_no_folder(
     qtbot: QtBot, tmp_path: Path, folder_exists: bool
@@ -101,3 +142,32 @@ def test_a_first_start_needs_no_folder(
 
     assert wizard.window.isVisible()
     wizard.setParent(None)
+
+
+def test_on_a_screen_of_twice_the_scale_the_main_button_can_be_seen(
+    tmp_path: Path,
+) -> None:
+    names = ("name", "x", "y", "width", "height", "logicalDpi", "dpr")
+    screen = dict(zip(names, ("screen", 0, 0, 1920, 1080, 96, 1), strict=True))
+    (tmp_path / "screens.json").write_text(json.dumps({"screens": [screen]}))
+    homes = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "APPDATA", "LOCALAPPDATA")
+    outcome = subprocess.run(
+        [sys.executable, "-c", OPENING],
+        cwd=tmp_path,
+        env=os.environ
+        | dict.fromkeys(homes, str(tmp_path))
+        | {
+            "QT_QPA_PLATFORM": "offscreen:configfile=screens.json",
+            "QT_SCALE_FACTOR": "2",
+        },
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    width, height, right, bottom = map(int, outcome.stdout.split())
+    assert width >= LEAST_SIZE.width()
+    assert height >= LEAST_SIZE.height()
+    assert right <= 1920 // 2
+    assert bottom <= 1080 // 2

@@ -578,6 +578,31 @@ def test_a_camera_that_is_unplugged_is_told_and_comes_back(
     assert "Live" in seen.words
 
 
+@pytest.mark.parametrize("kind", ["folder", "images"])
+def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
+    live: Seen, small_scene: Scene, tmp_path: Path, kind: str
+) -> None:
+    write_scene(replace(small_scene, n_images=3), tmp_path / "swing")
+    gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(tmp_path / "swing"))
+    live.wait("10 of 10 LEDs")
+
+    gone.rename(tmp_path / "elsewhere")
+    live.wait("Lost, reconnecting")
+    assert f"No image of {tmp_path / 'swing'} can be read any more." in live.words
+    assert "It is looked for until it is back." in live.words
+    for stale in ("of 10 LEDs", "images/s", "Live"):
+        assert stale not in live.words
+    assert live.markers == ()
+    assert live.exposure == "No LED is seen"
+
+    (tmp_path / "elsewhere").rename(gone)
+    live.wait("Live")
+    live.wait("10 of 10 LEDs")
+    assert "can be read any more" not in live.words
+
+
 def test_a_camera_that_is_not_there_is_told(
     seen: Seen, bench: Bench, small_scene: Scene
 ) -> None:

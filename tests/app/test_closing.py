@@ -2,10 +2,12 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -23,6 +25,7 @@ from lightpen.session.record import Record, open_record
 from lightpen.session.recording import RecordWriter
 from lightpen.session.solving import Solution, solve_record
 from lightpen_app.bench import Bench
+from lightpen_app.end_signals import END_SIGNALS, EndSignals
 from lightpen_app.job import Report
 from lightpen_app.live_view import CLOSING_TIME
 
@@ -49,6 +52,50 @@ def close():
 
 def pages(services):
     QTimer.singleShot(500, close)
+    return make_pages(services)
+
+sys.exit(run(pages))
+"""
+
+# A signal that whoever started the tests ignores would be ignored by the program, too.
+HEEDFUL = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+"""
+
+DEMO = """
+import os
+for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"):
+    os.environ.pop(name, None)  # so it tells what it does
+from lightpen_app.application import run_demo
+from lightpen_app.wizard_pages import make_pages
+sys.exit(run_demo(make_pages))
+"""
+
+SWINGING = """
+import shutil
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QMessageBox
+from lightpen.session.interrupted import read_resumable
+from lightpen_app.application import run
+from lightpen_app.wizard_pages import make_pages
+
+def tell(folder, asks):
+    if asks and not isinstance(QApplication.activeModalWidget(), QMessageBox):
+        return QTimer.singleShot(50, lambda: tell(folder, asks))
+    print(folder, flush=True)
+
+def swing(bench):
+    folder = bench.run.records_folder / "interrupted"
+    shutil.copytree(sys.argv[1], folder)
+    bench.run.go_on(read_resumable(folder))
+    tell_it = lambda: tell(folder, sys.argv[2])
+    QTimer.singleShot(100, tell_it)
+    if sys.argv[2]:
+        QApplication.closeAllWindows()
+
+def pages(services):
+    QTimer.singleShot(500, lambda: swing(services.bench))
     return make_pages(services)
 
 sys.exit(run(pages))
@@ -108,6 +155,32 @@ def swing_before(bench: Bench, stuck: Stuck) -> None:
 def n_kept(bench: Bench) -> int:
     state = bench.run.state
     return 0 if state is None else state.n_kept
+
+
+@contextmanager
+def started(
+    program: str, folder: Path, *arguments: str
+) -> Iterator["subprocess.Popen[str]"]:
+    """Run a program that keeps all that is its own in a folder."""
+    names = ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "HOME", "TMPDIR")
+    environment = os.environ | dict.fromkeys(names, str(folder))
+    with subprocess.Popen(
+        [sys.executable, "-c", HEEDFUL + program, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment | {"QT_QPA_PLATFORM": "offscreen"},
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def said(process: "subprocess.Popen[str]") -> str:
+    """Return the next line that a program prints."""
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
 
 
 def closing_time(bench: Bench) -> float:
@@ -259,3 +332,54 @@ def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:
 
     assert status == 0
     assert time.monotonic() - began < CLOSING_TIME + 2 * AT_ONCE
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_demo_with_nothing_left_behind(
+    tmp_path: Path, number: signal.Signals
+) -> None:
+    with started(DEMO, tmp_path) as process:
+        assert "Demo:" in said(process)
+        assert len(list(tmp_path.glob("lightpen-demo-*"))) == 1
+        process.send_signal(number)
+        words = process.communicate(timeout=2 * CLOSING_TIME)[1]
+
+    assert process.returncode == 128 + number
+    assert "Traceback" not in words
+    assert list(tmp_path.glob("lightpen-demo-*")) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("asks", ["asks", ""])
+def test_a_signal_closes_the_window_unasked_and_the_swing_is_offered_again(
+    tmp_path: Path, swung: Callable[..., Path], number: signal.Signals, asks: str
+) -> None:
+    with started(SWINGING, tmp_path, str(swung()), asks) as process:
+        folder = Path(said(process))
+        process.send_signal(number)
+        words = process.communicate(timeout=2 * CLOSING_TIME)[1]
+
+    assert process.returncode == 128 + number
+    assert "Traceback" not in words
+    assert_whole(folder, N_IMAGES)
+
+
+def test_signals_are_left_to_whoever_heard_them_before(qtbot: QtBot) -> None:
+    before = [signal.getsignal(number) for number in END_SIGNALS]
+    with EndSignals() as signals:
+        with qtbot.waitSignal(signals.came, timeout=TIMEOUT) as came:
+            signal.raise_signal(signal.SIGTERM)
+        assert came.args == [signal.SIGTERM]
+
+    assert [signal.getsignal(number) for number in END_SIGNALS] == before
+
+
+def test_a_signal_that_is_ignored_stays_so() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with EndSignals():
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -18,6 +18,7 @@ from typing_extensions import override
 
 from lightpen_app.main_window import MainWindow
 from lightpen_app.pages.page import MainAction, Page
+from lightpen_app.placement import fitted_place
 from lightpen_app.settings import Preferences, Settings
 from lightpen_app.steps import StepState
 from lightpen_app.theme import Appearance
@@ -203,6 +204,25 @@ def test_a_main_action_that_is_not_possible_says_why(
     assert not shell.main_button.isEnabled()
     assert shell.main_button.accessibleDescription() == "Choose the pen first."
     assert "Choose the pen first." in shell.window.words()
+
+
+def test_the_main_button_keeps_the_focus_while_it_cannot_be_pressed(
+    shell: Shell, press: Callable[[Key], None], qtbot: QtBot
+) -> None:
+    page = shell.pages[0]
+    shell.window.activateWindow()
+    shell.main_button.setFocus()
+    for why_not in ("Wait a moment.", ""):
+        page.why_not = why_not
+        page.changed.emit()
+
+    assert shell.main_button.hasFocus()
+
+    page.field.setFocus()
+    for why_not in ("Wait a moment.", ""):
+        page.why_not = why_not
+        page.changed.emit()
+    assert page.field.hasFocus()
 
 
 def test_a_page_leads_to_any_step_by_its_key(shell: Shell) -> None:
@@ -464,6 +484,18 @@ def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
 
 
+def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
+    shell.window.show_notice("The disk is full.")
+    shell.window.drop_notice("The disk is full.")
+    assert "The disk is full." not in shell.window.words()
+
+    shell.window.show_notice("The disk is full.")
+    shell.window.show_crash_report("/data/crash-1.txt")
+    shell.window.drop_notice("The disk is full.")
+
+    assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
 def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:
     shell.pages[0].notice_raised.emit("The file holds no LED.")
     shell.window.show_notice("The disk is full.")
@@ -507,6 +539,18 @@ def test_closing_asks_where_something_would_be_lost(
     shell.pages[1].question = ""
 
 
+def test_closing_where_nobody_can_answer_asks_nothing(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell.pages[1].question = "The LED table has changes that are not saved."
+    monkeypatch.setattr(QMessageBox, "exec", lambda box: pytest.fail(box.text()))
+
+    shell.window.close_unasked()
+
+    assert not shell.window.isVisible()
+    assert shell.pages[1].log == ["shut down"]
+
+
 def test_the_window_is_gone_before_it_waits_for_what_is_under_way(
     shell: Shell,
 ) -> None:
@@ -528,3 +572,39 @@ def test_the_window_comes_back_where_it_was(
     qtbot.addWidget(again.window)
 
     assert again.window.geometry() == place
+
+
+def test_the_window_opens_within_its_screen(shell: Shell) -> None:
+    assert shell.window.screen().availableGeometry().contains(shell.window.geometry())
+
+
+@pytest.mark.parametrize("place", [(20, 30, 3000, 2000), (5000, -700, 760, 640)])
+def test_a_window_of_another_screen_comes_back_within_this_one(
+    shell: Shell, qtbot: QtBot, settings: Settings, place: tuple[int, int, int, int]
+) -> None:
+    shell.window.setGeometry(*place)
+    shell.window.close()
+
+    again = Shell(settings)
+    qtbot.addWidget(again.window)
+    again.window.show()
+
+    available = again.window.screen().availableGeometry()
+    assert available.contains(again.window.geometry())
+
+
+@pytest.mark.parametrize(
+    ("place", "fitted"),
+    [
+        ((10, 50, 700, 400), (10, 50, 700, 400)),
+        ((10, 50, 1280, 800), (8, 50, 952, 470)),
+        ((-300, 0, 700, 400), (0, 30, 700, 400)),
+        ((900, 500, 700, 400), (260, 140, 700, 400)),
+    ],
+)
+def test_a_place_is_changed_only_as_far_as_the_screen_asks_for(
+    place: tuple[int, int, int, int], fitted: tuple[int, int, int, int]
+) -> None:
+    available = QRect(0, 30, 960, 510)  # below a panel
+
+    assert fitted_place(QRect(*place), available) == QRect(*fitted)

@@ -341,6 +341,35 @@ def test_a_large_change_asks_whether_the_tip_was_exchanged(bed: Bed) -> None:
     )
 
 
+def test_the_result_says_which_tip_it_is_of(bed: Bed, bench: Bench) -> None:
+    bed.solve()
+    page = bed.show()
+    texts = [each.text() for each in page.findChildren(QLabel)]
+    assert "Tip T-10 in the frame of pen LP-04 / mm, with U (k = 2)" in texts
+    assert remarks(page) == ""
+
+    names = replace(bench.preparation.names, tip="T-11")
+    bench.set_preparation(replace(bench.preparation, names=names))
+    page.left()
+    page.entered()
+
+    assert remarks(page) == (
+        "This swing is of tip T-10, pen LP-04, whatever the step Start names now: tip "
+        "T-11, pen LP-04."
+    )
+
+
+def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
+    folder = bed.services.bench.run.records_folder / "swing"
+    header = json.loads((folder / "header.json").read_text("utf-8"))
+    header["nominal_tip_mm"] = [3.0, -90.0, -20.0]
+    (folder / "header.json").write_text(json.dumps(header), "utf-8")
+    bed.solve()
+
+    said = remarks(bed.show())
+    assert re.search(r"The tip lies \d\.\d mm from its nominal place", said)
+
+
 def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
     bench = bed.solve()
     put_in_force(bench, tip(bench))

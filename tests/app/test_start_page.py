@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPointF, Qt, QThreadPool, QTranslator
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QTranslator
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
+    QScrollArea,
     QWidget,
 )
 from pytestqt.qtbot import QtBot
@@ -1115,6 +1116,48 @@ def test_buttons_wait_while_a_swing_is_read(
 
     qtbot.wait_until(lambda: start.steps == ["swing"])
     assert all(button.isEnabled() for button in buttons)
+
+
+def test_in_one_column_what_waits_for_an_answer_comes_first(
+    show: Callable[[Bench], Opened], bench: Bench
+) -> None:
+    interrupted(bench, "a")
+    start = show(bench)
+    (panel,) = start.page.findChildren(InterruptedPanel)
+    station = start.field("Station")
+
+    def place(widget: QWidget) -> QPoint:
+        return widget.mapTo(start.page, QPoint())
+
+    assert place(panel).x() > place(station).x()
+
+    start.page.resize(720, 400)
+    start.settle()
+
+    assert place(panel).y() < place(station).y()
+    assert place(panel).y() + panel.height() < start.page.height()
+
+    start.page.resize(1000, 640)
+    start.settle()
+
+    assert place(panel).x() > place(station).x()
+
+
+@pytest.mark.parametrize("width", [810, 850, 1000])
+def test_an_interrupted_swing_is_seen_whole(
+    show: Callable[[Bench], Opened], bench: Bench, width: int
+) -> None:
+    interrupted(bench, "a", n_images=168)
+    start = show(bench)
+    start.page.resize(width, 640)
+    start.settle()
+    (panel,) = start.page.findChildren(InterruptedPanel)
+    (scroll,) = panel.findChildren(QScrollArea)
+
+    assert scroll.verticalScrollBar().maximum() == 0
+    (row,) = start.rows()
+    for label in row.findChildren(QLabel):
+        assert label.height() >= label.heightForWidth(label.width())
 
 
 # Sounds

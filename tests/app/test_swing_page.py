@@ -20,7 +20,7 @@ from lightpen.cameras.worker import Connection
 from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.posture import Posture
 from lightpen.session.preparation import Names, SourceChoice, SourceKind
-from lightpen.session.record import DISCARDED, Record, open_record
+from lightpen.session.record import DISCARDED, JOURNAL, Record, open_record
 from lightpen.session.sources import Surroundings
 from lightpen.session.swing_state import Pause, Phase, SwingLimits, SwingState
 from lightpen.simulator.scenes import Scene
@@ -421,6 +421,27 @@ def test_computing_can_be_stopped_and_begun_again(
     desk.click("Compute again")
 
     until_verdict(qtbot, desk)
+
+
+def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    folder = desk.run.record_folder
+    desk.window.go_to(2)
+    desk.run.accept()
+    until(qtbot, lambda: desk.value.state.word == "IN FORCE")
+    assert desk.value.instruction == "Accepted"
+    assert folder is not None
+    journal = (folder / JOURNAL).read_bytes()
+
+    desk.window.go_to(1)
+
+    assert desk.run.result is None
+    assert desk.run.record_folder not in (None, folder)
+    desk.let_operator_swing()
+    until_verdict(qtbot, desk)
+    assert (folder / JOURNAL).read_bytes() == journal
 
 
 def test_a_swing_that_begins_behind_another_step_waits_for_its_own(

@@ -9,6 +9,7 @@ from pathlib import Path
 from subprocess import CompletedProcess
 from typing import Any
 
+import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
@@ -20,7 +21,7 @@ from lightpen.formats.pen_files import write_pen
 from lightpen.report import calibration_json
 from lightpen.session.interrupted import find_unfinished, read_resumable
 from lightpen.session.messages import Code
-from lightpen.session.preparation import Names, SourceChoice, SourceKind
+from lightpen.session.preparation import Names, PenFile, SourceChoice, SourceKind
 from lightpen.session.record import HEADER, IMAGES, JOURNAL, open_record
 from lightpen.session.results import Result, last_result
 from lightpen.session.solving import Solution, record_inputs, solve_record
@@ -42,10 +43,13 @@ class Stage:
         self.bench, self.run, self.qtbot = bench, bench.run, qtbot
         self.happened: list[Event] = []
         self.sentences: list[str] = []
+        self.relieved: list[str] = []
 
         # Connections
         bench.run.happened.connect(self.happened.append)
         bench.troubled.connect(self._note)
+        bench.live.relieved.connect(self.relieved.append)
+        bench.run.relieved.connect(self.relieved.append)
 
     def open_camera(self) -> None:
         """Open a camera that sees the pen in its cone; the operator follows."""
@@ -189,6 +193,29 @@ def test_a_swing_goes_from_the_first_image_to_the_verdict_without_a_wish(
 BETWEEN = (Happening.KEPT, Happening.FIELD_FULL, Happening.SLIPPED)
 
 
+def test_without_a_nominal_tip_the_swing_finds_the_seat_and_goes_to_the_verdict(
+    stage: Stage, tmp_path: Path
+) -> None:
+    prepared = stage.bench.preparation
+    pen = prepared.pen
+    assert pen is not None
+    write_pen(replace(pen, nominal_tip=None), tmp_path / "pen.json")
+    pen_file = PenFile.read(tmp_path / "pen.json")
+    stage.bench.set_preparation(replace(prepared, pen_file=pen_file))
+    stage.open_camera()
+    stage.begin()
+    assert stage.run.setup is not None
+    assert stage.run.setup.pen.nominal_tip is None
+    stage.wait_for_phase(Phase.VERDICT)
+
+    assert stage.happened[0].what is Happening.SEATED
+    assert stage.run.verdict is not None
+    assert stage.run.verdict.grade is not Grade.REPEAT
+    true_tip = stage.bench.around.scene.tip_pen
+    uncertainty = stage.run.setup.limits.max_uncertainty
+    assert np.abs(np.array(stage.tip()) - true_tip).max() < 2 * uncertainty
+
+
 def test_two_swings_in_one_second_have_records_of_their_own(stage: Stage) -> None:
     folders = set[Path]()
     for _ in range(4):
@@ -304,8 +331,10 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_is_told(
     (interrupted / "elsewhere").rename(interrupted / IMAGES)
     n_images = n_kept(stage.run)
     assert stage.n_recorded() == n_images
+    assert stage.relieved == []
     stage.run.resume()
     stage.wait_for_kept(n_images + 1)
+    assert stage.relieved == stage.sentences
 
 
 # The camera
@@ -498,9 +527,15 @@ def test_too_few_images_left_keep_the_solution_and_the_record(solved: Stage) -> 
     assert solved.solution() is before
     assert (solved.folder() / JOURNAL).read_bytes() == journal
     assert "images are usable" in solved.sentences[-1]
+    assert (
+        "Without these images there is no tip, so they stay in."
+        in (solved.sentences[-1])
+    )
+    assert solved.relieved == []
     solved.run.take_out([2])  # what failed is not asked for again
     solved.wait_until_solved()
     assert set(solved.solution().taken_out) == {1, 2}
+    assert solved.relieved == solved.sentences
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: Stage) -> None:
@@ -522,6 +557,11 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: Stage) -> No
 
     assert solved.solution() is before
     assert "does not exist" in solved.sentences[-1]
+    assert "stay in" not in solved.sentences[-1]
+    assert solved.relieved == []
+    solved.run.take_out([3])
+    solved.wait_until_solved()
+    assert solved.relieved == solved.sentences
 
 
 def test_solving_can_be_cancelled_and_done_again(
@@ -570,9 +610,6 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     solved: Stage,
 ) -> None:
     first = solved.run.accept()
-    solved.capture_more()
-    solved.run.finish()
-    solved.wait_for_phase(Phase.VERDICT)
     solved.run.take_out([1])
     solved.wait_until_solved()
     before = solved.in_force()
@@ -611,6 +648,12 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
         stage.run.accept()
     assert stage.in_force() is None
     assert open_record(interrupted).verdict is None
+
+
+def test_no_more_is_captured_for_a_tip_in_force(solved: Stage) -> None:
+    solved.run.accept()
+    with pytest.raises(ValueError, match="begin another one"):
+        solved.run.capture_more()
 
 
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: Stage) -> None:

@@ -19,8 +19,10 @@ from lightpen_app.widgets.operator_view import (
     other_screen,
 )
 from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign, draw_sign
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.words import BREAK, breakable, unbroken
 
 
 @pytest.mark.parametrize(
@@ -226,3 +228,31 @@ def test_the_operator_view_takes_another_screen_only_if_there_is_one() -> None:
     assert other_screen(screen, [screen]) is screen
     second = object()
     assert other_screen(screen, [screen, second]) is second  # type: ignore[list-item]
+
+
+LONG_WORDS = (
+    'It begins with "led,x_mm,y_mm,z_mm\\n1,0.00023,-0.00035,-3.1,0.0021,-12.5".',
+    "/home/operator/calibration/stations/hall_2/camera_left_intrinsics.yaml",
+    "x" * 200,
+)
+
+
+@pytest.mark.parametrize("text", LONG_WORDS)
+def test_a_remark_with_a_long_word_needs_no_wide_place(qtbot: QtBot, text: str) -> None:
+    label = SignLabel()
+    qtbot.addWidget(label)
+
+    label.set_value(Remark(text))
+
+    assert label.minimumSizeHint().width() < 280
+    assert label.value().text == label.accessibleName() == text
+
+
+@pytest.mark.parametrize("text", LONG_WORDS)
+def test_a_text_that_may_be_parted_is_the_same_text(text: str) -> None:
+    assert breakable(text) != text
+    assert unbroken(breakable(text)) == text
+
+
+def test_words_of_a_usual_length_are_not_parted() -> None:
+    assert BREAK not in breakable("Open the intrinsics file camera.yaml, 0.25 px.")

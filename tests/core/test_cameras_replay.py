@@ -1,5 +1,6 @@
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import chain, repeat
 from math import inf
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from lightpen.arrays import Image
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import (
     ConfigError,
+    DeviceLost,
     DeviceNotFound,
     EndOfImages,
     Frame,
@@ -18,6 +20,7 @@ from lightpen.cameras.protocol import (
     Settings,
 )
 from lightpen.cameras.replay import ReplayCamera
+from lightpen.errors import FileError
 from lightpen.images import ImageSource
 
 N_IMAGES = 5
@@ -182,6 +185,73 @@ def test_a_damaged_image_is_named_and_the_next_one_comes(tmp_path: Path) -> None
     assert [frame.seq for frame in frames] == [2, 3, 4]
     assert camera.stats().incomplete == 1
     assert camera.stats().delivered == 4
+
+
+@pytest.mark.parametrize("frame_rate", [20.0, inf])
+def test_a_folder_that_is_gone_is_a_lost_camera_until_it_is_back(
+    tmp_path: Path, frame_rate: float
+) -> None:
+    folder, elsewhere = tmp_path / "swing", tmp_path / "elsewhere"
+    images = write_images(folder)
+    camera = opened(folder, frame_rate=frame_rate)
+    camera.read(1.0)
+    folder.rename(elsewhere)
+    with pytest.raises(DeviceLost, match=r"No image of .*swing can be read any more\."):
+        camera.read(1.0)
+    camera.close()
+    with pytest.raises(DeviceNotFound):
+        camera.open()
+
+    elsewhere.rename(folder)
+    camera.open()
+    camera.start()
+    np.testing.assert_array_equal(camera.read(1.0).image, images[0])
+
+
+def test_a_video_that_is_gone_is_a_lost_camera(tmp_path: Path) -> None:
+    path = tmp_path / "swing.avi"
+    writer = cv2.VideoWriter(
+        str(path), cv2.VideoWriter.fourcc(*"FFV1"), 20.0, (64, 48), isColor=False
+    )
+    for _ in range(N_IMAGES):
+        writer.write(np.zeros((48, 64), np.uint8))
+    writer.release()
+    camera = ReplayCamera(str(path), loops=True, clock=SkippingClock())
+    camera.open()
+    camera.start()
+    camera.read(1.0)
+    path.rename(tmp_path / "elsewhere.avi")
+
+    read_all_but_lost = partial(read_all, camera)  # the file is open for a round yet
+    with pytest.raises(DeviceLost, match=r"swing\.avi"):
+        read_all_but_lost()
+
+
+def test_a_whole_round_of_damaged_images_is_a_lost_camera() -> None:
+    def damaged() -> Image:
+        raise FileError("It is damaged.")
+
+    def loaders() -> Iterator[Callable[[], Image]]:
+        good = partial(np.full, (4, 6), 0, np.uint8)
+        yield from chain(repeat(damaged, 2), [good], repeat(damaged, 2))
+
+    first = partial(np.full, (4, 6), 0, np.uint8)
+    turns = iter([iter([first]), loaders(), iter([damaged] * 5)])
+    source = ImageSource(tuple("abcde"), (), lambda: next(turns))
+    camera = ReplayCamera(
+        "swing 17", lambda: source, loops=True, frame_rate=inf, clock=SkippingClock()
+    )
+    camera.open()
+    camera.start()
+    outcomes: list[type] = []
+    while DeviceLost not in outcomes:
+        try:
+            outcomes.append(type(camera.read(1.0)))
+        except (FrameIncomplete, DeviceLost) as error:
+            outcomes.append(type(error))
+
+    bad = FrameIncomplete
+    assert outcomes == [bad, bad, Frame, bad, bad, bad, bad, DeviceLost]
 
 
 def test_an_image_of_another_size_is_refused(tmp_path: Path) -> None:

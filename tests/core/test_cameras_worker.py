@@ -38,6 +38,7 @@ from lightpen.cameras.worker import (
     SettingsApplied,
     Troubled,
     WorkerEvent,
+    is_too_slow,
 )
 from lightpen.simulator.scenes import Scene
 
@@ -331,14 +332,37 @@ def test_frames_of_a_live_camera_that_nobody_takes_in_time_are_reported(
     bench.worker.measure(True)
     bench.worker.start()
     bench.wait_for_trouble(FramesSkipped)
+    n_skipped = bench.worker.stats.skipped
     bench.wait_for_frames(5)
     n_reported = len(bench.events.troubles(FramesSkipped))
     kept = [bench.worker.next_frame(TIMEOUT).seq for _ in range(3)]
 
     assert n_reported == 1  # not once an image
-    assert "too slow" in bench.events.troubles(FramesSkipped)[0]
+    assert "too slow: 20 of 23 images" in bench.events.troubles(FramesSkipped)[0]
     assert kept == [0, 1, 2]
-    assert bench.worker.stats.skipped >= 5
+    assert bench.worker.stats.skipped >= n_skipped + 5
+
+
+def test_a_reader_that_was_held_up_once_is_not_called_slow(benches: Benches) -> None:
+    bench = benches.live(frame_rate=30, n_queued=3)
+    bench.worker.measure(True)
+    bench.worker.start()
+    bench.wait_for_frames(5)
+    assert bench.worker.stats.skipped > 0
+    for _ in range(30):
+        bench.worker.next_frame(TIMEOUT)
+
+    assert bench.events.troubles(FramesSkipped) == []
+
+
+@pytest.mark.parametrize(
+    ("n_missed", "n_offered", "is_slow"),
+    [(19, 20, False), (20, 36, True), (20, 400, True), (20, 401, False)],
+)
+def test_a_computer_is_slow_when_many_images_and_a_good_share_are_missed(
+    n_missed: int, n_offered: int, is_slow: bool
+) -> None:
+    assert is_too_slow(n_missed, n_offered) is is_slow
 
 
 def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
@@ -348,12 +372,12 @@ def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
     bench.worker.measure(True)
     bench.worker.start()
     for _ in range(3):
-        bench.wait_for_frames(3)
+        bench.wait_for_frames(30)
         bench.worker.next_frame(TIMEOUT)
     assert len(bench.events.troubles(FramesSkipped)) == 1
     bench.worker.measure(False)
     bench.worker.measure(True)
-    bench.wait_for_frames(3)
+    bench.wait_for_frames(30)
 
     assert len(bench.events.troubles(FramesSkipped)) == 2
 

@@ -8,7 +8,8 @@ from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.hand import Operator
-from lightpen.session.following import FIRST_LEAN, Follower
+from lightpen.session.following import FIRST_LEAN, GENTLE_LEANS, UPRIGHT, Follower
+from lightpen.session.messages import Code, Message
 from lightpen.session.posture import Posture
 from lightpen.session.swing_state import Phase, SwingSetup, SwingState, start_swing
 from lightpen.simulator.swings import paper_camera, paper_pen
@@ -89,6 +90,42 @@ def test_the_hand_is_led_only_while_images_are_captured(
     Follower(operator).follow(replace(state, phase=phase))
 
     assert operator.told == []
+
+
+@pytest.fixture
+def seeking(state: SwingState) -> SwingState:
+    """Return a swing that asks for a gentle swing, to find where the tip rests."""
+    return replace(state, phase=Phase.SEEN, message=Message(Code.SWING_TO_SEAT))
+
+
+def test_asked_to_swing_gently_the_pen_goes_round_upright(
+    operator: ToldOperator, seeking: SwingState
+) -> None:
+    follower = Follower(operator)
+    for time in np.arange(0.0, 2.0, 0.05):
+        follower.follow(replace(seeking, time=float(time)))
+
+    assert operator.told == [*GENTLE_LEANS, GENTLE_LEANS[0]]
+
+
+def test_asked_to_put_the_tip_in_only_the_hand_stays(
+    operator: ToldOperator, seeking: SwingState
+) -> None:
+    Follower(operator).follow(replace(seeking, message=Message(Code.SEAT_TIP)))
+
+    assert operator.told == []
+
+
+def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
+    operator: ToldOperator, seeking: SwingState
+) -> None:
+    follower = Follower(operator)
+    follower.follow(seeking)
+    for phase in (Phase.SETTLED, Phase.COUNTDOWN, Phase.COUNTDOWN):
+        follower.follow(replace(seeking, phase=phase, message=Message(Code.HOLD_STILL)))
+    follower.follow(replace(seeking, phase=Phase.CAPTURING))
+
+    assert operator.told == [GENTLE_LEANS[0], UPRIGHT, ASKED]
 
 
 def test_after_a_pause_the_hand_is_led_anew(

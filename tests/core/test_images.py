@@ -1,7 +1,9 @@
 """Images from folders, patterns and videos; what is damaged is named."""
 
+import subprocess
+import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -119,6 +121,41 @@ def test_a_folder_without_images_is_refused(tmp_path: Path) -> None:
 def test_nothing_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="Check the name"):
         find_images(str(tmp_path / "missing"))
+
+
+TOLD = """
+import sys
+from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.errors import FileError
+from lightpen.images import find_images
+try:
+    find_images(sys.argv[1])
+except FileError as error:
+    print(error)
+try:
+    ReplayCamera(sys.argv[1]).open()
+except DeviceNotFound as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("place", ["", "inner"])
+def test_a_folder_that_may_not_be_looked_into_is_refused(
+    folder: Path, obedient: Sequence[str], place: str
+) -> None:
+    folder.chmod(0)
+    python = [sys.executable, "-X", "utf8", "-c", TOLD, str(folder / place)]
+    told = subprocess.run(
+        [*obedient, *python], capture_output=True, encoding="utf-8", check=True
+    )
+    folder.chmod(0o700)
+
+    sentence = (
+        f"The source of images {folder / place} cannot be read: Permission denied. "
+        "Check that it is yours to read and that its disk is connected."
+    )
+    assert told.stdout.splitlines() == [sentence, sentence]
 
 
 def test_a_video_that_is_none_is_refused(tmp_path: Path) -> None:

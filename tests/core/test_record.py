@@ -199,6 +199,26 @@ def test_damage_in_the_middle_is_refused_and_located(
     assert find_unfinished(tmp_path).interrupted == ()
 
 
+@pytest.mark.parametrize(
+    ("number", "sentence"),
+    [
+        (2, r"written by a later version of the program \(format 2; this version read"),
+        (0, "header.json is damaged"),
+        ("new", "header.json is damaged"),
+        (None, "header.json is damaged"),
+    ],
+)
+def test_a_record_of_another_format_is_refused(
+    tmp_path: Path, header: Header, number: object, sentence: str
+) -> None:
+    path = recorded(tmp_path / "swing", header, 1) / "header.json"
+    entries = json.loads(path.read_text("utf-8"))
+    path.write_text(json.dumps(entries | {"format": number}), "utf-8")
+
+    with pytest.raises(FileError, match=sentence):
+        open_record(path.parent)
+
+
 def test_one_program_at_a_time_writes_to_a_record(
     tmp_path: Path,
     header: Header,

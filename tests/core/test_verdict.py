@@ -18,6 +18,7 @@ from lightpen.session.verdict import (
     NextStep,
     Verdict,
     change_since,
+    distance_from_nominal,
     halves_agree,
     judge,
 )
@@ -102,6 +103,49 @@ def test_leds_that_do_not_fit_are_checked() -> None:
     assert verdict.reason.arguments[0] == noisy.joint.sigma
 
 
+def test_an_uncertainty_by_the_led_file_is_told_as_such(good: Calibration) -> None:
+    budget = replace(good.budget, leds=np.diag([0.0, 0.01**2, 0.0, 0.0, 0.0, 0.0]))
+    off = replace(good, budget=budget, geometry=replace(good.geometry, led_sigma=0.1))
+    assert budget.led_uncertainty == pytest.approx(0.02)
+
+    verdict = judge(off, SwingLimits(max_uncertainty=0.015))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == Message(Code.LEDS_OFF, (0.1, budget.led_uncertainty))
+    assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
+    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code is Code.GOOD
+
+    exact = replace(off, geometry=replace(good.geometry, led_sigma=0.01))
+    verdict = judge(exact, SwingLimits(max_uncertainty=0.015))
+    assert verdict.reason.code is Code.UNCERTAIN
+
+
+def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
+    leds = PEN.leds.copy()
+    leds[8, 1] += 3.0
+    wrong = replace(PEN, leds=leds)
+    swing = swing_poses(150, np.random.default_rng(0))
+    pixels: FloatArray = simulate_centers(
+        *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
+        np.random.default_rng(1),
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    calibration = calibrate(CAMERA, wrong, observe_centers(centers, CAMERA, wrong))
+
+    verdict = judge(calibration, SwingLimits(max_uncertainty=0.05))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code is Code.LED_DISPLACED
+    led, length = verdict.reason.arguments
+    assert led == 9
+    assert length == pytest.approx(3.0, abs=0.05)
+
+
+def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
+    tip = np.array([0.0, 140.0, 2.0])
+    assert distance_from_nominal(tip, None) is None
+    assert distance_from_nominal(tip + np.array([0.0, 2.9, 0.0]), tip) is None
+    assert distance_from_nominal(tip, tip - [3.0, 4.0, 0.0]) == pytest.approx(5.0)
+
+
 def test_many_dropped_images_are_checked(good: Calibration) -> None:
     used = good.used.copy()
     used[::4] = False
@@ -146,6 +190,8 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         (Code.HALVES_DIFFER, NextStep.REPEAT),
         (Code.MANY_DROPPED, NextStep.REPEAT),
         (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
+        (Code.LEDS_OFF, NextStep.CHECK_FILES),
+        (Code.LED_DISPLACED, NextStep.CHECK_FILES),
     ],
 )
 def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:

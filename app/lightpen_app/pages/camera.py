@@ -244,7 +244,8 @@ class CameraPage(Page):
     # What the camera does
 
     def _on_image_shown(self, shown: Shown) -> None:
-        if not self._is_shown:
+        is_live = self._live.connection is Connection.STREAMING
+        if not (self._is_shown and is_live):  # the last image comes after the loss
             return
         seen = shown.seen
         labels = None if seen.sighting is None else seen.sighting.labels

@@ -283,6 +283,7 @@ class LedsPage(Page):
         self._file.ask(question, self.tr("Discard them"), act)
 
     def _open(self, path: Path, units: str | None = None) -> None:
+        self.status_changed.emit("")
         self._file.ask_units("")
         try:
             file = PenFile.read(path, units)
@@ -306,13 +307,13 @@ class LedsPage(Page):
             return
         self._open_draft(PenDraft.of(pen), foreign=True)
         self._file.set_value(str(path))
-        self._refuse(sentence)
+        self._file.set_problem(sentence)
 
     def _refuse(self, sentence: str) -> None:
-        """Say why a file cannot be used, and which one is."""
-        in_use = self._bench.preparation.pen_file
-        if in_use is not None:
-            kept = self.tr("{0} stays in use.").format(in_use.path.name)
+        """Say why a file cannot be opened, and which one is open."""
+        still_open = self._file.value()
+        if still_open:
+            kept = self.tr("{0} stays open.").format(Path(still_open).name)
             sentence = f"{sentence} {kept}"
         self._file.set_problem(sentence)
 

@@ -14,12 +14,15 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.errors import FileError
-from lightpen.report import warnings_of
 from lightpen.session.results import Result, last_result
 from lightpen.session.solving import Solution
-from lightpen.session.verdict import USUAL_CHANGE, NextStep, Verdict
+from lightpen.session.verdict import (
+    NextStep,
+    Verdict,
+)
 from lightpen_app.grades import GRADE_MARKS
 from lightpen_app.pages.page import MainAction, Page
+from lightpen_app.pages.review_doubts import ReviewDoubts
 from lightpen_app.pages.review_images import ImagesPanel
 from lightpen_app.pages.review_plots import (
     MethodsPanel,
@@ -57,13 +60,14 @@ class ReviewPage(Page):
 
     def __init__(self, services: Services, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._bench = services.bench
+        self._doubts = ReviewDoubts(self)
         self._run = services.bench.run
         self._is_narrow = False
         self._solution: Solution | None = None
         self._last: Result | None = None
         self._told: tuple[object, ...] = ()
         self._wants_more = False
-
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
@@ -310,11 +314,7 @@ class ReviewPage(Page):
         if solution is not self._solution:
             self._solution = solution
             self._question.hide()
-            if solution is not None:
-                self._last = self._last_accepted()
-            self._result.set_value(
-                None if solution is None else Outcome(solution, self._last)
-            )
+            self._result.set_value(self._outcome(solution))
         self._fill_tab()
         self._refresh_words()
 
@@ -324,6 +324,11 @@ class ReviewPage(Page):
             is_seen = tab is self._tabs.currentWidget()
             if is_seen and panel.value() is not self._solution:
                 panel.set_value(self._solution)
+
+    def _outcome(self, solution: Solution | None) -> Outcome | None:
+        if solution is None:
+            return None
+        return Outcome(solution, self._run.names, self._last_accepted())
 
     def _last_accepted(self) -> Result | None:
         names = self._run.names
@@ -375,18 +380,10 @@ class ReviewPage(Page):
         return State(word, said.hint, sign, tone)
 
     def _warnings(self) -> tuple[Remark, ...]:
-        if self._solution is None:
+        outcome = self._result.value()
+        if outcome is None:
             return ()
-        texts = warnings_of(self._solution.calibration)
-        change = Outcome(self._solution, self._last).change
-        if change is not None and self._last is not None and change.is_unusual:
-            text = self.tr(
-                "The tip lies {0} mm from the calibration of {1} (usual change: {2} "
-                "mm). Was the tip exchanged?"
-            )
-            date = f"{self._last.accepted.astimezone():%Y-%m-%d}"
-            distance = f"{change.distance:.3f}"
-            texts = [text.format(distance, date, USUAL_CHANGE), *texts]
+        texts = self._doubts.sentences(outcome, self._bench.preparation.names)
         return tuple(Remark(text, Sign.WARNING, Tone.WARN) for text in texts)
 
     def _on_progressed(self, fraction: float) -> None:

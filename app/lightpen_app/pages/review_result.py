@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from lightpen.arrays import FloatArray
+from lightpen.session.preparation import Names
 from lightpen.session.results import Result
 from lightpen.session.solving import Solution
 from lightpen.session.verdict import Change, change_since, halves_agree
@@ -15,6 +16,7 @@ from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.signs import Sign
 from lightpen_app.widgets.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.words import shortened
 
 BLANK = ("", "", "")
 
@@ -26,11 +28,14 @@ class Outcome:
     Attributes
     ----------
     solution : Solution
+    names : Names
+        Of what was swung.
     last : Result or None
         The last accepted result of this pen and tip.
     """
 
     solution: Solution
+    names: Names
     last: Result | None = None
 
     @property
@@ -96,15 +101,13 @@ class ResultPanel(Translated, QFrame):
         self._refresh()
 
     def _retranslate(self) -> None:
-        self._heading.setText(
-            self.tr("Tip in the frame of the pen / mm, with U (k = 2)")
-        )
         self._comparison.setText(self.tr("Differences / \xb5m"))
         self._table.setAccessibleName(self.tr("Differences"))
         self._refresh()
 
     def _refresh(self) -> None:
         outcome = self._value
+        self._heading.setText(self._heading_text(outcome))
         if outcome is None:
             self._readout.set_value(None)
             self._table.set_value(Figures())
@@ -124,6 +127,12 @@ class ResultPanel(Translated, QFrame):
             if whole
             else Remark(text, Sign.RING, Tone.PLAIN)
         )
+
+    def _heading_text(self, outcome: Outcome | None) -> str:
+        if outcome is None:
+            return self.tr("Tip in the frame of the pen / mm, with U (k = 2)")
+        text = self.tr("Tip {0} in the frame of pen {1} / mm, with U (k = 2)")
+        return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
 
     def _differences(self, outcome: Outcome) -> Figures:
         rows: list[tuple[str, tuple[str, ...]]] = []

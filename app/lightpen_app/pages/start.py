@@ -68,12 +68,12 @@ class StartPage(Page):
         self._searching = QTimer(self, singleShot=True, interval=0)
 
         # Layout
-        left = QVBoxLayout()
+        self._left = left = QVBoxLayout()
         left.setSpacing(2 * GRID)
         left.addWidget(self._names)
         left.addWidget(self._limits)
         left.addStretch(1)
-        right = QVBoxLayout()
+        self._right = right = QVBoxLayout()
         right.setSpacing(2 * GRID)
         right.addWidget(self._interrupted)
         right.addWidget(self._last)
@@ -158,6 +158,10 @@ class StartPage(Page):
         self._columns.setDirection(
             direction.TopToBottom if is_narrow else direction.LeftToRight
         )
+        # What waits for an answer comes first.
+        column = self._left if is_narrow else self._right
+        if column.indexOf(self._interrupted) < 0:
+            column.insertWidget(0, self._interrupted)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

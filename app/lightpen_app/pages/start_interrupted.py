@@ -3,9 +3,8 @@
 One that another program captures, or that is damaged, is told of and not offered.
 """
 
-import re
-
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGroupBox,
@@ -14,6 +13,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from typing_extensions import override
 
 from lightpen.session.interrupted import DamagedSwing, Unfinished
 from lightpen.session.preparation import recorded_names
@@ -22,12 +22,11 @@ from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.words import PARTED, moment_text, shortened
+from lightpen_app.words import PARTED, breakable, moment_text, shortened, unbroken
 
 ROW_HEIGHT, SENTENCE_HEIGHT = 7 * GRID, 17 * GRID
 LONGEST = 16  # characters of a name
 N_ROWS_SEEN = 2  # the others are scrolled to
-BREAK = "\u200b"  # where a line may end, though no blank is there
 NEVER = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
 
 
@@ -106,7 +105,14 @@ class InterruptedRow(Translated, QFrame):
 
     def words(self) -> tuple[str, str]:
         """Return what the row says."""
-        return self._when.text(), self._what.text().replace(BREAK, "")
+        return self._when.text(), unbroken(self._what.text())
+
+    def height_for(self, width: int) -> int:
+        """Return how high the row must be to show its words whole, px."""
+        least = SENTENCE_HEIGHT if isinstance(self._swing, DamagedSwing) else ROW_HEIGHT
+        for each in self.findChildren(QWidget):
+            each.ensurePolished()  # its font is known only then
+        return max(least, self.heightForWidth(width))
 
     def set_waiting(self, why: str) -> None:
         """Disable the buttons for a reason, or enable them for none."""
@@ -140,7 +146,7 @@ class InterruptedRow(Translated, QFrame):
 
     def _description(self) -> str:
         if isinstance(self._swing, DamagedSwing):
-            return _breakable(self._swing.sentence)
+            return breakable(self._swing.sentence)
         if self._is_under_way:
             return self.tr("Another program is capturing it.")
         names, n_images = recorded_names(self._swing), len(self._swing.images)
@@ -226,13 +232,16 @@ class InterruptedPanel(Translated, QGroupBox):
             layout.addWidget(row)
         layout.addStretch(1)
         self._scroll.setWidget(content)
-        n_whole = len(swings.interrupted) + len(swings.under_way)
-        heights = [ROW_HEIGHT] * n_whole + [SENTENCE_HEIGHT] * len(swings.damaged)
-        self._scroll.setFixedHeight(sum(h + GRID for h in heights[:N_ROWS_SEEN]))
         self._hint.setVisible(bool(swings.interrupted))
         self._again.setVisible(bool(swings.under_way or swings.damaged))
         self._retranslate()
         self.setVisible(bool(self._rows))
+        self._hold_rows()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._hold_rows()
 
     def rows(self) -> tuple[InterruptedRow, ...]:
         """Return the rows: what is offered, under way, and damaged."""
@@ -242,6 +251,12 @@ class InterruptedPanel(Translated, QGroupBox):
         """Disable the buttons for a reason, or enable them for none."""
         for row in self._rows:
             row.set_waiting(why)
+
+    def _hold_rows(self) -> None:
+        """Let the first rows be seen whole, however their words are wrapped."""
+        width = self._scroll.viewport().width() - GRID
+        heights = (row.height_for(width) + GRID for row in self._rows[:N_ROWS_SEEN])
+        self._scroll.setFixedHeight(sum(heights))
 
     def _row(
         self, swing: Record | DamagedSwing, is_under_way: bool = False
@@ -263,11 +278,6 @@ class InterruptedPanel(Translated, QGroupBox):
             self.tr("Resumed, it has all its images and the files it began with.")
         )
         self._again.setText(self.tr("Look again"))
-
-
-def _breakable(sentence: str) -> str:
-    """Let a path take more than one line."""
-    return re.sub(r"([/\\_])", rf"\1{BREAK}", sentence)
 
 
 def _button_row(*buttons: QPushButton) -> QWidget:

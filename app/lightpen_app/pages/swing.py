@@ -233,6 +233,7 @@ class SwingPage(Page):
             is_troubled=self._flow.is_troubled,
             solving=self._solved if self._run.is_solving else None,
             verdict=self._run.verdict,
+            is_accepted=self._run.result is not None,
             stillness=self._sight.stillness(),
             is_simulated=self._live.operator is not None,
         )

@@ -23,7 +23,7 @@ class SwingFlow(QObject):
     changed()
         `refusal` or `is_troubled` is different.
     troubled(str)
-        A sentence to be read.
+        A sentence to be read; empty where none is any more.
     """
 
     changed = Signal()
@@ -71,6 +71,8 @@ class SwingFlow(QObject):
         """Begin or go on: the page is shown."""
         self._is_shown = True
         self._refusal = ""
+        if self._run.result is not None:  # nothing more belongs to that swing
+            self._run.abandon()
         if self._paused_by_leaving:
             self._paused_by_leaving = False
             self._resume()
@@ -141,6 +143,8 @@ class SwingFlow(QObject):
             self._refusal = str(error)
             self.troubled.emit(self._refusal)
             self.changed.emit()
+            return
+        self.troubled.emit("")
 
     def _on_run_changed(self) -> None:
         folder = self._run.record_folder

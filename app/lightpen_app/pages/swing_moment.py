@@ -55,6 +55,8 @@ class Moment:
     solving : float or None
         How far the tip is computed, 0 to 1; None while it is not.
     verdict : Verdict or None
+    is_accepted : bool
+        Whether the tip is in force.
     stillness : float
         How long the pen has been upright and still after the verdict: 1 is enough.
     is_simulated : bool
@@ -69,6 +71,7 @@ class Moment:
     is_troubled: bool = False
     solving: float | None = None
     verdict: Verdict | None = None
+    is_accepted: bool = False
     stillness: float = 0.0
     is_simulated: bool = False
 
@@ -135,6 +138,8 @@ class SwingWords(QObject):
                 self.tr("The images are kept. Compute the tip again, or start over."),
             )
         told = phrase(message, heading)
+        if moment.is_accepted:
+            return Phrase(self.tr("Accepted"), self.tr("Put the pen down."))
         if moment.verdict is not None:
             return self._next_step(moment.verdict.grade)
         if moment.is_troubled and state.pause is Pause.BY_USER:
@@ -198,6 +203,9 @@ class SwingWords(QObject):
                 phrase(moment.state.message, moment.state.heading).hint,
                 *_LOOKS[Phase.VERDICT],
             )
+        if moment.is_accepted:
+            words = self.tr("The tip is used from now on.")
+            return State(self.tr("IN FORCE"), words, Sign.CHECK, Tone.GOOD)
         told = phrase(moment.verdict.reason, moment.state.heading)
         grade = moment.verdict.grade
         sign, tone = GRADE_MARKS[grade]

@@ -60,7 +60,11 @@ class ActionBar(Translated, QFrame):
     def set_action(self, action: MainAction, *, can_go_back: bool) -> None:
         """Show another main action."""
         self._main.setText(action.text)
+        if action.why_not and self._main.hasFocus():
+            self.setFocus()  # kept for the button, until it can be pressed again
         self._main.setEnabled(not action.why_not)
+        if not action.why_not and self.hasFocus():
+            self._main.setFocus()
         self._main.setAccessibleDescription(action.why_not)
         self._why_not.setText(action.why_not)
         self._why_not.setVisible(bool(action.why_not))

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QSize, Qt
+from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -28,7 +28,13 @@ LABELLED = (1, 2, 5)  # of each decade
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
 
+PLACES = (0.2, 0.8)  # of the width, where the words of a limit may stand
+ABOVE, BELOW = (0.5, 1.0), (0.5, 0.0)  # which point of the words is on the line
+
 Column: TypeAlias = FloatArray | tuple[str, ...]
+# As pyqtgraph hands them to `drawPicture`: line, ticks, and place, flags and text.
+TextSpec: TypeAlias = tuple[QRectF, Qt.AlignmentFlag, str]
+DrawSpecs: TypeAlias = tuple[tuple[object, ...], list[object], list[TextSpec]]
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,24 @@ class Axes:
 
 
 class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]
-    """An axis whose decades read 10, 20, 50, 100, and not 1e+02."""
+    """An axis whose decades read 10, 20, 50, 100, and not 1e+02.
+
+    Of numbers that would overlap only as many are drawn as there is room for.
+    """
+
+    @override
+    def generateDrawSpecs(self, p: QPainter) -> DrawSpecs | None:
+        specs: DrawSpecs | None = super().generateDrawSpecs(p)
+        if specs is None:
+            return None
+        line, ticks, words = specs
+        if self.logMode:
+            words = sorted(words, key=_is_between_decades)
+        free: list[TextSpec] = []
+        for each in words:
+            if each[2] and not any(each[0].intersects(other[0]) for other in free):
+                free.append(each)
+        return line, ticks, free
 
     @override
     def logTickStrings(
@@ -58,6 +81,11 @@ class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]
         numbers = (10 ** float(value) for value in values)
         leading = ((number, float(f"{number:e}"[:3])) for number in numbers)
         return [f"{number:g}" if digit in LABELLED else "" for number, digit in leading]
+
+
+def _is_between_decades(spec: TextSpec) -> bool:
+    """Return whether a number is no power of ten; they are drawn first."""
+    return spec[2].strip("0.") != "1"
 
 
 class Plot(QWidget):
@@ -260,7 +288,7 @@ class TracePlot(Plot):
         left.setLogMode(y_log)
         left.setWidth(LEFT_WIDTH)
         self._item.layout.setContentsMargins(0, 0, 2 * GRID, 0)
-        self._item.setRange(xRange=(1, N_LEAST), yRange=(0, 1), padding=0.01)
+        self._show_nothing()
         for _ in curves:
             curve = pg.PlotCurveItem()
             curve.setSegmentedLineMode("on")
@@ -270,8 +298,11 @@ class TracePlot(Plot):
         place = 0.2 if y_log else 0.8
         words = {"position": place}
         self._limit = pg.InfiniteLine(angle=0, movable=False, label="", labelOpts=words)
+        self._limit.label.setFont(font(TextSize.SMALL))
+        self._limit.label.textItem.document().setDocumentMargin(1)
         self._limit.hide()
         self._item.addItem(self._limit)
+        self._item.vb.sigResized.connect(self._on_area_resized)
         self._restyle()
 
     def set_data(self, x: FloatArray, *values: FloatArray) -> None:
@@ -280,14 +311,7 @@ class TracePlot(Plot):
         heights = [self._height(value) for value in values]
         for curve, height in zip(self._curves, heights, strict=True):
             curve.setData(x, height, connect="finite")
-        if len(x):
-            n_hidden = int((1 - self._tail) * len(x))
-            in_sight = [height[n_hidden:] for height in heights]
-            if self._limit_at is not None:
-                reach = (1.0, LABEL_ROOM if self._y_log else 1.0)
-                in_sight.append(self._height(self._limit_at * np.array(reach)))
-            room = np.append(x, x.min() + N_LEAST - 1)
-            self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero)
+        self._show_range()
 
     def set_limit(self, value: float | None, text: str = "") -> None:
         """Draw a limit line with words on it, or none."""
@@ -297,6 +321,83 @@ class TracePlot(Plot):
         if value is not None:
             self._limit.setValue(float(self._height(np.array([value]))[0]))
             self._limit.label.setFormat(text)
+        self._place_words()
+
+    def words_cover(self) -> float:
+        """Return how much of the curves the words of the limit cover, px."""
+        assert self._limit is not None
+        label = self._limit.label
+        return self._n_covered(label.orthoPos, label.anchors[0])
+
+    def _show_range(self) -> None:
+        """Show what has to be in sight, with room for the words of the limit."""
+        x, *values = map(np.asarray, self._columns.values())
+        if not len(x):
+            self._show_nothing()
+            return
+        n_hidden = int((1 - self._tail) * len(x))
+        in_sight = [self._height(value)[n_hidden:] for value in values]
+        if self._limit_at is not None:
+            reach = (1.0, LABEL_ROOM if self._y_log else 1.0)
+            in_sight.append(self._height(self._limit_at * np.array(reach)))
+        room = np.append(x, x.min() + N_LEAST - 1)
+        self._fit(room, np.concatenate(in_sight), y_zero=self._y_zero)
+        self._place_words()
+        if self._limit_at is not None and self.words_cover():
+            self._make_room()
+
+    def _on_area_resized(self) -> None:
+        if self._columns:
+            self._show_range()
+
+    def _show_nothing(self) -> None:
+        """Show the axes as they are before the first image."""
+        self._item.setRange(xRange=(1, N_LEAST), yRange=(0, 1), padding=0.01)
+
+    def _place_words(self) -> None:
+        """Put the words of the limit where they cover the least of the curves."""
+        if self._limit is None or self._limit_at is None:
+            return
+        label = self._limit.label
+        sides = (BELOW, ABOVE)
+        if self._limit.value() < sum(self.ranges()[1]) / 2:
+            sides = (ABOVE, BELOW)
+        firsts = PLACES if self._y_log else PLACES[::-1]
+        tried = [(place, side) for side in sides for place in firsts]
+        place, side = min(tried, key=lambda each: self._n_covered(*each))
+        label.anchors = [side, side]
+        label.setPosition(place)
+
+    def _make_room(self) -> None:
+        """Show so much below the limit that its words are under the curves."""
+        assert self._limit is not None
+        (_, _), (low, high) = self.ranges()
+        words = self._limit.label.textItem.boundingRect()
+        share = min(words.height() / max(self._item.vb.height(), 1.0), 0.75)
+        needed = (self._limit.value() - share * high) / (1 - share)
+        self._item.setYRange(min(low, needed), high, padding=0.01)
+        self._place_words()
+
+    def _n_covered(self, place: float, side: tuple[float, float]) -> float:
+        """Return how much of the curves and of the edges words would cover, px."""
+        assert self._limit is not None
+        (left, right), (low, high) = self.ranges()
+        area, words = self._item.vb, self._limit.label.textItem.boundingRect()
+        x_scale = area.width() / (right - left)
+        y_scale = area.height() / (high - low)
+        top = (high - self._limit.value()) * y_scale - side[1] * words.height()
+        middle = place * area.width()
+        bottom = top + words.height()
+        outside = max(-top, 0.0) + max(bottom - area.height(), 0.0)
+        columns = np.arange(middle - words.width() / 2, middle + words.width() / 2)
+        covered = 0
+        for curve in self._curves:
+            x, y = curve.getData()
+            if x is None or len(x) < 2:
+                continue
+            rows = (high - np.interp(columns / x_scale + left, x, y)) * y_scale
+            covered += int(np.sum((rows >= top) & (rows <= bottom)))
+        return float(covered + area.width() * outside)
 
     def _height(self, values: FloatArray) -> FloatArray:
         """Return how high values (N,) are drawn."""
@@ -315,6 +416,7 @@ class TracePlot(Plot):
             pen = pg.mkPen(colors.muted, width=1, style=Qt.PenStyle.DashLine)
             self._limit.setPen(pen)
             self._limit.label.setColor(QColor(colors.muted))
+            self._limit.label.fill = pg.mkBrush(colors.panel)
         if len(self._curves) > 1:  # beside the title they hide nothing
             title = title_with_names(self._axes.title, self._legend, colors)
             self._item.titleLabel.setText(title)

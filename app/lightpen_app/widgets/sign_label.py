@@ -9,6 +9,7 @@ from typing_extensions import override
 
 from lightpen_app.theme import GRID, TextSize, Tone, colors_of, set_tone, text_label
 from lightpen_app.widgets.signs import Sign, draw_sign
+from lightpen_app.words import breakable
 
 SIDE = 2 * GRID
 
@@ -67,7 +68,7 @@ class SignLabel(QWidget):
             return
         self._value = value
         self._mark.set_value(value)
-        self._words.setText(value.text)
+        self._words.setText(breakable(value.text))
         set_tone(self._words, value.tone)
         self.setAccessibleName(value.text)
         self.setVisible(bool(value.text))

@@ -1,5 +1,6 @@
 """Recorded images as a live camera, at the rate they were taken or as fast as asked."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,7 @@ from lightpen.cameras.protocol import (
     Caps,
     ConfigError,
     DeviceInfo,
+    DeviceLost,
     DeviceNotFound,
     EndOfImages,
     Frame,
@@ -23,6 +25,7 @@ from lightpen.cameras.protocol import (
     sealed,
 )
 from lightpen.errors import FileError
+from lightpen.files import printable
 from lightpen.images import ImageSource, find_images
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
@@ -36,10 +39,11 @@ def find_recording(where: str) -> ImageSource:
     Raises
     ------
     FileError
-        There are none.
+        There are none, or they may not be looked at.
     """
     inner = Path(where) / IMAGE_FOLDER
-    return find_images(str(inner) if inner.is_dir() else where)
+    has_inner = os.path.isdir(inner)  # noqa: PTH112 - of one who may not look, too
+    return find_images(str(inner) if has_inner else where)
 
 
 class ReplayCamera:
@@ -80,6 +84,7 @@ class ReplayCamera:
         self._source: ImageSource | None = None
         self._caps: Caps | None = None
         self._loaders: Iterator[Callable[[], Image]] | None = None
+        self._n_unread = 0  # images in succession
 
     @property
     def serial(self) -> str:
@@ -147,6 +152,7 @@ class ReplayCamera:
         self.probe()
         if self._loaders is None:
             self._loaders = self._open_source()
+            self._n_unread = 0
             self._next_due_ns = self._clock.now_ns()
 
     def stop(self) -> None:
@@ -154,7 +160,15 @@ class ReplayCamera:
         self._loaders = None
 
     def read(self, timeout_s: float) -> Frame:
-        """Return the next image, decoded now."""
+        """Return the next image, decoded now.
+
+        Raises
+        ------
+        FrameIncomplete
+            The image cannot be read.
+        DeviceLost
+            Nor can any other.
+        """
         if self._loaders is None:
             raise ValueError("The camera delivers no images: call `start` first.")
         self._await_turn(timeout_s)
@@ -213,7 +227,14 @@ class ReplayCamera:
             _check_like_first(image, seq, self.caps)
         except FileError as error:
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
+            self._n_unread += 1
+            if self._is_gone():
+                raise DeviceLost(
+                    f"No image of {printable(self._where)} can be read any more. "
+                    "Connect its disk or put the images back, or choose others."
+                ) from error
             raise FrameIncomplete(str(error)) from error
+        self._n_unread = 0
         return Frame(
             image=sealed(image),
             seq=seq,
@@ -221,6 +242,14 @@ class ReplayCamera:
             pixel_format=self.caps.pixel_formats[0],
             bits=8 * image.itemsize,
         )
+
+    def _is_gone(self) -> bool:
+        """Return whether no file is there, or none could be read in a whole round."""
+        if self._source is None:
+            return True
+        files = self._source.files
+        is_there = not files or any(os.access(file, os.R_OK) for file in files)
+        return not is_there or self._n_unread >= len(self._source.names)
 
 
 class ReplayBackend:

@@ -42,6 +42,10 @@ LONGEST_BUSY = 4.0  # s
 BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
 REQUEST_PAUSE = 0.5  # s between probes of a camera that waits for a trigger
 LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
+# Of the images since measuring began, skipped by a computer that is too slow; fewer
+# are skipped when something else holds it up once.
+LEAST_SKIPPED = 20
+SKIPPED_SHARE = 0.05
 
 
 class Connection(Enum):
@@ -139,6 +143,7 @@ class CameraWorker:
         self._connection: Connection | None = None
         self._stats = Stats()
         self._n_skipped = 0
+        self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
         self._heard_ns = 0
         self._n_triggered = 0
@@ -190,6 +195,7 @@ class CameraWorker:
         """Begin or stop to queue every frame for `next_frame`; none is left over."""
         if measures and not self._measures.is_set():
             self._queue.clear()
+            self._n_offered = self._n_missed = 0
             self._told_of_skipping = False
             self._measures.set()
         elif not measures:
@@ -275,11 +281,16 @@ class CameraWorker:
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
             self._queue.put(frame)
-        elif not self._queue.offer(frame) and not self._stopping.is_set():
-            self._n_skipped += 1
-            if not self._told_of_skipping:  # once is enough until measured anew
-                self._told_of_skipping = True
-                self._on_event(Troubled(_too_slow(frame)))
+            return
+        self._n_offered += 1
+        if self._queue.offer(frame) or self._stopping.is_set():
+            return
+        self._n_skipped += 1
+        self._n_missed += 1
+        is_slow = is_too_slow(self._n_missed, self._n_offered)
+        if is_slow and not self._told_of_skipping:  # once is enough until measured anew
+            self._told_of_skipping = True
+            self._on_event(Troubled(_too_slow(self._n_missed, self._n_offered)))
 
     def _quiet_time(self) -> float:
         """Return how long no image may come before the camera is probed, s."""
@@ -398,12 +409,17 @@ class CameraWorker:
             self._on_event(ConnectionChanged(connection))
 
 
+def is_too_slow(n_missed: int, n_offered: int) -> bool:
+    """Return whether so many images were missed that it was not one hold-up."""
+    return n_missed >= max(LEAST_SKIPPED, SKIPPED_SHARE * n_offered)
+
+
 def _wake() -> None:
     """Do nothing: the request that ends a wait for requests."""
 
 
-def _too_slow(frame: Frame) -> FramesSkipped:
+def _too_slow(n_missed: int, n_offered: int) -> FramesSkipped:
     return FramesSkipped(
-        f"This computer is too slow: image {frame.seq} and some after it were not "
-        "measured. Close other programs, or lower the frame rate."
+        f"This computer is too slow: {n_missed} of {n_offered} images were not "
+        "measured. Close other programs, or the swing takes longer."
     )

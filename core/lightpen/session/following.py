@@ -1,10 +1,16 @@
 """A simulated operator who does what the program asks for."""
 
+from math import pi
+
 from lightpen.cameras.hand import Operator
+from lightpen.session.messages import Code
 from lightpen.session.posture import Posture
 from lightpen.session.swing_state import Phase, SwingState
 
 FIRST_LEAN = Posture(tilt=0.35, direction=0.0, turn=0.0)
+UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
+GENTLE_LEANS = tuple(Posture(0.2, i * 2 * pi / 3, 0.0) for i in range(3))
+LEAN_TIME = 0.6  # s until the next one
 
 
 class Follower:
@@ -24,12 +30,23 @@ class Follower:
 
     def follow(self, state: SwingState) -> None:
         """Do what a state of the swing asks for."""
-        if state.phase is not Phase.CAPTURING:
+        swings = state.phase is Phase.SEEN and state.message.code is Code.SWING_TO_SEAT
+        if swings:
+            step = int((state.time - state.since) / LEAN_TIME)
+            self._lean_towards(GENTLE_LEANS[step % len(GENTLE_LEANS)])
+        elif state.phase is Phase.CAPTURING:
+            self._lean_towards(self._wanted(state))
+        elif self._wish in GENTLE_LEANS:  # so that the first lean is told from these
+            self._lean_towards(UPRIGHT)
+        elif self._wish != UPRIGHT:
             self._wish = None  # a hand that was stopped must be led anew
-            return
-        wish = state.target
+
+    def _wanted(self, state: SwingState) -> Posture | None:
         if state.heading is None:
-            wish = Posture(FIRST_LEAN.tilt, self._heading, FIRST_LEAN.turn)
+            return Posture(FIRST_LEAN.tilt, self._heading, FIRST_LEAN.turn)
+        return state.target
+
+    def _lean_towards(self, wish: Posture | None) -> None:
         if wish is not None and wish != self._wish:
             self._wish = wish
             self._operator.lean_towards(wish.tilt, wish.direction, wish.turn)

@@ -33,6 +33,8 @@ class Code(StrEnum):
     UNCERTAIN = "uncertain"  # U and its limit, mm; perhaps images missing
     HALVES_DIFFER = "halves differ"  # difference and its U, mm
     MANY_DROPPED = "many dropped"  # dropped and taken
+    LEDS_OFF = "LEDs off"  # standard deviation of a coordinate, U by it alone, mm
+    LED_DISPLACED = "LED displaced"  # its number, by how much, mm
     LEDS_MISFIT = "LEDs misfit"  # sigma and what is usual, px
     NO_TIP = "no tip"  # the sentence
     GOOD = "good"  # U, mm

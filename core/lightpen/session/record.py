@@ -34,7 +34,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.camera import Camera
 from lightpen.errors import FileError
-from lightpen.files import MEGABYTE, printable, read_bytes
+from lightpen.files import MEGABYTE, printable, read_bytes, unreadable
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
 from lightpen.images import MAX_FILE_SIZE, ImageSource, decode_image
@@ -206,7 +206,8 @@ def open_record(folder: Path) -> Record:
     Raises
     ------
     FileError
-        The folder is no record, or its files are damaged other than by a crash.
+        The folder is no record, or its files are damaged other than by a crash, or
+        written by a later version of the program.
     """
     header = _read_header(folder)
     images: list[RecordedImage] = []
@@ -250,8 +251,39 @@ def record_files(record: Record) -> tuple[Path, ...]:
 
 
 def is_record(folder: Path) -> bool:
-    """Return whether a folder is a record."""
-    return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
+    """Return whether a folder is a record.
+
+    Raises
+    ------
+    FileError
+        The folder may not be looked into.
+    """
+    try:
+        return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
+    except OSError as error:
+        raise unreadable(folder, "folder", error) from error
+
+
+def missing_parts(folder: Path) -> tuple[str, ...]:
+    """Return what a folder lacks that looks like a record; nothing of any other."""
+    parts = (HEADER, JOURNAL, IMAGES)
+    missing = tuple(name for name in parts if not (folder / name).exists())
+    return missing if len(missing) < len(parts) else ()
+
+
+def unacknowledged_images(record: Record) -> tuple[str, ...]:
+    """Return the images in the folder of a record that its journal does not name.
+
+    A crash, or a journal that was cut, leaves them; they take no part.
+
+    Returns
+    -------
+    tuple of str
+        Files, from the folder of the record, in their order.
+    """
+    known = {image_name(image.number) for image in record.images}
+    found = (f"{IMAGES}/{path.name}" for path in (record.folder / IMAGES).glob("*.png"))
+    return tuple(sorted(set(found) - known))
 
 
 def ends_in_verdict(folder: Path) -> bool:
@@ -374,6 +406,10 @@ def _read_header(folder: Path) -> Header:
     data = read_bytes(path, "record's header", HEADER_LIMIT)
     try:
         entries = json.loads(data)
+        if entries["format"] > FORMAT:
+            raise _of_later_version(path, entries["format"])
+        if entries["format"] != FORMAT:
+            raise ValueError(entries["format"])
         tip = entries["nominal_tip_mm"]
         return Header(
             camera=_read_copy(folder, "camera", entries["camera_file"]),
@@ -394,6 +430,13 @@ def _read_header(folder: Path) -> Header:
         raise FileError(
             f"{printable(str(path))} is damaged. Restore it from a copy."
         ) from error
+
+
+def _of_later_version(path: Path, number: Any) -> FileError:
+    return FileError(
+        f"{printable(str(path))} was written by a later version of the program (format "
+        f"{number}; this version reads {FORMAT}). Open the record with that version."
+    )
 
 
 def _read_copy(folder: Path, stem: str, entries: Mapping[str, str]) -> FileCopy:

@@ -7,6 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.calibrate import USUAL_SIGMA, Calibration
+from lightpen.led_quality import DISPLACED
 from lightpen.session.messages import Code, Message
 from lightpen.session.swing_state import SwingLimits, dial_counts
 from lightpen.uncertainty import Halves
@@ -14,6 +15,7 @@ from lightpen.uncertainty import Halves
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 MANY_DROPPED = 0.2  # of the images
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
+FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
 USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
 
 
@@ -65,6 +67,8 @@ _NEXT_STEPS = {
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
     Code.MANY_DROPPED: NextStep.REPEAT,
+    Code.LEDS_OFF: NextStep.CHECK_FILES,
+    Code.LED_DISPLACED: NextStep.CHECK_FILES,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
 }
 
@@ -106,6 +110,16 @@ def change_since(
     return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
 
 
+def distance_from_nominal(
+    tip_pen: FloatArray, nominal_tip: FloatArray | None
+) -> float | None:
+    """Return how far a tip lies from its place by design, mm, if that is too far."""
+    if nominal_tip is None:
+        return None
+    distance = float(np.linalg.norm(tip_pen - nominal_tip))
+    return distance if distance > FAR_FROM_NOMINAL else None
+
+
 def halves_agree(halves: Halves) -> bool:
     """Return whether the odd and the even images differ no more than by chance."""
     within = np.abs(halves.difference) <= HALVES_GATE * halves.expanded_uncertainty
@@ -117,6 +131,10 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
     uncertain = Message(Code.UNCERTAIN, (uncertainty, limit))
+    by_leds = calibration.budget.led_uncertainty
+    led_sigma = calibration.geometry.led_sigma
+    if by_leds > limit and led_sigma > DISPLACED:  # more images hardly change it
+        uncertain = Message(Code.LEDS_OFF, (led_sigma, by_leds))
     if uncertainty > FAR_OFF * limit:
         return Verdict(Grade.REPEAT, uncertain)
     differences = np.abs(calibration.halves.difference)
@@ -131,6 +149,11 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     if calibration.joint.sigma > USUAL_SIGMA:
         figures = (calibration.joint.sigma, USUAL_SIGMA)
         return Verdict(Grade.CHECK, Message(Code.LEDS_MISFIT, figures))
+    if calibration.leds.displaced:
+        lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
+        led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
+        displaced = Message(Code.LED_DISPLACED, (led, float(lengths[led - 1])))
+        return Verdict(Grade.CHECK, displaced)
     n_images, n_used = len(calibration.used), int(calibration.used.sum())
     if n_images - n_used > MANY_DROPPED * n_images:
         dropped = Message(Code.MANY_DROPPED, (n_images - n_used, n_images))

@@ -877,8 +877,8 @@
         <translation>放弃修改</translation>
     </message>
     <message>
-        <source>{0} stays in use.</source>
-        <translation>仍使用 {0}。</translation>
+        <source>{0} stays open.</source>
+        <translation>{0} 仍处于打开状态。</translation>
     </message>
     <message>
         <source>The LEDs are saved as {0} and in use.</source>
@@ -1030,8 +1030,8 @@
         <translation>仍然关闭</translation>
     </message>
     <message>
-        <source>Lightpen: pen tip calibration</source>
-        <translation>Lightpen：光笔测头校准</translation>
+        <source>Pen tip calibration</source>
+        <translation>光笔测头校准</translation>
     </message>
 </context>
 <context>
@@ -1409,6 +1409,10 @@
         <translation>使用 {0} / {1} 幅图像</translation>
     </message>
     <message>
+        <source>Tip {0} in the frame of pen {1} / mm, with U (k = 2)</source>
+        <translation>测头 {0}（光笔 {1} 坐标系）/ mm，含 U (k = 2)</translation>
+    </message>
+    <message>
         <source>its U (k = 2)</source>
         <translation>其 U (k = 2)</translation>
     </message>
@@ -1439,6 +1443,21 @@
     <message>
         <source>Odd and even images differ by more than chance</source>
         <translation>奇数与偶数图像的差异超出随机范围</translation>
+    </message>
+</context>
+<context>
+    <name>ReviewDoubts</name>
+    <message>
+        <source>This swing is of tip {0}, pen {1}, whatever the step Start names now: tip {2}, pen {3}.</source>
+        <translation>本次摆动属于测头 {0}、光笔 {1}；“开始”步骤现在填写的是测头 {2}、光笔 {3}。</translation>
+    </message>
+    <message>
+        <source>The tip lies {0} mm from the calibration of {1} (usual change: {2} mm). Was the tip exchanged?</source>
+        <translation>测头与 {1} 的校准相差 {0} mm（通常变化：{2} mm）。是否更换过测头？</translation>
+    </message>
+    <message>
+        <source>The tip lies {0} mm from its nominal place. Is it the tip that is named?</source>
+        <translation>测头偏离标称位置 {0} mm。是否为所填写的测头？</translation>
     </message>
 </context>
 <context>
@@ -1586,10 +1605,6 @@
     <message>
         <source>{0}: {1}</source>
         <translation>{0}：{1}</translation>
-    </message>
-    <message>
-        <source>The tip lies {0} mm from the calibration of {1} (usual change: {2} mm). Was the tip exchanged?</source>
-        <translation>测头与 {1} 的校准相差 {0} mm（通常变化：{2} mm）。是否更换过测头？</translation>
     </message>
 </context>
 <context>
@@ -2007,6 +2022,13 @@
     </message>
 </context>
 <context>
+    <name>SwingRun</name>
+    <message>
+        <source>Without these images there is no tip, so they stay in. {0}</source>
+        <translation>剔除这些图像后求不出测头，因此它们仍参与计算。{0}</translation>
+    </message>
+</context>
+<context>
     <name>SwingSight</name>
     <message>
         <source>The images are not of the size that this swing needs.</source>
@@ -2038,6 +2060,14 @@
     <message>
         <source>The images are kept. Compute the tip again, or start over.</source>
         <translation>图像已保留。请重新计算测头，或重新开始。</translation>
+    </message>
+    <message>
+        <source>Accepted</source>
+        <translation>已接受</translation>
+    </message>
+    <message>
+        <source>Put the pen down.</source>
+        <translation>请放下光笔。</translation>
     </message>
     <message>
         <source>An image could not be recorded; the notice at the top says why. Mend it, then press Space.</source>
@@ -2086,6 +2116,14 @@
     <message>
         <source>TIP SLIPPED</source>
         <translation>测头滑动</translation>
+    </message>
+    <message>
+        <source>The tip is used from now on.</source>
+        <translation>从现在起使用该测头。</translation>
+    </message>
+    <message>
+        <source>IN FORCE</source>
+        <translation>已生效</translation>
     </message>
     <message>
         <source>{0} images</source>
@@ -2232,10 +2270,6 @@
         <translation>露出 LED</translation>
     </message>
     <message>
-        <source>{0} LEDs are seen, {1} are needed. A finger may cover them; or lean back a little.</source>
-        <translation>看到 {0} 个 LED，需要 {1} 个。可能被手指遮住；或稍微往回倾斜。</translation>
-    </message>
-    <message>
         <source>Slower</source>
         <translation>慢一点</translation>
     </message>
@@ -2254,10 +2288,6 @@
     <message>
         <source>Tip slipped</source>
         <translation>测头滑动</translation>
-    </message>
-    <message>
-        <source>{0} images dropped. Press the tip into the cone again.</source>
-        <translation>已丢弃 {0} 幅图像。请把测头重新压入锥孔。</translation>
     </message>
     <message>
         <source>Pen not seen</source>
@@ -2300,23 +2330,31 @@
         <translation>继续采集</translation>
     </message>
     <message>
-        <source>{0} images of at least {1} are kept.</source>
-        <translation>已保留 {0} 幅图像，至少需要 {1} 幅。</translation>
-    </message>
-    <message>
         <source>Lean further</source>
         <translation>再倾斜一些</translation>
-    </message>
-    <message>
-        <source>Too little tilt {1}. Lean the pen further that way: about {0} more images.</source>
-        <translation>{1}倾斜不足。请朝该方向再倾斜一些：约需 {0} 幅图像。</translation>
     </message>
     <message>
         <source>Hold it upright</source>
         <translation>竖直握住</translation>
     </message>
     <message>
-        <source>{0} more images of the upright pen are needed.</source>
+        <source>LEDs seen: {0}, needed: {1}. A finger may cover them; or lean back a little.</source>
+        <translation>看到 {0} 个 LED，需要 {1} 个。可能被手指遮住；或稍微往回倾斜。</translation>
+    </message>
+    <message>
+        <source>Images dropped: {0}. Press the tip into the cone again.</source>
+        <translation>已丢弃 {0} 幅图像。请把测头重新压入锥孔。</translation>
+    </message>
+    <message>
+        <source>Images kept: {0} of at least {1}.</source>
+        <translation>已保留 {0} 幅图像，至少需要 {1} 幅。</translation>
+    </message>
+    <message>
+        <source>Too little tilt {1}. Lean the pen further that way. Images still needed: about {0}.</source>
+        <translation>{1}倾斜不足。请朝该方向再倾斜一些：约需 {0} 幅图像。</translation>
+    </message>
+    <message>
+        <source>Images of the upright pen still needed: {0}.</source>
         <translation>还需 {0} 幅光笔竖直的图像。</translation>
     </message>
     <message>
@@ -2350,6 +2388,18 @@
     <message>
         <source>{0} of {1} images do not take part. Review has their reasons; repeat the swing if the tip slipped.</source>
         <translation>{1} 幅图像中有 {0} 幅未参与计算。原因见“复核”步骤；若测头滑动过，请重做摆动。</translation>
+    </message>
+    <message>
+        <source>The LED file is off by {0} mm a coordinate, which alone makes U (k = 2) {1} mm. Is this the LED file of this pen? More images hardly help.</source>
+        <translation>LED 文件每个坐标的误差约为 {0} mm，仅此就使 U (k = 2) 达到 {1} mm。这是该光笔的 LED 文件吗？增加图像作用不大。</translation>
+    </message>
+    <message>
+        <source>LED out of place</source>
+        <translation>LED 位置不符</translation>
+    </message>
+    <message>
+        <source>LED {0} sits {1} mm off its place in the LED file. Is this the LED file of this pen?</source>
+        <translation>LED {0} 偏离 LED 文件中的位置 {1} mm。这是该光笔的 LED 文件吗？</translation>
     </message>
     <message>
         <source>The residuals are {0} px, {1} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
