@@ -345,7 +345,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, bench: Bench) -> None:
     bed.solve()
     page = bed.show()
     texts = [each.text() for each in page.findChildren(QLabel)]
-    assert "Tip T-10 in the frame of pen LP-04 / mm, with U (k = 2)" in texts
+    assert "Tip T-10 in the frame of pen LP-04 / mm, U\xa0(k\xa0=\xa02)" in texts
     assert remarks(page) == ""
 
     names = replace(bench.preparation.names, tip="T-11")

@@ -321,7 +321,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     first = record_folder(capturing)
     capturing.click("Finish early")
     assert capturing.tells("Too little tilt ")
-    assert capturing.tells("Lean the pen further that way: about ")
+    assert capturing.tells("Lean the pen further that way.")
     unknown = "The images do not tell yet where the tip is."
     assert capturing.tells(unknown) or capturing.tells("U (k = 2) of the tip is ")
     assert capturing.tells("Images kept: ")

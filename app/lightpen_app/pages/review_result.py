@@ -131,7 +131,7 @@ class ResultPanel(Translated, QFrame):
     def _heading_text(self, outcome: Outcome | None) -> str:
         if outcome is None:
             return self.tr("Tip in the frame of the pen / mm, with U (k = 2)")
-        text = self.tr("Tip {0} in the frame of pen {1} / mm, with U (k = 2)")
+        text = self.tr("Tip {0} in the frame of pen {1} / mm, U\xa0(k\xa0=\xa02)")
         return text.format(shortened(outcome.names.tip), shortened(outcome.names.pen))
 
     def _differences(self, outcome: Outcome) -> Figures:

@@ -1409,8 +1409,8 @@
         <translation>使用 {0} / {1} 幅图像</translation>
     </message>
     <message>
-        <source>Tip {0} in the frame of pen {1} / mm, with U (k = 2)</source>
-        <translation>测头 {0}（光笔 {1} 坐标系）/ mm，含 U (k = 2)</translation>
+        <source>Tip {0} in the frame of pen {1} / mm, U&#xa0;(k&#xa0;=&#xa0;2)</source>
+        <translation>测头 {0}（光笔 {1} 坐标系）/ mm，U&#xa0;(k&#xa0;=&#xa0;2)</translation>
     </message>
     <message>
         <source>its U (k = 2)</source>
