@@ -48,6 +48,7 @@ from lightpen_app.widgets.exposure_bar import ExposureBar
 from lightpen_app.widgets.focus_meter import FocusMeter
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.words import unbroken
 
 LAMPS = (
     Lamp(np.array([200.0, 150.0]), (8.0, 6.0)),
@@ -70,7 +71,7 @@ class Seen:
         """All that is written on the page."""
         labels = self.page.findChildren(QLabel)
         view = self.child(ImageView)
-        shown = [each.text() for each in labels if each.isVisible()]
+        shown = [unbroken(each.text()) for each in labels if each.isVisible()]
         return "\n".join([*shown, view.accessibleDescription()])
 
     @property

@@ -45,6 +45,7 @@ from lightpen_app.widgets.led_table import MISFIT, LedTable
 from lightpen_app.widgets.pen_view import PenView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.words import unbroken
 
 LEDS = paper_pen().leds
 X, Y, Z = 1, 2, 3  # columns of the table
@@ -64,7 +65,7 @@ class Seen:
     def words(self) -> str:
         """All that is written on the page, blanks alike."""
         labels = self.page.findChildren(QLabel)
-        shown = [label.text() for label in labels if label.isVisible()]
+        shown = [unbroken(label.text()) for label in labels if label.isVisible()]
         banner = self.child(StateBanner).value()
         parts = [*shown, banner.word, banner.detail]
         return "\n".join(parts).replace("\N{NO-BREAK SPACE}", " ")
