@@ -31,7 +31,7 @@ from lightpen.cameras.protocol import (
 )
 from lightpen.errors import LightpenError
 
-N_QUEUED = 16  # frames of 5 MB: 0.8 s at 20 a second
+N_QUEUED = 4  # frames of 5 MB; those that are lost when it is full, no swing misses
 QUIET_PERIODS = 3
 LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is there
 LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
