@@ -22,7 +22,7 @@ WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be told of
 
 if TYPE_CHECKING:
 
-    def QT_TRANSLATE_NOOP(context: str, text: str) -> str:  # noqa: N802
+    def QT_TRANSLATE_NOOP(context: str, text: str) -> str:  # noqa: N802 - Qt's
         """Return the text; PySide6 gives it the type of any object."""
 else:
     from PySide6.QtCore import QT_TRANSLATE_NOOP

@@ -89,6 +89,7 @@ class OptionsMenu(Translated, QMenu):
         return menu
 
     def _choose(self, **changes: object) -> None:
+        # Menus name the field that they change, whose type mypy cannot know.
         self._value = replace(self._value, **changes)  # type: ignore[arg-type]
         self.value_changed.emit(self._value)
 

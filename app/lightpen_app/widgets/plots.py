@@ -54,7 +54,7 @@ class Axes:
     y: str = ""
 
 
-class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]
+class _ReadableAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     """An axis whose decades read 10, 20, 50, 100, and not 1e+02.
 
     Of numbers that would overlap only as many are drawn as there is room for.
@@ -143,6 +143,7 @@ class Plot(QWidget):
         data = QByteArray()
         buffer = QBuffer(data)
         buffer.open(QBuffer.OpenModeFlag.WriteOnly)
+        # The stub of Qt wants bytes for the format, Qt itself a text.
         image.save(buffer, "PNG")  # type: ignore[call-overload]
         write_whole(path, bytes(data.data()))
 

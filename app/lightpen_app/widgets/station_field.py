@@ -34,7 +34,8 @@ class StationField(QComboBox):
         self._edit.setMaxLength(LONGEST_NAME)
         self.setLineEdit(self._edit)
         self.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
-        # "Hall" must not become "Hall 2" because that is known.
+        # "Hall" must not become "Hall 2" because that is known; Qt takes None for no
+        # completer, its stub does not.
         self.setCompleter(None)  # type: ignore[arg-type]
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
