@@ -27,7 +27,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
-PLOTTING_MS = 200
+PLOTTING_MS = 40  # from one plot to the next
 
 SOUNDS: dict[Happening, Sound] = {
     Happening.SEATED: Sound.SEATED,
@@ -60,7 +60,6 @@ class SwingPage(Page):
         self._words = SwingWords(self)
         self._solved = 0.0  # how far the tip is computed
         self._measured: tuple[Kept, Shortfall] | None = None
-        self._plotted: SwingState | None = None
         self._said: tuple[MainAction, bool] | None = None
         self._was_capturing = False
         self._press_act: Callable[[], object] = self._flow.toggle_pause
@@ -165,7 +164,6 @@ class SwingPage(Page):
             self._flow.keep_choices()
         self._flow.enter()
         self._show()
-        self._plot()
         self._plotting.start()
 
     @override
@@ -196,7 +194,6 @@ class SwingPage(Page):
         self._start_over.setToolTip(
             self.tr("Set this swing aside and begin anew. Its images are kept.")
         )
-        self._plotted = None
         self._show()
 
     def _why_no_review(self, state: SwingState) -> str:
@@ -289,10 +286,8 @@ class SwingPage(Page):
 
     def _plot(self) -> None:
         state, setup = self._run.state, self._run.setup
-        if state is None or setup is None or state is self._plotted:
-            return
-        self._plotted = state
-        self._face.set_plots(state, setup.limits.max_uncertainty)
+        if state is not None and setup is not None:
+            self._face.plots().show_next(state, setup.limits.max_uncertainty)
 
     def _on_image_shown(self, shown: Shown) -> None:
         self._sight.take(shown)

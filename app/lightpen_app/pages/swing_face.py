@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.arrays import Image
-from lightpen.session.swing_state import SwingState
 from lightpen_app.pages.swing_plots import SwingPlots
 from lightpen_app.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.fitted_text import FittedText
@@ -157,10 +156,6 @@ class SwingFace(Translated, QWidget):
     def set_image(self, half: Image, size: QSize, markers: Sequence[Marker]) -> None:
         """Show a live image; see `ImageView.set_half`."""
         self._image.set_half(half, size, markers)
-
-    def set_plots(self, state: SwingState, max_uncertainty: float) -> None:
-        """Show how the swing went so far; the limit of U in mm."""
-        self._plots.set_state(state, max_uncertainty)
 
     def plots(self) -> SwingPlots:
         """Return the plots."""

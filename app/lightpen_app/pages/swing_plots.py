@@ -1,9 +1,12 @@
 """The plots that grow while the pen is swung."""
 
+from collections import deque
+
 import numpy as np
 from PySide6.QtWidgets import QGridLayout, QWidget
 
 from lightpen.arrays import FloatArray
+from lightpen.session.kept import Kept
 from lightpen.session.seat import tip_offsets
 from lightpen.session.swing_state import SwingState
 from lightpen_app.quantities import MICROMETRES
@@ -20,6 +23,7 @@ class SwingPlots(Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._shown: dict[TracePlot, SwingState] = {}
 
         # Widgets
         self._misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
@@ -46,32 +50,76 @@ class SwingPlots(Translated, QWidget):
         for plot in self.plots():
             plot.setMinimumHeight(LEAST_HEIGHT)
 
+        self._turns = deque(
+            zip(
+                self.plots(),
+                (
+                    self._show_misfit,
+                    self._show_scatter,
+                    self._show_estimate,
+                    self._show_uncertainty,
+                ),
+                strict=True,
+            )
+        )
         self._retranslate()
 
     def plots(self) -> tuple[TracePlot, ...]:
         """Return the plots: misfit, scatter, estimate and uncertainty."""
         return self._misfit, self._scatter, self._estimate, self._uncertainty
 
-    def set_state(self, state: SwingState, max_uncertainty: float) -> None:
-        """Show how a swing went so far; the limit of U in mm."""
-        kept, trace = state.kept, state.trace
-        numbers = kept.numbers.astype(np.float64)
-        self._misfit.set_data(numbers, kept.misfits)
+    def show_next(self, state: SwingState, max_uncertainty: float) -> None:
+        """Show how a swing went so far in the plot whose turn it is.
+
+        One at a time, so that the window is never held up by all of them.
+
+        Parameters
+        ----------
+        state : SwingState
+        max_uncertainty : float
+            The limit of U, mm.
+        """
+        plot, show = self._turns[0]
+        self._turns.rotate(-1)
+        if self._shown.get(plot) is not state:
+            self._shown[plot] = state
+            show(state, max_uncertainty)
+
+    def _show_misfit(self, state: SwingState, _max_uncertainty: float) -> None:
+        self._misfit.set_data(_numbers(state.kept), state.kept.misfits)
+
+    def _show_scatter(self, state: SwingState, _max_uncertainty: float) -> None:
+        kept = state.kept
         offsets: FloatArray = np.zeros((len(kept), 3))
         if kept.seat is not None:
             offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
-        self._scatter.set_data(numbers, *(MICROMETRES * offsets.T))
-        counts = trace.n_images.astype(np.float64)
+        self._scatter.set_data(_numbers(kept), *(MICROMETRES * offsets.T))
+
+    def _show_estimate(self, state: SwingState, _max_uncertainty: float) -> None:
+        trace = state.trace
         changes = trace.tips - trace.tips[-1:]
-        self._estimate.set_data(counts, *(MICROMETRES * changes.T))
+        self._estimate.set_data(
+            trace.n_images.astype(np.float64), *(MICROMETRES * changes.T)
+        )
+
+    def _show_uncertainty(self, state: SwingState, max_uncertainty: float) -> None:
+        trace = state.trace
         limit = MICROMETRES * max_uncertainty
         self._uncertainty.set_limit(limit, self.tr("limit {0}").format(f"{limit:g}"))
         finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
-        self._uncertainty.set_data(counts, MICROMETRES * finite)
+        self._uncertainty.set_data(
+            trace.n_images.astype(np.float64), MICROMETRES * finite
+        )
 
     def _retranslate(self) -> None:
         """Set the titles anew."""
+        self._shown.clear()
         self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
         self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
+
+
+def _numbers(kept: Kept) -> FloatArray:
+    """Return the numbers (N,) of kept images."""
+    return kept.numbers.astype(np.float64)
