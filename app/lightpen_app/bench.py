@@ -115,7 +115,7 @@ class Bench(QObject):
             names=Names(
                 name,
                 *(station.operator, station.pen, station.tip, station.cone),
-                station.ball_diameter,
+                station.ball_diameter or None,
             ),
             nominal_tip=_parse_point(station.nominal_tip),
             source=_source(station),
@@ -249,7 +249,7 @@ class Bench(QObject):
             pen=names.pen,
             tip=names.tip,
             cone=names.cone,
-            ball_diameter=names.ball_diameter,
+            ball_diameter=names.ball_diameter or 0.0,
             nominal_tip=_point_text(now.nominal_tip),
             source=now.source.kind,
             source_place=now.source.place,

@@ -118,7 +118,7 @@ class Demo(QObject):
     def _farewell(self) -> str:
         return self.tr(
             "That was the demo. Look around as long as you like; nothing of it is "
-            "kept. Start the program without --demo to calibrate a tip."
+            "kept. Start the program without the demo to calibrate a tip."
         )
 
     def _end(self, words: str) -> None:

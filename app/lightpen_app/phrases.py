@@ -358,6 +358,14 @@ def sides_text(directions: Iterable[int], heading: float | None = None) -> str:
     return comma.join(_translated(_SIDES[side]) for side in sides)
 
 
+def n_images_text(n_images: int) -> str:
+    """Return how many images, such as "12 images"."""
+    if n_images == 1:
+        return _translated(QT_TRANSLATE_NOOP("phrases", "1 image"))
+    many = _translated(QT_TRANSLATE_NOOP("phrases", "{0} images"))
+    return many.format(n_images)
+
+
 def lack_text(lack: Lack) -> str:
     """Return what to do about something that is missing, a sentence."""
     return _translated(_LACKS[lack])

@@ -27,6 +27,7 @@ MAX_PIXELS = 200_000_000
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
 MAX_KEPT_MEMORY = 256 * 2**20
+IMAGE_FOLDER = "images"
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -52,6 +53,8 @@ class ImageSource:
 
 def find_images(*places: str) -> ImageSource:
     """Find the images of a folder, a pattern such as ``swing/*.png``, or a video.
+
+    A folder without images may have them in its subfolder ``images``.
 
     Parameters
     ----------
@@ -132,7 +135,10 @@ def decode_image(data: bytes, name: str) -> Image:
 
 def _images_at(path: Path, where: str) -> ImageSource:
     if path.is_dir():
-        files = [p for p in path.iterdir() if p.suffix.lower() in SUFFIXES]
+        files = _image_files_in(path)
+        inner = path / IMAGE_FOLDER
+        if not files and inner.is_dir():
+            files = _image_files_in(inner)
         if not files:
             raise FileError(
                 f"The folder {where} holds no images ({', '.join(SUFFIXES)}). "
@@ -149,6 +155,10 @@ def _images_at(path: Path, where: str) -> ImageSource:
                 f"There is no folder, video or image at {where}. Check the name."
             )
     return image_files(sorted(files, key=_natural_order))
+
+
+def _image_files_in(folder: Path) -> list[Path]:
+    return [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
 
 
 def _grey(image: npt.NDArray[Any], name: str) -> Image:

@@ -152,8 +152,8 @@ def check_frame(pen: Pen) -> None:
             f"The LEDs are not in the pen frame: LED {worst + 1} is "
             f"{deviations[worst]:.2f} mm from where the frame puts it (origin in front "
             "of LED 1, y along LEDs 1 to 4, LEDs 5 to 10 at z = 0). If these are a "
-            "measuring machine's coordinates, put them into the pen frame: "
-            "lightpen pen RAW.csv OUT.csv."
+            "measuring machine's coordinates, put them into the pen frame, on "
+            "the command line with: lightpen pen RAW.csv OUT.csv."
         )
     backwards = np.flatnonzero(pen.normals[:, 2] <= 0)
     if len(backwards):
@@ -349,7 +349,7 @@ def _mirrored(leds: FloatArray) -> FileError:
         return FileError(
             "The LEDs are neither in the pen frame nor right-handed: they are a mirror "
             "image of the pen. Change the sign of one coordinate, then put them into "
-            "the pen frame: lightpen pen RAW.csv OUT.csv."
+            "the pen frame, on the command line with: lightpen pen RAW.csv OUT.csv."
         )
     name, rule = _HANDEDNESS[axis]
     worst = int(np.argmax(np.abs(leds[:, axis])))

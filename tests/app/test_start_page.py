@@ -475,7 +475,7 @@ def test_a_negative_ball_diameter_cannot_be_entered(
 ) -> None:
     start.type_into("Ball diameter", "-3")
 
-    assert bench.preparation.names.ball_diameter >= 0
+    assert (bench.preparation.names.ball_diameter or 0.0) >= 0
     assert "-" not in start.text_of("Ball diameter")
 
 

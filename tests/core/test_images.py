@@ -41,6 +41,16 @@ def test_a_folder_gives_its_images_in_natural_order(folder: Path) -> None:
         np.testing.assert_array_equal(load(), GREY)
 
 
+def test_a_folder_without_images_has_them_in_its_subfolder_images(
+    folder: Path, tmp_path: Path
+) -> None:
+    swing = tmp_path / "swing-1"
+    swing.mkdir()
+    folder.rename(swing / "images")
+
+    assert len(find_images(str(swing)).names) == 3
+
+
 def test_a_pattern_gives_the_matching_images(folder: Path) -> None:
     source = find_images(str(folder / "frame_1*.png"))
 

@@ -69,7 +69,7 @@ def test_each_name_must_be_given(whole: Preparation, lack: Lack, blank: str) -> 
 def test_a_ball_diameter_and_a_nominal_tip_need_not_be_known(
     whole: Preparation,
 ) -> None:
-    names = replace(NAMES, ball_diameter=0.0)
+    names = replace(NAMES, ball_diameter=None)
 
     assert replace(whole, names=names, nominal_tip=None).lacks() == ()
 
@@ -188,7 +188,7 @@ def test_a_record_of_an_older_program_gets_the_usual_limits(
     record = open_record(tmp_path / "swing")
 
     assert recorded_setup(record).limits == SwingLimits()
-    assert recorded_names(record) == replace(NAMES, pen="", ball_diameter=0.0)
+    assert recorded_names(record) == replace(NAMES, pen="", ball_diameter=None)
 
 
 def test_a_file_that_vanished_since_is_told_when_a_record_begins(

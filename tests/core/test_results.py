@@ -132,7 +132,7 @@ def test_a_damaged_result_is_told_and_not_passed_over(
         ("expanded_uncertainty_mm", [1.0, 2.0, float("inf")]),
         ("accepted", "yesterday"),
         ("accepted", "2026-01-02T12:00:00"),
-        ("ball_diameter_mm", None),
+        ("ball_diameter_mm", "wide"),
     ],
 )
 def test_an_entry_that_makes_no_sense_is_damage(
@@ -143,6 +143,17 @@ def test_an_entry_that_makes_no_sense_is_damage(
 
     with pytest.raises(FileError, match="is damaged"):
         last_result(tmp_path, "LP-04", "T-10")
+
+
+def test_a_ball_diameter_that_is_not_known_is_stored_as_none(tmp_path: Path) -> None:
+    unknown = replace(result(), names=replace(NAMES, ball_diameter=None))
+    file = store_result(tmp_path, unknown)
+
+    stored = last_result(tmp_path, "LP-04", "T-10")
+
+    assert json.loads(file.read_bytes())["ball_diameter_mm"] is None
+    assert stored is not None
+    assert stored.names.ball_diameter is None
 
 
 def test_a_damaged_result_that_is_older_does_not_matter(tmp_path: Path) -> None:

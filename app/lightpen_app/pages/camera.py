@@ -117,8 +117,10 @@ class CameraPage(Page):
 
     @override
     def main_action(self) -> MainAction:
-        lacks = self._bench.preparation.camera_lacks()
-        return MainAction(self.tr("Continue to the LEDs"), _first_text(lacks))
+        why_not = _first_text(self._bench.preparation.camera_lacks())
+        if not why_not and self._live.connection is Connection.LOST:
+            why_not = self.tr("The camera is lost. It is looked for until it is back.")
+        return MainAction(self.tr("Continue to the LEDs"), why_not)
 
     @override
     def entered(self) -> None:
@@ -268,6 +270,7 @@ class CameraPage(Page):
         if connection is Connection.STREAMING:
             self._show_pen()
         self._show_connection()
+        self.changed.emit()
 
     def _on_settings_applied(self, settings: Settings) -> None:
         self._settings = settings

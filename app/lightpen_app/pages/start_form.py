@@ -101,7 +101,7 @@ class NamesForm(Translated, QWidget):
             pen=self._pen.text().strip(),
             tip=self._tip.text().strip(),
             cone=self._cone.text().strip(),
-            ball_diameter=self._ball.value(),
+            ball_diameter=self._ball.value() or None,
         )
 
     def set_value(self, names: Names) -> None:
@@ -112,7 +112,7 @@ class NamesForm(Translated, QWidget):
         for edit, text in zip(self._edits, texts, strict=True):
             edit.setText(text)
             edit.setCursorPosition(0)
-        self._ball.setValue(names.ball_diameter)
+        self._ball.setValue(names.ball_diameter or 0.0)
         self.blockSignals(blocked)
 
     def set_stations(self, names: Sequence[str]) -> None:

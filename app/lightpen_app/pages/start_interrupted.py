@@ -18,6 +18,7 @@ from typing_extensions import override
 from lightpen.session.interrupted import DamagedSwing, Unfinished
 from lightpen.session.preparation import recorded_names
 from lightpen.session.record import Record
+from lightpen_app.phrases import n_images_text
 from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
@@ -150,12 +151,8 @@ class InterruptedRow(Translated, QFrame):
         if self._is_under_way:
             return self.tr("Another program is capturing it.")
         names, n_images = recorded_names(self._swing), len(self._swing.images)
-        images = (
-            self.tr("1 image")
-            if n_images == 1
-            else self.tr("{0} images").format(n_images)
-        )
-        told = (*(shortened(name, LONGEST) for name in (names.pen, names.tip)), images)
+        called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
+        told = (*called, n_images_text(n_images))
         return PARTED.join(filter(None, told))
 
     def _on_discard_clicked(self) -> None:

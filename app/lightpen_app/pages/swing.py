@@ -178,8 +178,8 @@ class SwingPage(Page):
         if state is None or state.phase is Phase.VERDICT or not state.n_kept:
             return ""
         return self.tr(
-            "The swing is not finished. Its {0} images are kept; it is offered again "
-            "at the next start."
+            "The swing is not finished. The images kept so far ({0}) are safe; it is "
+            "offered again at the next start."
         ).format(state.n_kept)
 
     @override
@@ -324,8 +324,8 @@ class SwingPage(Page):
             self._flow.start_over()
             return
         text = self.tr(
-            "Begin anew? The {0} images of this swing are set aside; they stay on the "
-            "disk."
+            "Begin anew? The images of this swing ({0}) are set aside; they stay on "
+            "the disk."
         )
         self._ask(
             text.format(state.n_kept),

@@ -10,11 +10,18 @@ from lightpen.session.following import FIRST_LEAN
 from lightpen.session.messages import Code
 from lightpen.session.posture import Posture, posture_of
 from lightpen.session.progress import Shortfall, turn_range
-from lightpen.session.swing import COUNTDOWN
+from lightpen.session.swing import COUNTDOWN, has_just_slipped
 from lightpen.session.swing_state import Pause, Phase, SwingSetup, SwingState
 from lightpen.session.verdict import Grade, Verdict
 from lightpen_app.grades import GRADE_MARKS
-from lightpen_app.phrases import Phrase, grade_text, lean_phrase, phase_text, phrase
+from lightpen_app.phrases import (
+    Phrase,
+    grade_text,
+    lean_phrase,
+    n_images_text,
+    phase_text,
+    phrase,
+)
 from lightpen_app.theme import Tone
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.posture_dial import DialValue
@@ -188,10 +195,10 @@ class SwingWords(QObject):
             fraction = moment.solving
         elif state.phase is Phase.COUNTDOWN:
             fraction = min((state.time - state.since) / COUNTDOWN, 1.0)
+        elif state.phase is Phase.CAPTURING and has_just_slipped(state):
+            word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
         elif state.phase is Phase.CAPTURING and state.message.code in FLAWS:
             word, sign, tone = self.tr("NOT KEPT"), Sign.WARNING, Tone.WARN
-        elif state.phase is Phase.CAPTURING and state.message.code is Code.TIP_SLIPPED:
-            word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
         elif state.phase is Phase.VERDICT:
             return self._verdict(moment)
         return State(word, moment.seen, sign, tone, fraction)
@@ -217,7 +224,7 @@ class SwingWords(QObject):
         if state.phase is Phase.COUNTDOWN:
             return str(state.message.arguments[0])
         if state.phase in ENDED:
-            return self.tr("{0} images").format(n_kept)
+            return n_images_text(n_kept)
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)

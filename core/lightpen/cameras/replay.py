@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from math import inf
-from pathlib import Path
 
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
@@ -30,20 +29,6 @@ from lightpen.images import ImageSource, find_images
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
-IMAGE_FOLDER = "images"
-
-
-def find_recording(where: str) -> ImageSource:
-    """Find the images of a folder, its subfolder ``images``, a pattern or a video.
-
-    Raises
-    ------
-    FileError
-        There are none, or they may not be looked at.
-    """
-    inner = Path(where) / IMAGE_FOLDER
-    has_inner = os.path.isdir(inner)  # noqa: PTH112 - of one who may not look, too
-    return find_images(str(inner) if has_inner else where)
 
 
 class ReplayCamera:
@@ -56,7 +41,7 @@ class ReplayCamera:
     where : str
         Folder, pattern or video; the serial number of this camera.
     find : callable, optional
-        Returns the images; by default `find_recording` looks ``where``.
+        Returns the images; by default `find_images` looks ``where``.
     frame_rate : float
         1/s, at which the images come at most; `math.inf` for as fast as asked.
     loops : bool
@@ -74,7 +59,7 @@ class ReplayCamera:
         clock: Clock | None = None,
     ) -> None:
         self._where = where
-        self._find = find or partial(find_recording, where)
+        self._find = find or partial(find_images, where)
         self._frame_rate = FRAME_RATE.nearest(frame_rate)
         self._loops = loops
         self._clock = clock or MachineClock()
@@ -224,7 +209,7 @@ class ReplayCamera:
         self._next_seq += 1
         try:
             image = loader()
-            _check_like_first(image, seq, self.caps)
+            _check_like_first(image, self._name(seq), self.caps)
         except FileError as error:
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
             self._n_unread += 1
@@ -242,6 +227,11 @@ class ReplayCamera:
             pixel_format=self.caps.pixel_formats[0],
             bits=8 * image.itemsize,
         )
+
+    def _name(self, seq: int) -> str:
+        """Return the file of an image; after the last one comes the first."""
+        names = () if self._source is None else self._source.names
+        return printable(names[seq % len(names)]) if names else f"Image {seq + 1}"
 
     def _is_gone(self) -> bool:
         """Return whether no file is there, or none could be read in a whole round."""
@@ -276,16 +266,16 @@ def _first_image(source: ImageSource, where: str) -> Image:
     raise FileError(f"{where} holds no images. Choose a recording that holds some.")
 
 
-def _check_like_first(image: Image, seq: int, caps: Caps) -> None:
+def _check_like_first(image: Image, name: str, caps: Caps) -> None:
     height, width = image.shape
     if (width, height) != (caps.width, caps.height):
         raise FileError(
-            f"Image {seq + 1} is {width} x {height} px, the first one is {caps.width} "
-            f"x {caps.height} px. Replay only images of one camera together."
+            f"{name} is {width} x {height} px, the first image is {caps.width} x "
+            f"{caps.height} px. Replay only images of one camera together."
         )
     if f"Mono{8 * image.itemsize}" not in caps.pixel_formats:
         raise FileError(
-            f"Image {seq + 1} has {8 * image.itemsize} bits, the first one is "
+            f"{name} has {8 * image.itemsize} bits, the first image is "
             f"{caps.pixel_formats[0]}. Replay only images of one camera together."
         )
 

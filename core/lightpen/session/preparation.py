@@ -49,8 +49,8 @@ class Names:
     ----------
     station, operator, pen, tip, cone : str
         ``pen`` is its serial number.
-    ball_diameter : float
-        Of the tip, mm; 0 when it is not known.
+    ball_diameter : float or None
+        Of the tip, mm; None when it is not known.
     """
 
     station: str = ""
@@ -58,7 +58,7 @@ class Names:
     pen: str = ""
     tip: str = ""
     cone: str = ""
-    ball_diameter: float = 0.0
+    ball_diameter: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +251,7 @@ def recorded_names(record: Record) -> Names:
         pen=str(header.settings.get("pen", "")),
         tip=header.tip,
         cone=header.cone,
-        ball_diameter=_number(record, "ball_diameter_mm", 0.0),
+        ball_diameter=_number(record, "ball_diameter_mm", 0.0) or None,
     )
 
 

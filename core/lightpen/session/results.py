@@ -122,6 +122,7 @@ def _read(file: Path) -> Result:
     data = read_bytes(file, "result", LIMIT)
     try:
         entries = json.loads(data)
+        ball = entries["ball_diameter_mm"]
         result = Result(
             names=Names(
                 station=entries["station"],
@@ -129,7 +130,7 @@ def _read(file: Path) -> Result:
                 pen=entries["pen"],
                 tip=entries["tip"],
                 cone=entries["cone"],
-                ball_diameter=float(entries["ball_diameter_mm"]),
+                ball_diameter=None if ball is None else float(ball),
             ),
             accepted=datetime.fromisoformat(entries["accepted"]),
             grade=str(entries["grade"]),

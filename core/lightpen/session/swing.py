@@ -50,6 +50,7 @@ RESEATED = 0.5  # s in the cone that end a pause
 LIFTED = 3.0  # mm from the cone; less is a slip
 LEAVING = 0.2  # s out of the cone until the pen counts as lifted
 ABOUT_TO_SLIP = 0.5  # s before a slip, in which the tip may be half out
+SLIP_TOLD = 4.0  # s for which a slip is told of, at least
 ASTRAY = 2.0  # s out of the cone until the capture pauses
 FEW = 12  # images; not worth more than a new start
 BAD_SIGMA = 3.0  # times the noise of the other images
@@ -93,7 +94,12 @@ def feed(setup: SwingSetup, state: SwingState, sighting: Sighting, time: float) 
     """
     state = _noticed(setup, state, sighting, time)
     rule = _RULES.get(state.phase)
-    return rule(setup, state, sighting) if rule else Fed(state)
+    if rule is None:
+        return Fed(state)
+    fed = rule(setup, state, sighting)
+    if any(event.what is Happening.SLIPPED for event in fed.events):
+        return replace(fed, state=replace(fed.state, slipped_at=time))
+    return fed
 
 
 def pause(state: SwingState) -> SwingState:
@@ -121,6 +127,11 @@ def conclude(state: SwingState, verdict: Message, passed: bool) -> Fed:
     """Show the verdict on the solved swing."""
     happening = Happening.DONE if passed else Happening.FAILED
     return Fed(_enter(state, Phase.VERDICT, verdict), (Event(happening),))
+
+
+def has_just_slipped(state: SwingState) -> bool:
+    """Return whether a slip is so recent that the operator has to be told."""
+    return state.slipped_at is not None and state.time - state.slipped_at < SLIP_TOLD
 
 
 def stillness(state: SwingState) -> float:

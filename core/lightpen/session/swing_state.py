@@ -190,6 +190,8 @@ class SwingState:
         Where to lean the pen next.
     target_since : float
         When the target was chosen, s.
+    slipped_at : float or None
+        When kept images were last dropped or the tip last slipped, s.
     still_since : float or None
         Since when the pen is upright and still, s.
     trace : Trace
@@ -212,6 +214,7 @@ class SwingState:
     heading: float | None
     target: Posture | None
     target_since: float
+    slipped_at: float | None
     still_since: float | None
     trace: Trace
 
@@ -251,6 +254,7 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         heading=None,
         target=None,
         target_since=time,
+        slipped_at=None,
         still_since=None,
         trace=Trace(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)),
     )

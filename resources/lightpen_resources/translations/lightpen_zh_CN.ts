@@ -34,6 +34,10 @@
         <translation>确认 LED 明亮清晰，内参属于这台相机，并且没有其他光源。</translation>
     </message>
     <message>
+        <source>The camera is lost. It is looked for until it is back.</source>
+        <translation>相机连接中断。程序会持续查找，直到恢复。</translation>
+    </message>
+    <message>
         <source>Continue to the LEDs</source>
         <translation>继续：LED</translation>
     </message>
@@ -77,8 +81,8 @@
         <translation>演示：测头结果、可信程度及其依据。</translation>
     </message>
     <message>
-        <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without --demo to calibrate a tip.</source>
-        <translation>演示结束。您可以随意查看；演示数据不会保留。要校准测头，请不带 --demo 启动程序。</translation>
+        <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
+        <translation>演示结束。您可以随意查看；演示数据不会保留。要校准测头，请不带演示启动程序。</translation>
     </message>
 </context>
 <context>
@@ -542,14 +546,6 @@
     <message>
         <source>Another program is capturing it.</source>
         <translation>另一个程序正在采集。</translation>
-    </message>
-    <message>
-        <source>1 image</source>
-        <translation>1 幅</translation>
-    </message>
-    <message>
-        <source>{0} images</source>
-        <translation>{0} 幅</translation>
     </message>
 </context>
 <context>
@@ -1934,8 +1930,8 @@
         <translation>继续本次摆动</translation>
     </message>
     <message>
-        <source>The swing is not finished. Its {0} images are kept; it is offered again at the next start.</source>
-        <translation>摆动尚未完成。已保留 {0} 幅图像，下次启动时会再次列出。</translation>
+        <source>The swing is not finished. The images kept so far ({0}) are safe; it is offered again at the next start.</source>
+        <translation>本次摆动尚未完成。已保留的图像（{0} 幅）是安全的；下次启动时可以继续。</translation>
     </message>
     <message>
         <source>Start over</source>
@@ -1990,8 +1986,8 @@
         <translation>继续采集</translation>
     </message>
     <message>
-        <source>Begin anew? The {0} images of this swing are set aside; they stay on the disk.</source>
-        <translation>重新开始吗？本次摆动的 {0} 幅图像将被搁置，仍保留在磁盘上。</translation>
+        <source>Begin anew? The images of this swing ({0}) are set aside; they stay on the disk.</source>
+        <translation>重新开始？本次摆动的图像（{0} 幅）将被搁置，但仍保留在磁盘上。</translation>
     </message>
     <message>
         <source>Begin anew</source>
@@ -2124,10 +2120,6 @@
     <message>
         <source>IN FORCE</source>
         <translation>已生效</translation>
-    </message>
-    <message>
-        <source>{0} images</source>
-        <translation>{0} 幅图像</translation>
     </message>
     <message>
         <source>{0} of at least {1}</source>
@@ -2640,6 +2632,14 @@
     <message>
         <source>, </source>
         <translation>、</translation>
+    </message>
+    <message>
+        <source>1 image</source>
+        <translation>1 幅图像</translation>
+    </message>
+    <message>
+        <source>{0} images</source>
+        <translation>{0} 幅图像</translation>
     </message>
 </context>
 <context>
