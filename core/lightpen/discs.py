@@ -38,6 +38,12 @@ GAUSSIAN_GREY = 0.381
 AREA_LOSS = 0.56
 VARIANCE_GAIN = 0.30
 
+# The shading of a disc is measured where its radius is so many widths of its rim, and
+# on its inner pixels without those beside the rim.
+LEAST_SHADED = 4.0
+LEAST_INNER = 0.3  # of the area
+BESIDE = np.ones((3, 3), np.uint8)
+
 # How far a whole ellipse strays from roundness 1 and skewness 0 by sampling, blur and
 # noise, found on rendered discs of 6 to 100 px at signal-to-noise ratios down to 12.
 ROUNDNESS_LOSS = 0.004
@@ -220,6 +226,7 @@ def _measure_window(
     moments = _moments(soft, frame, (high - low) / contrast)
     if moments is None:
         return None
+    moments = _unshaded(moments, window, soft, frame, levels)
     region, *others = regions
     height, width = image.shape
     leaves_image = (
@@ -329,6 +336,34 @@ def _moments(soft: MatLike, frame: Box, ramp: float) -> Moments | None:
         _skewness(m, var_x, cov_xy, determinant),
         GAUSSIAN_RISE * sigma,
     )
+
+
+def _unshaded(
+    moments: Moments, window: Image, soft: MatLike, frame: Box, levels: Levels
+) -> Moments:
+    """Return the moments with the centre that the disc has without shading.
+
+    An LED is less bright seen from the side, so one side of a leaning disc is brighter
+    than the other. If the brightness rises by the share g from the centre to the rim,
+    the outline lies further out there by g / 2 times the width of the rim, the mean of
+    all levels; the centroid of the inner pixels tells g.
+    """
+    radius = sqrt(moments.area / pi)
+    rim = moments.edge_width / (HIGH - LOW)
+    if radius < LEAST_SHADED * rim:
+        return moments
+    inner = cv2.erode(cv2.inRange(soft, 255, 255), BESIDE)
+    place = cv2.moments(inner)
+    weighted = cv2.moments(cv2.bitwise_and(window, window, mask=inner))
+    area = place["m00"] / 255.0
+    if area < LEAST_INNER * moments.area:
+        return moments
+    factor = 2.0 * pi * rim * radius / area * levels.plateau / levels.contrast
+    x, y = (
+        factor * (weighted[m] / weighted["m00"] - place[m] / place["m00"])
+        for m in ("m10", "m01")
+    )
+    return moments._replace(x=moments.x - x, y=moments.y - y)
 
 
 def _skewness(

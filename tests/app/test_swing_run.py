@@ -702,7 +702,8 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     stage.run.finish()
     stage.wait_for_phase(Phase.VERDICT)
 
-    assert stage.run.verdict is not None
+    ended = stage.run.state
+    assert stage.run.verdict is not None, ended and ended.message
     assert stage.run.verdict.reason.code is not Code.TOO_FEW_IMAGES
 
 

@@ -24,6 +24,7 @@ class SwingPlots(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._shown: dict[TracePlot, SwingState] = {}
+        self._limit: float | None = None  # of U, µm
 
         # Widgets
         self._misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
@@ -104,20 +105,25 @@ class SwingPlots(Translated, QWidget):
 
     def _show_uncertainty(self, state: SwingState, max_uncertainty: float) -> None:
         trace = state.trace
-        limit = MICROMETRES * max_uncertainty
-        self._uncertainty.set_limit(limit, self.tr("limit {0}").format(f"{limit:g}"))
+        self._limit = MICROMETRES * max_uncertainty
+        self._show_limit()
         finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
         self._uncertainty.set_data(
             trace.n_images.astype(np.float64), MICROMETRES * finite
         )
 
+    def _show_limit(self) -> None:
+        if self._limit is not None:
+            words = self.tr("limit {0}").format(f"{self._limit:g}")
+            self._uncertainty.set_limit(self._limit, words)
+
     def _retranslate(self) -> None:
         """Set the titles anew."""
-        self._shown.clear()
         self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
         self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
         self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
+        self._show_limit()
 
 
 def _numbers(kept: Kept) -> FloatArray:
