@@ -326,7 +326,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     assert capturing.tells(unknown) or capturing.tells("U (k = 2) of the tip is ")
     assert capturing.tells("Images kept: ")
     capturing.click("Go on swinging")
-    keep_on(capturing, 8)
+    keep_on(capturing, 20)
     assert phase(capturing) is Phase.CAPTURING
 
     finish_now(capturing)
@@ -370,7 +370,7 @@ def finish_now(walker: "Walker") -> None:
 
 
 def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
-    keep_on(capturing, 12)
+    keep_on(capturing, 20)
     finish_now(capturing)
     capturing.until(lambda: capturing.offers("Stop computing"))
     capturing.click("Stop computing")
