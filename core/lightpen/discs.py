@@ -352,9 +352,9 @@ def _unshaded(
     rim = moments.edge_width / (HIGH - LOW)
     if radius < LEAST_SHADED * rim:
         return moments
-    inner = cv2.erode(cv2.inRange(soft, 255, 255), BESIDE)
+    _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 255, cv2.THRESH_BINARY)
     place = cv2.moments(inner)
-    weighted = cv2.moments(cv2.bitwise_and(window, window, mask=inner))
+    weighted = cv2.moments(cv2.copyTo(window, inner))
     area = place["m00"] / 255.0
     if area < LEAST_INNER * moments.area:
         return moments
