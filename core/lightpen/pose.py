@@ -30,6 +30,7 @@ from lightpen.rigid import nearest_rotation, rotation_from_vector
 MIN_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
+ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
 MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
 WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
@@ -113,10 +114,11 @@ def fit_poses(
     """
     _require_seen(pixels)
     problem = _Reprojection(camera, pen.leds, pen.normals, pen.diameter / 2, pixels)
-    start = _refine(problem, rotations, translations, robust=False, max_steps=3)
-    return _refine(
-        problem, start.rotations, start.translations, robust=True, max_steps=MAX_STEPS
+    R, t = _descend(
+        problem, rotations, translations, robust=False, max_steps=3, tolerance=ROUGHLY
     )
+    R, t = _descend(problem, R, t, robust=True)
+    return _poses_at(problem, R, t, robust=True)
 
 
 def fit_paper_poses(
@@ -155,7 +157,8 @@ def fit_paper_poses(
     ideal = replace(camera, distortion=np.zeros(5))
     undistorted = ideal.pixels(normalised)
     problem = _Reprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
-    return _refine(problem, R, t, robust=False, max_steps=MAX_STEPS)
+    R, t = _descend(problem, R, t, robust=False)
+    return _poses_at(problem, R, t, robust=False)
 
 
 def start_poses(
@@ -345,14 +348,16 @@ def _require_seen(pixels: FloatArray) -> None:
         raise ValueError(f"Every image needs {MIN_LEDS} LEDs, one has {n_seen.min()}.")
 
 
-def _refine(
+def _descend(
     problem: _Reprojection,
     R: FloatArray,
     t: FloatArray,
     *,
     robust: bool,
-    max_steps: int,
-) -> Poses:
+    max_steps: int = MAX_STEPS,
+    tolerance: float = STEP_TOLERANCE,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the poses after Gauss-Newton steps, until these are small."""
     seen = np.isfinite(problem.pixels[..., 0])
     for _ in range(max_steps):
         residuals, J = problem.residuals_with_jacobian(R, t)
@@ -366,8 +371,15 @@ def _refine(
         step *= np.minimum(1, MAX_STEP / np.maximum(size, NOISE_FLOOR))[:, None]
         R = rotation_from_vector(step[:, :3]) @ R
         t = t + step[:, 3:]
-        if size.max() < STEP_TOLERANCE:
+        if size.max() < tolerance:
             break
+    return R, t
+
+
+def _poses_at(
+    problem: _Reprojection, R: FloatArray, t: FloatArray, *, robust: bool
+) -> Poses:
+    seen = np.isfinite(problem.pixels[..., 0])
     residuals, J = problem.residuals_with_jacobian(R, t)
     sigma = robust_sigma(residuals, 6)
     weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
