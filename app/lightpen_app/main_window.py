@@ -15,6 +15,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
+    QCheckBox,
     QGridLayout,
     QMainWindow,
     QMessageBox,
@@ -229,7 +230,11 @@ class MainWindow(QMainWindow):
         key = event.key()
         if key in ENTER_KEYS:
             focused = QApplication.focusWidget()
-            if isinstance(focused, QAbstractButton) and focused.isEnabled():
+            if (
+                isinstance(focused, QAbstractButton)
+                and not isinstance(focused, QCheckBox)
+                and focused.isEnabled()
+            ):
                 focused.click()
             else:
                 self._action_bar.press_main()

@@ -234,6 +234,9 @@ _LACKS: dict[Lack, str] = {
         "phrases", "The intrinsics file is for images of another size."
     ),
     Lack.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
+    Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
+        "phrases", "Save or discard the changes of the LED table."
+    ),
 }
 _REASONS: dict[Reason, str] = {
     Reason.NONE: "",

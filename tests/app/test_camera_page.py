@@ -684,6 +684,17 @@ def test_a_mask_is_cleared(seen: Seen, bench: Bench, small_scene: Scene) -> None
     assert not seen.named("Clear the mask").isEnabled()
 
 
+def test_a_mask_is_of_one_source_only(live: Seen, bench: Bench, tmp_path: Path) -> None:
+    bench.set_preparation(replace(bench.preparation, mask=np.array([[9.0, 9.0, 5.0]])))
+
+    folder = recording(tmp_path / "swing")
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(folder))
+
+    assert bench.preparation.source.place == str(folder)
+    assert len(bench.preparation.mask) == 0
+
+
 def test_a_mask_adds_to_the_one_before(
     seen: Seen, bench: Bench, small_scene: Scene
 ) -> None:

@@ -27,7 +27,13 @@ from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.pen import Pen
 from lightpen.pen_check.match import Finding, PenMatch, What
 from lightpen.rigid import rotation_from_vector
-from lightpen.session.preparation import Names, PenFile, SourceChoice, SourceKind
+from lightpen.session.preparation import (
+    Lack,
+    Names,
+    PenFile,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.simulator.sample_pens import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
@@ -452,6 +458,7 @@ def test_a_changed_cell_is_in_use_once_it_is_saved(
     assert in_use(bench) is before
     assert seen.why_not == "Save the LED table first: the record needs its file."
     assert seen.page.unsaved() == "The LED table has changes that are not saved."
+    assert bench.preparation.leds_lacks() == (Lack.SAVED_LEDS,)
 
     seen.save_as(tmp_path / "other")  # the dialog adds the ending
 
@@ -460,6 +467,7 @@ def test_a_changed_cell_is_in_use_once_it_is_saved(
     assert (in_use(bench).path, seen.path) == (path, str(path))
     assert seen.statuses == ["The LEDs are saved as other.json and in use."]
     assert (seen.why_not, seen.page.unsaved()) == ("", "")
+    assert bench.preparation.leds_lacks() == ()
 
 
 def test_typing_the_old_number_again_leaves_nothing_to_save(seen: Seen) -> None:
@@ -671,7 +679,7 @@ def test_row_and_disc_are_chosen_together(seen: Seen) -> None:
 
 def test_a_pen_that_fits_is_said_to(live: Seen) -> None:
     live.wait("10 of 10 LEDs")
-    live.wait("Every LED sits where the table has it, in")
+    live.wait("Every LED is within 0.1 mm of its place in the table, in")
 
     assert "misfit 0.0" in live.words
     assert live.child(StateBanner).value().tone is Tone.GOOD
@@ -685,14 +693,14 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
 ) -> None:
     caught: list[BaseException] = []
     monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
-    live.wait("Every LED sits where the table has it, in")
+    live.wait("Every LED is within 0.1 mm of its place in the table, in")
     with monkeypatch.context() as broken:
         broken.setattr("lightpen_app.pages.leds_watch.match_pen", lambda *_: 1 / 0)
         live.qtbot.waitUntil(lambda: bool(caught), timeout=8000)
         live.qtbot.waitUntil(lambda: not live.cell(7, MISFIT), timeout=8000)
         assert "Every LED sits" not in live.words
 
-    live.wait("Every LED sits where the table has it, in")
+    live.wait("Every LED is within 0.1 mm of its place in the table, in")
     live.qtbot.waitUntil(lambda: live.cell(7, MISFIT).startswith("0.0"))
     assert all(isinstance(error, ZeroDivisionError) for error in caught)
 
@@ -710,7 +718,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: Seen) -> None:
 
     live.type_cell(7, Y, "160")
 
-    live.wait("Every LED sits where the table has it, in")
+    live.wait("Every LED is within 0.1 mm of its place in the table, in")
     assert live.told_of(7) == ""
 
 
@@ -747,7 +755,7 @@ def test_raw_coordinates_are_matched_too(live: Seen, tmp_path: Path) -> None:
     live.open(write_table(tmp_path / "raw.csv", raw()))
 
     live.wait("10 of 10 LEDs")
-    live.wait("Every LED sits where the table has it, in")
+    live.wait("The LEDs fit the images, but not the pen frame")
 
 
 def test_a_covered_led_is_told(seen: Seen, bench: Bench, small_scene: Scene) -> None:

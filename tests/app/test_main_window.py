@@ -7,6 +7,7 @@ from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QCheckBox,
     QLineEdit,
     QMenu,
     QMessageBox,
@@ -178,6 +179,19 @@ def test_enter_on_another_button_presses_that_one(
         press(Key.Key_Return)
 
     assert shell.shown == "Start"
+
+
+def test_enter_on_a_check_box_presses_the_main_button(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    box = QCheckBox(shell.pages[0])
+    box.show()
+    box.setFocus()
+
+    press(Key.Key_Return)
+
+    assert not box.isChecked()
+    assert shell.shown == "Camera"
 
 
 def test_escape_neither_leaves_the_page_nor_closes_the_window(

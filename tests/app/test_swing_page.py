@@ -574,6 +574,7 @@ def test_a_camera_that_is_unplugged_and_back_costs_nothing(
     camera.faults.unplug()
     until(qtbot, lambda: capturing.value.state.word == "NO IMAGES")
     assert "goes on by itself" in capturing.value.hint
+    assert capturing.recorder.sounds()[-1] is Sound.LOST
 
     camera.faults.plug_in()
     until(qtbot, lambda: capturing.bench.live.connection is Connection.STREAMING)

@@ -330,6 +330,7 @@ def test_a_date_is_kept_if_it_can_be_told(
         ("4638.1999999999998", "463O", r"is not a number \(letter O\)"),
         ("4638.1999999999998", "-4638", "focal lengths -4638 and 4637.1 px"),
         ("4638.1999999999998", "16.0", "may be in millimetres"),
+        ("4638.1999999999998", "2000", "2000 and 4637.1 px along u and v"),
         ("1031.3", "103100", r"principal point at \(1219.6, 103100\) px, far outside"),
         ("4638.1999999999998, 0.", "4638.1999999999998, 0.5", "skew of 0.5 px"),
         ("0., 0., 1.", "0., 0., 2.", "not of the form fx 0 cx, 0 fy cy, 0 0 1"),
@@ -532,11 +533,12 @@ def cameras(draw: st.DrawFn) -> Camera:
         root = rng.normal(size=(4 + n, 4 + n)) * 10.0 ** rng.integers(-8, 3, 4 + n)
         covariance = root.T @ root
         covariance = (covariance + covariance.T) / 2
+    fx = draw(st.floats(300, 1e6))
     return Camera(
         width=draw(st.integers(1, 9000)),
         height=draw(st.integers(1, 9000)),
-        fx=draw(st.floats(200, 1e6)),
-        fy=draw(st.floats(200, 1e6)),
+        fx=fx,
+        fy=fx * draw(st.floats(0.7, 1.4)),
         cx=draw(st.floats(0, 1)),
         cy=draw(st.floats(0, 1)),
         distortion=np.array(draw(st.lists(finite, min_size=n, max_size=n))),

@@ -16,6 +16,7 @@ from lightpen.session.interrupted import (
     discard_damaged,
     discard_swing,
     find_unfinished,
+    read_for_more,
     read_resumable,
 )
 from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
@@ -334,3 +335,18 @@ def test_a_swing_under_way_in_another_program_is_told_apart_until_that_is_killed
     other.wait()
     assert find_unfinished(tmp_path).under_way == ()
     assert names_found(tmp_path) == ["a"]
+
+
+def test_a_swing_that_goes_on_after_its_verdict_is_resumed_with_the_same_limits(
+    preparation: Preparation, tmp_path: Path
+) -> None:
+    limits = replace(preparation.limits, min_images=2, max_images=3)
+    with recorded(replace(preparation, limits=limits), tmp_path / "a", 2) as writer:
+        writer.conclude("check")
+
+    more = read_for_more(tmp_path / "a")
+    again = read_resumable(tmp_path / "a")
+
+    assert more.setup.limits.min_images > limits.max_images
+    assert again.setup.limits == more.setup.limits
+    assert find_unfinished(tmp_path).interrupted == ()

@@ -1,6 +1,7 @@
 """The kept images: one fit, whatever way they came in; slipped ones found."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -87,6 +88,17 @@ def test_images_from_before_a_slip_need_not_be_far_out() -> None:
     _, suspected = without_slipped(CAMERA, PEN, kept, since=3.75)
     assert sure < suspected
     assert suspected <= {39, 40}
+
+
+def test_an_image_that_the_fit_leaves_out_has_the_misfit_of_all_its_leds() -> None:
+    kept = grown(slipping([], 0.0))
+    assert kept.joint is not None
+    used = kept.joint.used.copy()
+    used[5] = False
+    without = replace(kept, joint=replace(kept.joint, used=used))
+
+    squares = np.sum(kept.joint.residuals[5] ** 2, axis=1)
+    np.testing.assert_allclose(without.misfits[5], np.sqrt(squares.mean()))
 
 
 def test_a_tip_that_wobbles_throughout_costs_no_images() -> None:

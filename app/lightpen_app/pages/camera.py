@@ -207,7 +207,8 @@ class CameraPage(Page):
     def _on_source_chosen(self, source: SourceChoice) -> None:
         self._forget_trouble()
         now = self._bench.preparation
-        self._bench.set_preparation(replace(now, source=source))
+        mask = now.mask if source == now.source else np.zeros((0, 3))
+        self._bench.set_preparation(replace(now, source=source, mask=mask))
 
     def _on_path_chosen(self, path: str) -> None:
         if self._reading is not None:

@@ -109,7 +109,7 @@ class LedsPage(Page):
 
     @override
     def is_complete(self) -> bool:
-        return not self._bench.preparation.leds_lacks() and not self._is_pending
+        return not self._bench.preparation.leds_lacks()
 
     @override
     def why_closed(self) -> str:
@@ -224,6 +224,12 @@ class LedsPage(Page):
         frame = self._check.frame
         self._table.set_flaw(self._check.flaw)
         self._file.set_problem("" if frame is None else frame.error)
+        self._match.set_has_frame(frame is None or not frame.error)
+        preparation = self._bench.preparation
+        if preparation.has_unsaved_leds is not self._is_pending:
+            self._bench.set_preparation(
+                replace(preparation, has_unsaved_leds=self._is_pending)
+            )
         self._refresh()
         self._aim()
         self.changed.emit()

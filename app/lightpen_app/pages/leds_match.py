@@ -12,6 +12,7 @@ from typing_extensions import override
 from lightpen.calibrate import USUAL_SIGMA
 from lightpen.observe import Reason
 from lightpen.pen_check.match import Finding, PenMatch, What
+from lightpen.pen_check.shifts import MIN_SHIFT
 from lightpen.session.sighting import Sighting
 from lightpen_app.live_view import Shown
 from lightpen_app.phrases import reason_text
@@ -39,6 +40,7 @@ class MatchPanel(Translated, QGroupBox):
         self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)
         self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
         self._why_none = ""
+        self._has_frame = True
 
         # Widgets
         self._view = ImageView()
@@ -94,6 +96,12 @@ class MatchPanel(Translated, QGroupBox):
         """Say what is missing to find the pen in the images, or nothing."""
         if sentence != self._why_none:
             self._why_none = sentence
+            self._refresh()
+
+    def set_has_frame(self, has_frame: bool) -> None:
+        """Say whether the pen stands in its frame; if not, fitting is not enough."""
+        if has_frame != self._has_frame:
+            self._has_frame = has_frame
             self._refresh()
 
     def value(self) -> PenMatch | None:
@@ -161,7 +169,7 @@ class MatchPanel(Translated, QGroupBox):
         word = self.tr("{0} of {1} LEDs").format(n_seen, n_leds)
         detail = self.tr("misfit {0} px").format(_pixels(sigma))
         good = n_seen == n_leds and sigma <= USUAL_SIGMA
-        if good and not self.reasons():
+        if good and self._has_frame and not self.reasons():
             return State(word, detail, Sign.CHECK, Tone.GOOD)
         return State(word, detail, Sign.WARNING, Tone.WARN)
 
@@ -179,9 +187,17 @@ class MatchPanel(Translated, QGroupBox):
         elif not match.fits:
             words = self.tr("Lean and turn the pen, so that it is seen from all sides.")
             remarks = [Remark(words, Sign.WAIT, Tone.QUIET)]
+        elif not self._has_frame:
+            words = self.tr(
+                "The LEDs fit the images, but not the pen frame: see what is told of "
+                "the file."
+            )
+            remarks = [Remark(words, Sign.WARNING, Tone.WARN)]
         else:
-            words = self.tr("Every LED sits where the table has it, in {0} views.")
-            text = words.format(match.n_views)
+            words = self.tr(
+                "Every LED is within {0} mm of its place in the table, in {1} views."
+            )
+            text = words.format(f"{MIN_SHIFT:g}", match.n_views)
             remarks = [Remark(text, Sign.CHECK, Tone.GOOD)]
         return remarks
 

@@ -62,6 +62,7 @@ class SwingPage(Page):
         self._measured: tuple[Kept, Shortfall] | None = None
         self._said: tuple[MainAction, bool] | None = None
         self._was_capturing = False
+        self._was_troubled = False
         self._press_act: Callable[[], object] = self._flow.toggle_pause
         self._on_yes: Callable[[], object] = self._run.finish
 
@@ -90,8 +91,8 @@ class SwingPage(Page):
         self._run.happened.connect(self._on_happened)
         self._run.progressed.connect(self._on_progressed)
         self._live.image_shown.connect(self._on_image_shown)
-        self._live.connection_changed.connect(self._show_soon)
-        self._flow.changed.connect(self._show_soon)
+        self._live.connection_changed.connect(self._on_connection_changed)
+        self._flow.changed.connect(self._on_flow_changed)
         self._flow.troubled.connect(self.notice_raised)
         self._sight.continued.connect(self._on_continued)
         self._question.agreed.connect(self._on_question_agreed)
@@ -303,6 +304,17 @@ class SwingPage(Page):
             n_kept = moment.state.n_kept
             progress = n_kept / max(n_kept + moment.short.n_more, 1)
         self._sounds.play(SOUNDS[event.what], progress)
+
+    def _on_connection_changed(self, connection: Connection) -> None:
+        if connection is Connection.LOST and self._run.is_capturing:
+            self._sounds.play(Sound.LOST)
+        self._show_soon()
+
+    def _on_flow_changed(self) -> None:
+        if self._flow.is_troubled and not self._was_troubled:
+            self._sounds.play(Sound.LOST)
+        self._was_troubled = self._flow.is_troubled
+        self._show_soon()
 
     def _on_progressed(self, fraction: float) -> None:
         self._solved = fraction

@@ -1,6 +1,6 @@
 """What the operator is shown at one moment of a swing, as a value for the widgets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 
 from PySide6.QtCore import QObject
@@ -12,7 +12,7 @@ from lightpen.session.posture import Posture, posture_of
 from lightpen.session.progress import Shortfall, turn_range
 from lightpen.session.swing import COUNTDOWN, has_just_slipped
 from lightpen.session.swing_state import Pause, Phase, SwingSetup, SwingState
-from lightpen.session.verdict import Grade, Verdict
+from lightpen.session.verdict import Grade, NextStep, Verdict
 from lightpen_app.grades import GRADE_MARKS
 from lightpen_app.phrases import (
     Phrase,
@@ -137,6 +137,12 @@ class SwingWords(QObject):
     def _told(self, moment: Moment) -> Phrase:
         state = moment.state
         message, heading = state.message, state.heading
+        if moment.lacks_images and state.pause is Pause.BY_USER:
+            hint = self.tr(
+                "The camera sends none; nothing is lost. Press Space to go on when "
+                "they come."
+            )
+            return replace(self._no_images(), hint=hint)
         if moment.lacks_images:
             return self._no_images()
         if moment.is_unsolved:
@@ -148,7 +154,7 @@ class SwingWords(QObject):
         if moment.is_accepted:
             return Phrase(self.tr("Accepted"), self.tr("Put the pen down."))
         if moment.verdict is not None:
-            return self._next_step(moment.verdict.grade)
+            return self._next_step(moment.verdict)
         if moment.is_troubled and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "An image could not be recorded; the notice at the top says why. Mend "
@@ -165,14 +171,17 @@ class SwingWords(QObject):
             return lean_phrase(state.target, _posture(moment), heading)
         return told
 
-    def _next_step(self, grade: Grade) -> Phrase:
+    def _next_step(self, verdict: Verdict) -> Phrase:
         steps = {
             Grade.PASS: self.tr("Done"),
             Grade.CHECK: self.tr("Look at it"),
             Grade.REPEAT: self.tr("Repeat the swing"),
         }
+        step = steps[verdict.grade]
+        if not verdict.can_be_accepted and verdict.next_step is NextStep.CAPTURE_MORE:
+            step = self.tr("Capture more")
         hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
-        return Phrase(steps[grade], hint)
+        return Phrase(step, hint)
 
     def _no_images(self) -> Phrase:
         return Phrase(

@@ -118,7 +118,8 @@ class PlotCard(Translated, QFrame):
         self._save_png.setText(self.tr("Save picture (PNG)"))
         self._save_csv.setText(self.tr("Save numbers (CSV)"))
         self._button.setToolTip(self.tr("Enlarge or save this plot"))
-        self._button.setAccessibleName(self.tr("Enlarge or save this plot"))
+        words = f"{self._plot.accessibleName()}: {self._button.toolTip()}"
+        self._button.setAccessibleName(words)
 
 
 class PlotGrid(QWidget):

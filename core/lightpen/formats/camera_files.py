@@ -41,6 +41,7 @@ from lightpen.formats.entries import Entries, counted_noun
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
+LARGEST_ASPECT = 1.5  # of a pixel
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 SYMMETRY_TOLERANCE = 1e-6  # of the covariance, relative: files with few digits
 
@@ -289,6 +290,12 @@ def _check_pinhole(pinhole: FloatArray, width: int, height: int, name: str) -> N
             f"{name} has the focal lengths {fx:g} and {fy:g} px, too short for "
             f"images of {width} x {height} px; they may be in millimetres. Give them "
             "in pixels."
+        )
+    if max(fx, fy) > LARGEST_ASPECT * min(fx, fy):
+        raise FileError(
+            f"{name} has the focal lengths {fx:g} and {fy:g} px along u and v; with "
+            "the pixels of a camera these are nearly alike. Export the file again, or "
+            "calibrate the camera again."
         )
     if abs(cx - width / 2) > width or abs(cy - height / 2) > height:
         raise FileError(

@@ -132,20 +132,29 @@ def read_resumable(folder: Path) -> Resumable:
     """
     record = open_record(folder)
     setup = recorded_setup(record)
+    if record.more is not None:
+        min_images, max_images = record.more
+        limits = replace(setup.limits, min_images=min_images, max_images=max_images)
+        setup = replace(setup, limits=limits)
     return Resumable(record, setup, resume_swing(setup, record))
 
 
 def read_for_more(folder: Path) -> Resumable:
     """Read a swing that has all it needs, to capture more images nevertheless.
 
+    The record notes it, so that the swing goes on likewise when it is interrupted.
+
     Raises
     ------
     FileError
-        The record or one of its files cannot be read.
+        The record or one of its files cannot be read, or the record be written.
     """
     swing = read_resumable(folder)
     limits = limits_for_more(swing.setup.limits, swing.state.n_kept)
-    return replace(swing, setup=replace(swing.setup, limits=limits))
+    with RecordWriter.resume(swing.record) as writer:
+        writer.ask_for_more(limits.min_images, limits.max_images)
+    setup = replace(swing.setup, limits=limits)
+    return replace(swing, record=open_record(folder), setup=setup)
 
 
 def discard_swing(folder: Path) -> None:

@@ -76,13 +76,18 @@ class Kept:
 
     @property
     def misfits(self) -> FloatArray:
-        """Root mean square residual of each image in the joint fit, px, (N,)."""
+        """Root mean square residual of each image in the joint fit, px, (N,).
+
+        Of an image that the fit leaves out, over all LEDs that it shows.
+        """
         if self.joint is None:
             return self.sigmas
         squares = np.einsum("nli,nli->nl", self.joint.residuals, self.joint.residuals)
-        n_used = np.maximum(self.joint.used.sum(axis=1), 1)
-        total = np.sum(np.where(self.joint.used, squares, 0), axis=1)
-        return np.asarray(np.sqrt(total / n_used))
+        used = self.joint.used
+        takes_part = used.any(axis=1, keepdims=True)
+        counted = np.where(takes_part, used, np.isfinite(squares))
+        total = np.sum(squares, axis=1, where=counted)
+        return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
 
 
 def none_kept(n_leds: int) -> Kept:

@@ -109,6 +109,7 @@ class Lack(StrEnum):
     CAMERA_FILE = "camera file"
     IMAGE_SIZE = "image size"
     PEN_FILE = "pen file"
+    SAVED_LEDS = "saved leds"
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +129,8 @@ class Preparation:
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
     limits : SwingLimits
+    has_unsaved_leds : bool
+        Whether LEDs were edited or opened that are not those of the file in use.
     """
 
     names: Names = field(default_factory=Names)
@@ -138,6 +141,7 @@ class Preparation:
     pen_file: PenFile | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     limits: SwingLimits = field(default_factory=SwingLimits)
+    has_unsaved_leds: bool = False
 
     @property
     def camera(self) -> Camera | None:
@@ -186,7 +190,11 @@ class Preparation:
 
     def leds_lacks(self) -> tuple[Lack, ...]:
         """Return what the step LEDs lacks."""
-        return () if self.pen_file is not None else (Lack.PEN_FILE,)
+        lacks = {
+            Lack.PEN_FILE: self.pen_file is None,
+            Lack.SAVED_LEDS: self.has_unsaved_leds,
+        }
+        return tuple(lack for lack, is_lacking in lacks.items() if is_lacking)
 
     def lacks(self) -> tuple[Lack, ...]:
         """Return all that is missing before a swing."""

@@ -144,6 +144,8 @@ class Record:
         Numbers of images that do not take part, and why.
     verdict : str or None
         The last one; None if the swing was interrupted.
+    more : pair of int or None
+        Least and greatest number of images that were asked for after a verdict.
     length : int
         Of what was read of the journal, bytes.
     """
@@ -153,6 +155,7 @@ class Record:
     images: tuple[RecordedImage, ...]
     taken_out: Mapping[int, str]
     verdict: str | None
+    more: tuple[int, int] | None
     length: int
 
     @property
@@ -212,7 +215,7 @@ def open_record(folder: Path) -> Record:
     header = _read_header(folder)
     images: list[RecordedImage] = []
     taken_out: dict[int, str] = {}
-    verdict = None
+    verdict, more = None, None
     lines = _sound_lines(folder)
     for number, line in enumerate(lines, start=1):
         try:
@@ -230,13 +233,17 @@ def open_record(folder: Path) -> Record:
                         taken_out.pop(image, None)
                 case "verdict":
                     verdict = str(entries["verdict"])
+                case "more":
+                    more = int(entries["min_images"]), int(entries["max_images"])
         except (ValueError, KeyError, TypeError) as error:
             raise FileError(
                 f"Line {number} of {printable(str(folder / JOURNAL))} is damaged. "
                 "Restore the file from a copy, or remove the line to go on without "
                 "that image."
             ) from error
-    return Record(folder, header, tuple(images), taken_out, verdict, _length_of(lines))
+    return Record(
+        folder, header, tuple(images), taken_out, verdict, more, _length_of(lines)
+    )
 
 
 def record_files(record: Record) -> tuple[Path, ...]:

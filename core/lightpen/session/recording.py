@@ -179,6 +179,12 @@ class RecordWriter:
         """Let images take part in the calibration again."""
         self._write_line({"kind": "back", "numbers": list(numbers)})
 
+    def ask_for_more(self, min_images: int, max_images: int) -> None:
+        """Note that the swing goes on after a verdict, and to how many images."""
+        self._write_line(
+            {"kind": "more", "min_images": min_images, "max_images": max_images}
+        )
+
     def conclude(self, verdict: str) -> None:
         """Write the verdict: the swing is no longer interrupted."""
         self._write_line({"kind": "verdict", "verdict": verdict})

@@ -1065,8 +1065,12 @@
         <translation>倾斜并转动光笔，让相机从各个方向看到它。</translation>
     </message>
     <message>
-        <source>Every LED sits where the table has it, in {0} views.</source>
-        <translation>在 {0} 个视图中，每个 LED 都在表格给出的位置。</translation>
+        <source>The LEDs fit the images, but not the pen frame: see what is told of the file.</source>
+        <translation>LED 与图像相符，但不符合测笔坐标系：请看文件处的说明。</translation>
+    </message>
+    <message>
+        <source>Every LED is within {0} mm of its place in the table, in {1} views.</source>
+        <translation>在 {1} 个视角中，每个 LED 与表中位置相差均不超过 {0} mm。</translation>
     </message>
     <message>
         <source>{0} of LEDs {1} and {2} are exchanged in the table.</source>
@@ -2050,6 +2054,10 @@
         <translation>{0}；已丢弃 {1} 幅</translation>
     </message>
     <message>
+        <source>The camera sends none; nothing is lost. Press Space to go on when they come.</source>
+        <translation>相机没有发送图像；没有任何丢失。图像恢复后按空格键继续。</translation>
+    </message>
+    <message>
         <source>Not computed</source>
         <translation>尚未计算</translation>
     </message>
@@ -2084,6 +2092,10 @@
     <message>
         <source>Repeat the swing</source>
         <translation>重做摆动</translation>
+    </message>
+    <message>
+        <source>Capture more</source>
+        <translation>继续采集</translation>
     </message>
     <message>
         <source>Hold the pen upright and still for 3 s to see the review.</source>
@@ -2448,6 +2460,10 @@
     <message>
         <source>Open the LED geometry file.</source>
         <translation>请打开 LED 几何文件。</translation>
+    </message>
+    <message>
+        <source>Save or discard the changes of the LED table.</source>
+        <translation>请保存或放弃 LED 表的更改。</translation>
     </message>
     <message>
         <source>unreadable</source>
