@@ -205,7 +205,7 @@ def test_exchanged_leds_are_named(prepared: "Walker", tmp_path: Path) -> None:
 
     prepared.until_tells("LEDs 6 and 9 are exchanged")
     assert prepared.tells("Mend the LED table first: what is wrong is told above.")
-    assert prepared.steps()["Swing"] == "to do"  # with the file that is in use
+    assert prepared.steps()["Swing"] == "closed"
 
 
 def test_a_displaced_led_is_named(prepared: "Walker", tmp_path: Path) -> None:
