@@ -33,7 +33,7 @@ from lightpen_app.swing_run import SwingRun
 
 TIMEOUT = 20_000  # ms until a test gives up
 N_IMAGES = 20  # of the record that is resumed
-SHORT = SwingLimits(max_uncertainty=0.03, min_images=12, min_per_field=0)
+SHORT = SwingLimits(max_uncertainty=0.015, min_images=12, min_per_field=0)
 
 
 class Stage:
