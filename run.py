@@ -21,7 +21,7 @@ Usage: {run} COMMAND
 
   demo             watch a simulated operator calibrate a tip
   test [ARGS]      run the test suite; ARGS go to pytest
-  check            run the linter, the formatter's check and the type checker
+  check            check style, types and the order of imports
   bench [ARGS]     measure every figure of speed and accuracy; try: {run} bench --help
   lightpen [ARGS]  run the program itself; try: {run} lightpen --help
 
@@ -29,6 +29,12 @@ Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"  # the first that installs dependency groups
+CHECKS = (
+    ("ruff", "check"),
+    ("ruff", "format", "--check"),
+    ("mypy",),
+    ("lint-imports", "--no-cache"),
+)
 REQUIREMENTS = {
     "program": ["--editable", "."],
     "development": ["--editable", ".", "--group", "dev"],
@@ -191,13 +197,11 @@ def become(command: Sequence[str]) -> NoReturn:
 
 def check(environment: Environment) -> int:
     """Run every check even if an earlier one fails."""
-    python = environment.program("python")
     status = 0
-    for arguments in (["ruff", "check"], ["ruff", "format", "--check"], ["mypy"]):
-        say(f"$ {' '.join(arguments)}")
-        status |= subprocess.run(
-            [python, "-m", *arguments], cwd=ROOT, check=False
-        ).returncode
+    for name, *arguments in CHECKS:
+        say(f"$ {' '.join((name, *arguments))}")
+        command = [environment.program(name), *arguments]
+        status |= subprocess.run(command, cwd=ROOT, check=False).returncode
     return status
 
 

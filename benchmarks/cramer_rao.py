@@ -10,13 +10,13 @@ from benchmarks.tips import one_step
 from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.calibrate import calibrate
-from lightpen.camera import Camera
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.pose import fit_poses
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.joint import ContactModel, reduce
 from lightpen.formats.observation_files import Centers
-from lightpen.joint import ContactModel, reduce
-from lightpen.observe import observe_centers
-from lightpen.pen import Pen
-from lightpen.pose import fit_poses
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,

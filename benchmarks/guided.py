@@ -17,17 +17,10 @@ from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.hand import Operator
-from lightpen.session.posture import Posture, angles_between, rotations_of
-from lightpen.session.sighting import Sighting, sight_centers
-from lightpen.session.swing import feed
-from lightpen.session.swing_state import (
-    Phase,
-    SwingLimits,
-    SwingSetup,
-    SwingState,
-    start_swing,
-)
+from lightpen.detection.sighting import Sighting, sight_centers
+from lightpen.model.limits import SwingLimits
+from lightpen.model.posture import Posture, angles_between, rotations_of
+from lightpen.simulator.hand import Operator
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
@@ -35,6 +28,13 @@ from lightpen.simulator.swings import (
     paper_pen,
     simulate_centers,
     swing_poses,
+)
+from lightpen.swing.rules import advance
+from lightpen.swing.state import (
+    Phase,
+    SwingSetup,
+    SwingState,
+    start_swing,
 )
 
 SEEDS = tuple(range(20))
@@ -122,7 +122,7 @@ def _swing(seed: int, kind: str) -> Outcome:
         now = clock.now_ns() * 1e-9
         sighting = _sight(setup, operator, now, rng)
         start = time.thread_time()
-        state = feed(setup, state, sighting, now).state
+        state = advance(setup, state, sighting, now).state
         slowest = max(slowest, time.thread_time() - start)
         if state.phase is not Phase.CAPTURING:
             continue

@@ -11,13 +11,16 @@ from benchmarks.tips import UM
 from benchmarks.workers import Workers
 
 from lightpen.arrays import BoolArray, Image
-from lightpen.calibrate import Calibration, calibrate
-from lightpen.ellipse import disc_images
-from lightpen.images import ImageSource
-from lightpen.observe import Reason, observe_images
+from lightpen.detection.observations import (
+    observe_images,
+)
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.formats.images import ImageSource
+from lightpen.model.ellipse import disc_images
+from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
 from lightpen.simulator.scene_files import scene_truth
 from lightpen.simulator.scenes import HARD, Scene
-from lightpen.simulator.shots import ScenePlan, plan_scene, render_shot
 from lightpen.simulator.swings import leds_in_camera
 
 SEEDS = (101, 102, 103)
@@ -116,7 +119,7 @@ def _rendered(plan: ScenePlan) -> ImageSource:
 
     def loaders() -> Iterator[Callable[[], Image]]:
         for shot in plan.shots:
-            yield partial(render_shot, plan.scene, shot)
+            yield partial(render_plan, plan.scene, shot)
 
     return ImageSource(tuple(str(shot.index) for shot in plan.shots), (), loaders)
 

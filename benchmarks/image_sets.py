@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.pen_files import read_pen
-from lightpen.images import ImageSource, find_images
-from lightpen.pen import Pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 
 
 def data_folder() -> Path | None:

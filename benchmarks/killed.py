@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.session.interrupted import find_unfinished
-from lightpen.session.record import Record, open_record
-from lightpen.session.solving import solve_record
+from lightpen.record.reading import Record, open_record
+from lightpen.record.solving import solve_record
+from lightpen.record.unfinished import find_unfinished
 from lightpen.simulator.swings import PAPER_TIP
 
 N_KILLS = 20

@@ -8,11 +8,11 @@ from benchmarks.rows import Row
 from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.ellipse import disc_images
-from lightpen.labelling.labels import Labels, Verdict, label_images
-from lightpen.rigid import rotation_from_vector
+from lightpen.detection.labelling.labels import Labels, LabelStatus, label_images
+from lightpen.detection.spots import Spots
+from lightpen.model.ellipse import disc_images
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import paper_camera, paper_pen
-from lightpen.spots import Spots
 
 CAMERA = paper_camera()
 PEN = paper_pen()
@@ -96,7 +96,7 @@ def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> View:
 
 def outcome(labels: Labels, view: View) -> str:
     """Return whether an image was labelled right, wrong, or refused."""
-    if labels.reason is not Verdict.LABELLED:
+    if labels.reason is not LabelStatus.LABELLED:
         return "refused"
     named = labels.spot >= 0
     right = np.array_equal(labels.spot[named], view.spot[named])

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.camera import Camera
-from lightpen.pen import Pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 
 BLOB_STEP = 3.0  # grey values from threshold to threshold; more exact than 1 or 10
 DEFAULT_BLOB_STEP = 10.0  # OpenCV's

@@ -25,15 +25,18 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
-from lightpen.session.preparation import Names
-from lightpen.session.swing_state import Phase, SwingLimits
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.swing.state import (
+    Phase,
+)
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.settings import Preferences, Settings
 from lightpen_app.wizard_pages import make_pages
+from lightpen_app.work.settings import Preferences, Settings
 
 TIMER_MS = 10
 SAMPLE_MS = 1000
-NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
+NAMES = Names("Workbench", "Workbench", "SIM-1", "T-1", "C-1", 10.0)
 # Never reached, so that each swing goes on to its last image.
 LIMITS = SwingLimits(max_uncertainty=1e-9)
 
@@ -77,22 +80,22 @@ class Soak(QObject):
             if window.page().key == before:
                 QTimer.singleShot(100, self.start)
                 return
-        self._wizard.bench.live.set_following(True)
-        operator = self._wizard.bench.live.operator
+        self._wizard.workbench.live.set_following(True)
+        operator = self._wizard.workbench.live.operator
         assert operator is not None
         operator.seat()
         self._plots = [p for p in window.findChildren(pg.PlotWidget) if p.isVisible()]
         for plot in self._plots:
             plot.viewport().installEventFilter(self)
         self._start = self._last_tick = time.perf_counter()
-        self._stats = self._wizard.bench.live.stats
+        self._stats = self._wizard.workbench.live.stats
         self._ticker.start()
         self._sampler.start()
 
     def figures(self) -> dict[str, object]:
         """Return what was measured."""
         elapsed = time.perf_counter() - self._start
-        stats = self._wizard.bench.live.stats.since(self._stats)
+        stats = self._wizard.workbench.live.stats.since(self._stats)
         return {
             "seconds": elapsed,
             "images": stats.delivered - stats.skipped,
@@ -130,11 +133,11 @@ class Soak(QObject):
             self._sampler.stop()
             QApplication.exit()
             return
-        run = self._wizard.bench.run
+        run = self._wizard.workbench.run
         if run.state is not None and run.state.phase is Phase.VERDICT:
             self._n_swings += 1
             run.set_aside()
-            run.begin(self._wizard.bench.preparation)
+            run.begin(self._wizard.workbench.preparation)
 
 
 def _memory_mb() -> float:
@@ -152,14 +155,16 @@ def main() -> int:
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.resize(1920, 1080)
         wizard.window.show()
-        wizard.bench.start()
-        bench = wizard.bench
-        bench.set_preparation(replace(bench.preparation, names=NAMES, limits=LIMITS))
+        wizard.workbench.start()
+        workbench = wizard.workbench
+        workbench.set_preparation(
+            replace(workbench.preparation, names=NAMES, limits=LIMITS)
+        )
         soak = Soak(wizard, float(sys.argv[1]))
         QTimer.singleShot(0, soak.start)
         application.exec()
         print(json.dumps(soak.figures()))
-        bench.run.abandon()
+        workbench.run.abandon()
         wizard.window.close()
     return 0
 

@@ -20,20 +20,20 @@ from benchmarks.rows import Row
 from benchmarks.workers import Workers, elapsed_ms, median_ms
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.calibrate import calibrate
-from lightpen.ellipse import centers_from_centroids, ellipse_centers
+from lightpen.detection.labelling.labels import Labels, label_spots, track_spots
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
+from lightpen.detection.spots import Spots, detect_spots
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.joint import extend_joint, fit_joint
+from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.two_stage import fit_two_stage
 from lightpen.formats.observation_files import Centers
-from lightpen.joint import extend_joint, fit_joint
-from lightpen.labelling.labels import Labels, label_spots, track_spots
-from lightpen.observe import observe_centers
-from lightpen.pivot import fit_pivot
-from lightpen.pose import Poses, fit_paper_poses, fit_poses
-from lightpen.rigid import rotation_from_vector
+from lightpen.model.ellipse import centers_from_centroids, ellipse_centers
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.image_plans import ImagePlan, live_plan, render_plan
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.shots import Shot, live_shot, render_shot
 from lightpen.simulator.swings import leds_in_camera, simulate_centers, swing_poses
-from lightpen.spots import Spots, detect_spots
-from lightpen.two_stage import fit_two_stage
 
 N_IMAGES = 50  # of the camera, at 20 a second
 FRAME_RATE = 20.0
@@ -129,8 +129,8 @@ def _row(what: str, time_ms: float, limit: str, others: str = "") -> Row:
 
 
 def _image_times() -> _ImageTimes:
-    shots = [live_shot(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
-    images = [render_shot(SCENE, shot) for shot in shots]
+    shots = [live_plan(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
+    images = [render_plan(SCENE, shot) for shot in shots]
     blobs, default_blobs = blob_detector(), blob_detector(DEFAULT_BLOB_STEP)
 
     def start(i: int) -> Poses:
@@ -149,7 +149,7 @@ def _image_times() -> _ImageTimes:
         solve_pnp(CAMERA, PEN, nearest(found, _true_centers(shots[i])))
 
     def render(i: int) -> Image:
-        return render_shot(SCENE, live_shot(SCENE, i, i / FRAME_RATE))
+        return render_plan(SCENE, live_plan(SCENE, i, i / FRAME_RATE))
 
     return _ImageTimes(
         tracking=_median_over_images(track),
@@ -185,7 +185,7 @@ def _predicted(earlier: Poses, last: Poses) -> tuple[FloatArray, FloatArray]:
     return R, t
 
 
-def _true_centers(shot: Shot) -> FloatArray:
+def _true_centers(shot: ImagePlan) -> FloatArray:
     leds, normals = leds_in_camera(PEN, shot.rotation, shot.translation)
     return ellipse_centers(CAMERA, leds, normals, PEN.diameter / 2)
 

@@ -19,15 +19,15 @@ def main() -> int:
     from PySide6.QtWidgets import QApplication
 
     from lightpen_app.application import Wizard, make_application
-    from lightpen_app.settings import Settings
     from lightpen_app.wizard_pages import make_pages
+    from lightpen_app.work.settings import Settings
 
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
         settings = Settings(Path(folder) / "lightpen.ini")
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.show()
-        wizard.bench.start()
+        wizard.workbench.start()
 
         def answer(window: QObject) -> None:
             for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):

@@ -16,13 +16,20 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.session.interrupted import find_unfinished, read_resumable
-from lightpen.session.preparation import Names
-from lightpen.session.swing_state import Event, Happening, SwingLimits
-from lightpen_app.bench import Bench
-from lightpen_app.settings import Settings
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.unfinished import (
+    find_unfinished,
+)
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.state import (
+    Happening,
+    SwingEvent,
+)
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.workbench import Workbench
 
-NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
+NAMES = Names("Workbench", "Workbench", "SIM-1", "T-1", "C-1", 10.0)
 ENDLESS = SwingLimits(max_uncertainty=1e-9, max_images=100_000)
 
 
@@ -30,28 +37,30 @@ def main() -> int:
     """Swing until this process is killed."""
     folder = Path(sys.argv[1])
     application = QCoreApplication(sys.argv[:1])
-    bench = Bench(Settings(folder / "lightpen.ini"), folder)
-    run = bench.run
+    workbench = Workbench(Settings(folder / "lightpen.ini"), folder)
+    run = workbench.run
 
-    def tell(event: Event) -> None:
+    def tell(event: SwingEvent) -> None:
         if event.what is Happening.KEPT and run.record_folder is not None:
             _say("kept", run.record_folder.name, *event.numbers)
 
     run.happened.connect(tell)
-    bench.set_preparation(replace(bench.preparation, names=NAMES, limits=ENDLESS))
-    bench.use_sample_files()
-    bench.open_camera()
-    operator = bench.live.operator
+    workbench.set_preparation(
+        replace(workbench.preparation, names=NAMES, limits=ENDLESS)
+    )
+    workbench.use_sample_files()
+    workbench.open_camera()
+    operator = workbench.live.operator
     if operator is not None:
         operator.seat()
-    bench.live.set_following(True)
+    workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
         record = offered[0]
         run.go_on(read_resumable(record.folder))
         _say("resumed", record.folder.name, len(record.images))
     else:
-        run.begin(bench.preparation)
+        run.begin(workbench.preparation)
     return application.exec()
 
 

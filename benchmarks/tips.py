@@ -19,11 +19,15 @@ from benchmarks.rows import NO_LIMIT, Row, numbers, without_data
 from benchmarks.workers import Workers
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.calibrate import Calibration, calibrate
+from lightpen.detection.observations import (
+    Observations,
+    observe_centers,
+    observe_images,
+)
+from lightpen.detection.pose import Poses, fit_poses
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.pivot import PivotFit, fit_pivot
 from lightpen.formats.observation_files import read_centers
-from lightpen.observe import Observations, observe_centers, observe_images
-from lightpen.pivot import PivotFit, fit_pivot
-from lightpen.pose import Poses, fit_poses
 
 TIP_LIMITS = {"swing-full": 3.5, "swing-clean": 4.0, "fixed-point": None}  # um
 CENTER_LIMIT = 0.006  # px

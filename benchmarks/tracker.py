@@ -6,8 +6,8 @@ import numpy as np
 from benchmarks.rows import Row, numbers, without_data
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.pivot import fit_pivot
 from lightpen.formats.observation_files import PoseTable, read_poses
-from lightpen.pivot import fit_pivot
 
 # scikit-surgerycalibration, algebraic one-step, in its tests
 PUBLISHED_TIP = np.array([-14.476, 395.143, -7.558])  # mm

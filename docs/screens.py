@@ -28,30 +28,32 @@ from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.hand import Operator
-from lightpen.cameras.protocol import Frame, FrameTimeout, sealed
-from lightpen.cameras.protocol import Settings as CameraSettings
-from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.session.following import Follower
-from lightpen.session.interrupted import read_resumable
-from lightpen.session.live import LiveImage
-from lightpen.session.preparation import Names, Preparation
-from lightpen.session.recording import RecordWriter
-from lightpen.session.results import Result, store_result
-from lightpen.session.sighting import look, sight_centers
-from lightpen.session.sources import Surroundings
-from lightpen.session.swing import feed
-from lightpen.session.swing_state import SwingSetup, SwingState, start_swing
+from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
+from lightpen.detection.sighting import look, sight_centers
+from lightpen.live.looking import LiveImage
+from lightpen.live.preparation import (
+    Preparation,
+)
+from lightpen.live.sources import Surroundings
+from lightpen.record.names import Names
+from lightpen.record.results import Result, store_result
+from lightpen.record.writing import RecordWriter
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.follower import Follower
+from lightpen.simulator.hand import Operator
+from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.shots import plan_scene, render_shot
 from lightpen.simulator.swings import simulate_centers
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.rules import advance
+from lightpen.swing.state import SwingSetup, SwingState, start_swing
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.languages import Language
-from lightpen_app.live_view import Shown
-from lightpen_app.pooling import pooled
-from lightpen_app.settings import Preferences, Settings
-from lightpen_app.theme import GRID, Appearance
+from lightpen_app.look.languages import Language
+from lightpen_app.look.pooling import pooled
+from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.wizard_pages import make_pages
+from lightpen_app.work.live_view import Shown
+from lightpen_app.work.settings import Preferences, Settings
 
 FOLDER = Path(__file__).resolve().parent / "screens"
 DATA = Path("lightpen")  # below the present folder
@@ -117,19 +119,19 @@ class Stage:
         store_result(DATA / "results", _earlier_result())
         around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
-        bench = self._bench = self.wizard.bench
-        bench.set_preparation(replace(bench.preparation, names=NAMES))
-        bench.use_sample_files()
-        bench.live.open(
+        workbench = self._workbench = self.wizard.workbench
+        workbench.set_preparation(replace(workbench.preparation, names=NAMES))
+        workbench.use_sample_files()
+        workbench.live.open(
             StillCamera(self._scene, around.clock), CameraSettings(), around.clock
         )
         self._n_swings = 0
-        bench.live.swing_changed.connect(self._on_swing_changed)
+        workbench.live.swing_changed.connect(self._on_swing_changed)
         self.wizard.window.show()
 
     def close(self) -> None:
         """Close the window without a question."""
-        self._bench.run.abandon()
+        self._workbench.run.abandon()
         self.wizard.window.close()
 
     def set_look(self, look: Look) -> None:
@@ -178,9 +180,9 @@ class Stage:
         QThreadPool.globalInstance().waitForDone()
 
     def _fill_swing(self) -> None:
-        swing = _swing(self._bench.preparation.swing_setup(), self._scene)
+        swing = _swing(self._workbench.preparation.swing_setup(), self._scene)
         self._wait_until(lambda: self._n_swings > 0)  # of the page's own beginning
-        self._bench.live.swing_changed.emit(swing)
+        self._workbench.live.swing_changed.emit(swing)
         for index in range(N_SHOWN):
             self._show_image(index)
         refreshed = QDeadlineTimer(2 * REFRESH_MS)
@@ -191,24 +193,24 @@ class Stage:
 
     def solve(self) -> None:
         """Record a swing and solve it, so that the review opens."""
-        run = self._bench.run
+        run = self._workbench.run
         folder = run.records_folder / "20260930-100000_LP-04_T-10-80"
-        _record(folder, self._bench.preparation)
+        _record(folder, self._workbench.preparation)
         run.go_on(read_resumable(folder))
         run.finish()
         self._wait_until(lambda: run.solution is not None)
 
     def _show_image(self, index: int) -> None:
-        image = sealed(render_shot(self._scene, self._shots[index]))
+        image = sealed(render_plan(self._scene, self._shots[index]))
         frame = Frame(image, seq=index, host_ts_ns=round(index * PERIOD * 1e9))
-        now = self._bench.preparation
+        now = self._workbench.preparation
         assert now.camera is not None
         assert now.pen is not None
         sighting = look(image, now.camera, now.pen, now.mask)
         assert sighting.spots is not None
         height, width = image.shape
         seen = LiveImage(frame, sighting.spots, sighting)
-        self._bench.live.image_shown.emit(
+        self._workbench.live.image_shown.emit(
             Shown(pooled(image), QSize(width, height), seen)
         )
         self._settle()
@@ -263,7 +265,7 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
         t = scene.cone_cam + held.offsets - R @ scene.tip_pen
         pixels = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
         sighting = sight_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
-        state = feed(setup, state, sighting, now).state
+        state = advance(setup, state, sighting, now).state
         follower.follow(state)
     return state
 
@@ -274,7 +276,7 @@ def _record(folder: Path, preparation: Preparation) -> None:
     header = replace(preparation.header(), created=NOW)
     with RecordWriter.create(folder, header) as writer:
         for index, shot in enumerate(plan_scene(scene).shots):
-            image = render_shot(scene, shot)
+            image = render_plan(scene, shot)
             seen = look(image, scene.camera, scene.pen)
             writer.append(
                 image, seen.pixels, seen.rotation, seen.translation, index * PERIOD

@@ -86,7 +86,7 @@ def _characters_used() -> list[int]:
     files = [
         *PACKAGE.glob("translations/*zh_CN.ts"),
         *PACKAGE.glob("help/zh_CN/*.md"),
-        PACKAGE.parents[1] / "app" / "lightpen_app" / "languages.py",
+        PACKAGE.parents[1] / "app" / "lightpen_app" / "look" / "languages.py",
     ]
     text = SIGNS + "".join(file.read_text("utf-8") for file in files)
     return sorted({ord(character) for character in text if character > "\x7f"})

@@ -18,8 +18,8 @@ import pytest
 HOLDER = """
 import sys, time
 from pathlib import Path
-from lightpen.session.record import open_record
-from lightpen.session.recording import RecordWriter
+from lightpen.record.reading import open_record
+from lightpen.record.writing import RecordWriter
 
 with RecordWriter.resume(open_record(Path(sys.argv[1]))):
     print("held", flush=True)
@@ -200,16 +200,24 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
     import numpy as np
 
     from lightpen.cameras.clock import SkippingClock
-    from lightpen.cameras.simulated import SimulatedCamera
-    from lightpen.session.capture import capture_image
-    from lightpen.session.following import Follower
-    from lightpen.session.preparation import CameraFile, Names, PenFile, Preparation
-    from lightpen.session.recording import RecordWriter
-    from lightpen.session.sighting import look
-    from lightpen.session.swing_state import SwingLimits, start_swing
+    from lightpen.detection.sighting import look
+    from lightpen.live.preparation import (
+        CameraFile,
+        PenFile,
+        Preparation,
+    )
+    from lightpen.model.limits import SwingLimits
+    from lightpen.record.names import Names
+    from lightpen.record.writing import RecordWriter
+    from lightpen.simulator.camera import SimulatedCamera
+    from lightpen.simulator.follower import Follower
     from lightpen.simulator.scene_files import write_sample_files
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
+    from lightpen.swing.capture import capture_image
+    from lightpen.swing.state import (
+        start_swing,
+    )
 
     scene = Scene(camera=paper_camera(binning=2))
     files = write_sample_files(scene, folder.parent / "files")

@@ -14,9 +14,9 @@ from time import sleep
 import numpy as np
 import pytest
 
-from lightpen.session.interrupted import find_unfinished
-from lightpen.session.record import Record, is_record, open_record
-from lightpen.session.solving import solve_record
+from lightpen.record.reading import Record, is_record, open_record
+from lightpen.record.solving import solve_record
+from lightpen.record.unfinished import find_unfinished
 from lightpen.simulator.swings import PAPER_TIP
 
 N_KILLS = 20
@@ -31,17 +31,19 @@ import os, sys, time
 from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication
-from lightpen.cameras.hand import Operator
-from lightpen.cameras.protocol import Settings as CameraSettings
-from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.session.interrupted import find_unfinished, read_resumable
-from lightpen.session.preparation import Names
-from lightpen.session.sources import Surroundings
-from lightpen.session.swing_state import Happening, SwingLimits
+from lightpen.simulator.hand import Operator
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.record.unfinished import (find_unfinished,)
+from lightpen.swing.resuming import read_resumable
+from lightpen.record.names import Names
+from lightpen.live.sources import Surroundings
+from lightpen.swing.state import (Happening,)
+from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen_app.bench import Bench
-from lightpen_app.settings import Settings
+from lightpen_app.work.workbench import Workbench
+from lightpen_app.work.settings import Settings
 
 SPEED = 8
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
@@ -66,10 +68,11 @@ def tell(*words):
 def swing(folder):
     application = QCoreApplication([])
     around = Surroundings(Scene(camera=paper_camera(binning=4)), HastyClock())
-    bench = Bench(Settings(folder / "lightpen.ini"), folder, around)
-    bench.set_preparation(replace(bench.preparation, names=NAMES, limits=ENDLESS))
-    bench.use_sample_files()
-    run = bench.run
+    workbench = Workbench(Settings(folder / "lightpen.ini"), folder, around)
+    chosen = replace(workbench.preparation, names=NAMES, limits=ENDLESS)
+    workbench.set_preparation(chosen)
+    workbench.use_sample_files()
+    run = workbench.run
 
     def say(event):
         if event.what is Happening.KEPT:
@@ -78,14 +81,14 @@ def swing(folder):
     run.happened.connect(say)
     clock = around.clock
     camera = SimulatedCamera(around.scene, clock, Operator(clock, seated=True))
-    bench.live.open(camera, CameraSettings(), clock)
-    bench.live.set_following(True)
+    workbench.live.open(camera, CameraSettings(), clock)
+    workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
         run.go_on(read_resumable(offered[0].folder))
         tell("resumed", offered[0].folder.name, run.state.n_kept)
     else:
-        run.begin(bench.preparation)
+        run.begin(workbench.preparation)
     application.exec()
 
 for line in sys.stdin:

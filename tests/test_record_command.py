@@ -10,18 +10,18 @@ from typing import Any
 
 import pytest
 
-from lightpen.calibrate import calibrate
-from lightpen.files import sha256
-from lightpen.observe import observe_images
-from lightpen.session.record import (
+from lightpen.detection.observations import observe_images
+from lightpen.estimation.calibrate import calibrate
+from lightpen.formats.files import sha256
+from lightpen.record.reading import (
     HEADER,
     JOURNAL,
     image_name,
     open_record,
     source,
 )
-from lightpen.session.recording import note_taken_out
-from lightpen.session.solving import solve_record
+from lightpen.record.solving import solve_record
+from lightpen.record.writing import note_taken_out
 
 Run = Callable[..., CompletedProcess[str]]
 N_IMAGES = 20

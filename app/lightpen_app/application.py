@@ -19,20 +19,20 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen.errors import LightpenError, UsageError
-from lightpen.report import calibration_text
-from lightpen.session.sources import Surroundings
-from lightpen_app.bench import Bench
+from lightpen.estimation.report import calibration_text
+from lightpen.live.sources import Surroundings
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
-from lightpen_app.languages import LanguageSwitch
-from lightpen_app.main_window import LEAST_SIZE, MainWindow
-from lightpen_app.pages.page import Page
-from lightpen_app.services import Services
-from lightpen_app.settings import Preferences, Settings, data_folder, settings_file
-from lightpen_app.sounds import Mute, find_sounds
-from lightpen_app.swing_run import SwingRun
-from lightpen_app.theme import apply_theme, colors_for, load_fonts
+from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.sounds import Mute, find_sounds
+from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
+from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
+from lightpen_app.steps.page import Page
+from lightpen_app.steps.services import Services
+from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
+from lightpen_app.work.swing_run import SwingRun
+from lightpen_app.work.workbench import Workbench
 
 MakePages: TypeAlias = Callable[[Services], Sequence[Page]]
 
@@ -71,16 +71,16 @@ class Wizard(QObject):
         self._sounds = Mute(
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
-        self.bench = Bench(settings, folder, around, self)
-        services = Services(self.bench, self._sounds)
+        self.workbench = Workbench(settings, folder, around, self)
+        services = Services(self.workbench, self._sounds)
         self.window = MainWindow(make_pages(services), settings, self._preferences)
         self.window.setMinimumSize(LEAST_SIZE)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
-        self.bench.troubled.connect(self.window.show_notice)
-        self.window.closing.connect(self.bench.shut_down)
-        for part in (self.bench.live, self.bench.run):
+        self.workbench.troubled.connect(self.window.show_notice)
+        self.window.closing.connect(self.workbench.shut_down)
+        for part in (self.workbench.live, self.workbench.run):
             part.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
@@ -153,14 +153,14 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         users = Settings(settings_file()).preferences()
         settings.set_preferences(users)
         wizard = Wizard(application, make_pages, settings, Path(folder))
-        demo = Demo(wizard.window, wizard.bench, is_watched=is_seen)
+        demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:
             demo.told.connect(partial(print, flush=True))
-            demo.ended.connect(partial(_print_tip, wizard.bench.run))
+            demo.ended.connect(partial(_print_tip, wizard.workbench.run))
             demo.ended.connect(wizard.window.close)
         QTimer.singleShot(0, demo.start)
         status = _shown(application, wizard, signals)
-        if not is_seen and wizard.bench.run.result is None:
+        if not is_seen and wizard.workbench.run.result is None:
             status = status or 1
     return _ended(wizard, status)
 
@@ -177,7 +177,7 @@ def _shown(application: QApplication, wizard: Wizard, signals: EndSignals) -> in
     signals.came.connect(partial(_end, application, wizard))
     wizard.crash_hook.install()
     wizard.window.show()
-    wizard.bench.start()
+    wizard.workbench.start()
     try:
         return application.exec()
     finally:
@@ -197,7 +197,7 @@ def _ended(wizard: Wizard, status: int) -> int:
     that is stuck, as in a write to a disk that does not answer. What was acknowledged
     is on the disk, as after any kill.
     """
-    if not wizard.bench.shut_down(0.0):
+    if not wizard.workbench.shut_down(0.0):
         for stream in (sys.stdout, sys.stderr):
             if stream is not None:  # as it is without a console on Windows
                 stream.flush()

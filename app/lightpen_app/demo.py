@@ -4,11 +4,11 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from lightpen.session.preparation import Names
-from lightpen.session.swing_state import Phase
-from lightpen_app.bench import Bench
-from lightpen_app.main_window import MainWindow
-from lightpen_app.theme import Tone
+from lightpen.record.names import Names
+from lightpen.swing.state import Phase
+from lightpen_app.look.theme import Tone
+from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.work.workbench import Workbench
 
 NAMES = Names(
     station="Demo", operator="Demo", pen="SIM-1", tip="T-1", cone="C-1",
@@ -25,7 +25,7 @@ class Demo(QObject):
     Parameters
     ----------
     window : MainWindow
-    bench : Bench
+    workbench : Workbench
         With a simulated source.
     is_watched : bool
         Whether somebody looks on, who needs time to read.
@@ -42,11 +42,11 @@ class Demo(QObject):
     ended = Signal()
 
     def __init__(
-        self, window: MainWindow, bench: Bench, *, is_watched: bool = True
+        self, window: MainWindow, workbench: Workbench, *, is_watched: bool = True
     ) -> None:
         super().__init__(window)
         self._window = window
-        self._bench = bench
+        self._workbench = workbench
         self._is_watched = is_watched
         pause_s = WATCHED_S if is_watched else UNWATCHED_S
         self._pause_ticks = round(1000 * pause_s / TICK_MS)
@@ -63,8 +63,8 @@ class Demo(QObject):
 
     def start(self) -> None:
         """Begin on the page that is shown."""
-        now = self._bench.preparation
-        self._bench.set_preparation(replace(now, names=NAMES))
+        now = self._workbench.preparation
+        self._workbench.set_preparation(replace(now, names=NAMES))
         self._timer.start()
 
     def _on_tick(self) -> None:
@@ -75,7 +75,7 @@ class Demo(QObject):
         self._n_ticks += 1
         if self._n_ticks < self._pause_ticks:
             return
-        run = self._bench.run
+        run = self._workbench.run
         if run.result is not None:
             self._end(self._farewell() if self._is_watched else "")
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
@@ -84,7 +84,7 @@ class Demo(QObject):
             self._window.press_main()
 
     def _has_failed(self) -> bool:
-        run = self._bench.run
+        run = self._workbench.run
         if run.state is None or run.state.phase is not Phase.VERDICT:
             return False
         return run.verdict is None or not run.verdict.can_be_accepted
@@ -106,11 +106,11 @@ class Demo(QObject):
             "review": self.tr("Demo: the tip, what it is worth, and why."),
         }
         self.told.emit(words[key])
-        operator = self._bench.live.operator
+        operator = self._workbench.live.operator
         if operator is not None:
             operator.seat()
         if key == "swing":
-            self._bench.live.set_following(True)
+            self._workbench.live.set_following(True)
 
     def _show(self, words: str) -> None:
         self._window.show_notice(words, Tone.ACTIVE)

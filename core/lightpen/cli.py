@@ -21,34 +21,32 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.calibrate import Calibration, calibrate
+from lightpen.detection.observations import observe_centers, observe_images
 from lightpen.errors import CalibrationError, LightpenError, UsageError
-from lightpen.files import write_whole
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.observation_files import read_centers, read_poses
-from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
-from lightpen.images import find_images
-from lightpen.observe import observe_centers, observe_images
-from lightpen.pivot import fit_pivot
-from lightpen.report import (
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.report import (
     METHODS,
-    Inputs,
-    all_hashed,
     calibration_json,
     calibration_text,
     encoded,
-    hashed,
     pivot_json,
     pivot_text,
 )
-from lightpen.session.record import (
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import write_whole
+from lightpen.formats.hashes import Inputs, all_hashed, hashed
+from lightpen.formats.images import find_images
+from lightpen.formats.observation_files import read_centers, read_poses
+from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.record.reading import (
     is_record,
     missing_parts,
     open_record,
     record_files,
     unacknowledged_images,
 )
-from lightpen.session.solving import record_inputs, solve_record
+from lightpen.record.solving import record_inputs, solve_record
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters

@@ -31,19 +31,19 @@ from PySide6.QtWidgets import (
 from pytestqt.exceptions import TimeoutError as WaitedInVain
 from pytestqt.qtbot import QtBot
 
-from lightpen.cameras.hand import Operator
-from lightpen.session.preparation import Names
-from lightpen.session.sources import Surroundings
+from lightpen.live.sources import Surroundings
+from lightpen.record.names import Names
+from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import Wizard
-from lightpen_app.bench import Bench
-from lightpen_app.languages import LanguageSwitch
-from lightpen_app.services import Services
-from lightpen_app.settings import Settings
-from lightpen_app.sounds import Silence
-from lightpen_app.theme import DARK, apply_theme, load_fonts, style_sheet
+from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.sounds import Silence
+from lightpen_app.look.theme import DARK, apply_theme, load_fonts, style_sheet
+from lightpen_app.steps.services import Services
 from lightpen_app.wizard_pages import make_pages
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.workbench import Workbench
 
 # No windows on the desk of whoever runs the tests; set it to see them.
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -106,21 +106,23 @@ NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
 
 @pytest.fixture
-def bench(settings: Settings, tmp_path: Path, around: Surroundings) -> Iterator[Bench]:
-    """A bench with names and the simulated pen's files; its camera is not open yet.
+def workbench(
+    settings: Settings, tmp_path: Path, around: Surroundings
+) -> Iterator[Workbench]:
+    """A workbench with names and the simulated pen's files; its camera is not open yet.
 
-    `bench.open_camera()` opens it; images then come four times as fast as usual.
+    `workbench.open_camera()` opens it; images then come four times as fast as usual.
     """
-    bench = Bench(settings, tmp_path / "data", around)
-    bench.set_preparation(replace(bench.preparation, names=NAMES))
-    bench.use_sample_files()
-    yield bench
-    bench.shut_down()
+    workbench = Workbench(settings, tmp_path / "data", around)
+    workbench.set_preparation(replace(workbench.preparation, names=NAMES))
+    workbench.use_sample_files()
+    yield workbench
+    workbench.shut_down()
 
 
 @pytest.fixture
-def services(bench: Bench) -> Services:
-    return Services(bench, Silence())
+def services(workbench: Workbench) -> Services:
+    return Services(workbench, Silence())
 
 
 # The whole wizard, used as an operator uses it
@@ -141,13 +143,13 @@ class Walker:
     def __init__(self, qtbot: QtBot, wizard: Wizard) -> None:
         self._qtbot = qtbot
         self.wizard = wizard
-        self.bench = wizard.bench
+        self.workbench = wizard.workbench
         self.window = wizard.window
         self.n_inputs = 0
         self.window.resize(1280, 800)
         self.window.show()
         self.take_window()
-        self.bench.start()
+        self.workbench.start()
 
     def take_window(self) -> None:
         """Turn to the window, as its user does who has closed another one."""
@@ -323,14 +325,14 @@ class Walker:
     @property
     def operator(self) -> Operator:
         """Who holds the simulated pen."""
-        operator = self.bench.live.operator
+        operator = self.workbench.live.operator
         assert operator is not None
         return operator
 
     def swing(self) -> None:
         """Seat the tip and follow the arrow, as a person at the cone does."""
         self.operator.seat()
-        self.bench.live.set_following(True)
+        self.workbench.live.set_following(True)
 
     def close(self) -> None:
         """Close the window, whatever it asks."""

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QImage
 
 from lightpen.arrays import Image
-from lightpen_app.settings import Settings, Station
+from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker

@@ -13,12 +13,12 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen_app.application import Wizard
-from lightpen_app.languages import Language
-from lightpen_app.main_window import LEAST_SIZE
-from lightpen_app.pages.page import MainAction, Page
-from lightpen_app.services import Services
-from lightpen_app.settings import Preferences, Settings
-from lightpen_app.theme import LIGHT, Appearance, colors_of
+from lightpen_app.look.languages import Language
+from lightpen_app.look.theme import LIGHT, Appearance, colors_of
+from lightpen_app.shell.main_window import LEAST_SIZE
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.work.settings import Preferences, Settings
 
 OPENING = """
 import sys
@@ -120,7 +120,7 @@ def test_a_trouble_that_is_over_is_no_longer_told(
     qtbot: QtBot, settings: Settings, part: str
 ) -> None:
     wizard = open_wizard(qtbot, settings)
-    teller = getattr(wizard.bench, part)
+    teller = getattr(wizard.workbench, part)
 
     teller.troubled.emit("The disk is full.")
     assert "The disk is full." in wizard.window.words()

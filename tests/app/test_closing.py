@@ -17,17 +17,20 @@ from PySide6.QtCore import QThreadPool
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.cameras.hand import Operator
-from lightpen.cameras.protocol import Settings as CameraSettings
-from lightpen.cameras.simulated import SimulatedCamera
-from lightpen.session.interrupted import find_unfinished, read_resumable
-from lightpen.session.record import Record, open_record
-from lightpen.session.recording import RecordWriter
-from lightpen.session.solving import Solution, solve_record
-from lightpen_app.bench import Bench
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.record.reading import Record, open_record
+from lightpen.record.solving import Solution, solve_record
+from lightpen.record.unfinished import (
+    find_unfinished,
+)
+from lightpen.record.writing import RecordWriter
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.hand import Operator
+from lightpen.swing.resuming import read_resumable
 from lightpen_app.end_signals import END_SIGNALS, EndSignals
-from lightpen_app.job import Report
-from lightpen_app.live_view import CLOSING_TIME
+from lightpen_app.work.job import Report
+from lightpen_app.work.live_view import CLOSING_TIME
+from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -42,7 +45,7 @@ import sys, time
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 from lightpen_app.application import run
-from lightpen_app.job import Job
+from lightpen_app.work.job import Job
 from lightpen_app.wizard_pages import make_pages
 
 def close():
@@ -76,7 +79,7 @@ SWINGING = """
 import shutil
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QMessageBox
-from lightpen.session.interrupted import read_resumable
+from lightpen.swing.resuming import read_resumable
 from lightpen_app.application import run
 from lightpen_app.wizard_pages import make_pages
 
@@ -85,17 +88,17 @@ def tell(folder, asks):
         return QTimer.singleShot(50, lambda: tell(folder, asks))
     print(folder, flush=True)
 
-def swing(bench):
-    folder = bench.run.records_folder / "interrupted"
+def swing(workbench):
+    folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(sys.argv[1], folder)
-    bench.run.go_on(read_resumable(folder))
+    workbench.run.go_on(read_resumable(folder))
     tell_it = lambda: tell(folder, sys.argv[2])
     QTimer.singleShot(100, tell_it)
     if sys.argv[2]:
         QApplication.closeAllWindows()
 
 def pages(services):
-    QTimer.singleShot(500, lambda: swing(services.bench))
+    QTimer.singleShot(500, lambda: swing(services.workbench))
     return make_pages(services)
 
 sys.exit(run(pages))
@@ -114,18 +117,18 @@ class Stuck:
 
 
 @pytest.fixture
-def stuck(bench: Bench) -> Iterator[Stuck]:
+def stuck(workbench: Workbench) -> Iterator[Stuck]:
     stuck = Stuck()
     yield stuck
     stuck.may_end.set()
-    bench.shut_down()
+    workbench.shut_down()
     assert QThreadPool.globalInstance().waitForDone(TIMEOUT)
 
 
 @pytest.fixture
-def interrupted(bench: Bench, swung: Callable[..., Path]) -> Path:
-    """An interrupted swing among the records of the bench."""
-    folder = bench.run.records_folder / "interrupted"
+def interrupted(workbench: Workbench, swung: Callable[..., Path]) -> Path:
+    """An interrupted swing among the records of the workbench."""
+    folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(swung(), folder)
     return folder
 
@@ -141,19 +144,19 @@ class StuckCamera(SimulatedCamera):
         super().close()
 
 
-def swing_before(bench: Bench, stuck: Stuck) -> None:
+def swing_before(workbench: Workbench, stuck: Stuck) -> None:
     """Swing before a camera that will not close."""
-    around = bench.around
+    around = workbench.around
     camera = StuckCamera(
         around.scene, around.clock, Operator(around.clock, seated=True)
     )
     camera.stuck = stuck
-    bench.live.open(camera, CameraSettings(), around.clock)
-    bench.live.set_following(True)
+    workbench.live.open(camera, CameraSettings(), around.clock)
+    workbench.live.set_following(True)
 
 
-def n_kept(bench: Bench) -> int:
-    state = bench.run.state
+def n_kept(workbench: Workbench) -> int:
+    state = workbench.run.state
     return 0 if state is None else state.n_kept
 
 
@@ -183,10 +186,10 @@ def said(process: "subprocess.Popen[str]") -> str:
     return process.stdout.readline().strip()
 
 
-def closing_time(bench: Bench) -> float:
+def closing_time(workbench: Workbench) -> float:
     """Give what is under way `SOON` to end, and return how long it took, s."""
     began = time.monotonic()
-    assert not bench.shut_down(SOON)
+    assert not workbench.shut_down(SOON)
     return time.monotonic() - began
 
 
@@ -199,7 +202,7 @@ def assert_whole(folder: Path, n_images: int) -> None:
 
 
 def test_closing_waits_for_all_that_is_under_way_together(
-    bench: Bench,
+    workbench: Workbench,
     stuck: Stuck,
     interrupted: Path,
     qtbot: QtBot,
@@ -209,32 +212,32 @@ def test_closing_waits_for_all_that_is_under_way_together(
         stuck.wait()
         return solve_record(record, report)
 
-    monkeypatch.setattr("lightpen_app.swing_run.solve_record", solve)
-    swing_before(bench, stuck)
-    bench.run.go_on(read_resumable(interrupted))
-    qtbot.waitUntil(lambda: n_kept(bench) >= N_IMAGES + 2, timeout=TIMEOUT)
-    bench.run.finish()
+    monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
+    swing_before(workbench, stuck)
+    workbench.run.go_on(read_resumable(interrupted))
+    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
+    workbench.run.finish()
     qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
 
-    assert closing_time(bench) < SOON + AT_ONCE
+    assert closing_time(workbench) < SOON + AT_ONCE
     assert_whole(interrupted, N_IMAGES + 2)
 
 
 def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
-    bench: Bench,
+    workbench: Workbench,
     stuck: Stuck,
     interrupted: Path,
     qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    around, append = bench.around, RecordWriter.append
+    around, append = workbench.around, RecordWriter.append
     camera = SimulatedCamera(
         around.scene, around.clock, Operator(around.clock, seated=True)
     )
-    bench.live.open(camera, CameraSettings(), around.clock)
-    bench.live.set_following(True)
-    bench.run.go_on(read_resumable(interrupted))
-    qtbot.waitUntil(lambda: n_kept(bench) >= N_IMAGES + 2, timeout=TIMEOUT)
+    workbench.live.open(camera, CameraSettings(), around.clock)
+    workbench.live.set_following(True)
+    workbench.run.go_on(read_resumable(interrupted))
+    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
 
     def write(writer: RecordWriter, *image: object) -> int:
         stuck.wait()
@@ -242,17 +245,17 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
 
     monkeypatch.setattr(RecordWriter, "append", write)
     qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
-    n_acknowledged = n_kept(bench)
+    n_acknowledged = n_kept(workbench)
 
-    assert closing_time(bench) < SOON + AT_ONCE
+    assert closing_time(workbench) < SOON + AT_ONCE
     assert len(open_record(interrupted).images) >= n_acknowledged
     stuck.may_end.set()
-    assert bench.shut_down()
+    assert workbench.shut_down()
     assert_whole(interrupted, n_acknowledged)
 
 
 def test_a_solution_that_ends_in_time_is_waited_for(
-    bench: Bench,
+    workbench: Workbench,
     interrupted: Path,
     qtbot: QtBot,
     monkeypatch: pytest.MonkeyPatch,
@@ -266,14 +269,14 @@ def test_a_solution_that_ends_in_time_is_waited_for(
         ended.set()
         return solution
 
-    monkeypatch.setattr("lightpen_app.swing_run.solve_record", solve)
-    bench.run.go_on(read_resumable(interrupted))
-    bench.run.finish()
+    monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
+    workbench.run.go_on(read_resumable(interrupted))
+    workbench.run.finish()
     qtbot.waitUntil(began.is_set, timeout=TIMEOUT)
 
-    assert bench.shut_down()
+    assert workbench.shut_down()
     assert ended.is_set()
-    assert bench.run.solution is None
+    assert workbench.run.solution is None
     assert_whole(interrupted, N_IMAGES)
 
 
@@ -289,11 +292,11 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
         return solve_record(record, report)
 
     walker = open_wizard()
-    run = walker.bench.run
+    run = walker.workbench.run
     folder = run.records_folder / "interrupted"
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
-        slow.setattr("lightpen_app.swing_run.solve_record", solve)
+        slow.setattr("lightpen_app.work.swing_run.solve_record", solve)
         run.go_on(read_resumable(folder))
         run.finish()
         walker.until(stuck.is_reached.is_set)
@@ -311,7 +314,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     again.until_says("Interrupted swing")
     again.click("Resume")
     again.until_shows("Swing")
-    assert n_kept(again.bench) == N_IMAGES
+    assert n_kept(again.workbench) == N_IMAGES
 
 
 def test_the_process_ends_though_a_job_does_not(tmp_path: Path) -> None:

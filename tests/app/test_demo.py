@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.simulator.scenes import Scene
 from lightpen_app.demo import NAMES, Demo
-from lightpen_app.settings import Settings, Station
+from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard
@@ -62,10 +62,10 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     settings.set_station(NAMES.station, hopeless)
     settings.set_last_station(NAMES.station)
     walker = open_wizard()
-    demo = Demo(walker.window, walker.bench, is_watched=False)
+    demo = Demo(walker.window, walker.workbench, is_watched=False)
 
     with qtbot.waitSignal(demo.ended, timeout=60_000):
         demo.start()
 
-    assert walker.bench.run.result is None
+    assert walker.workbench.run.result is None
     assert "The demo ends here: there is no tip to accept." in walker.window.words()

@@ -26,9 +26,9 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from lightpen_app.languages import Language
-from lightpen_app.main_window import MainWindow
-from lightpen_app.theme import Appearance, TextSize, font, text_label
+from lightpen_app.look.languages import Language
+from lightpen_app.look.theme import Appearance, TextSize, font, text_label
+from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.plots import Axes, Curve, Plot, TracePlot
 from lightpen_app.widgets.push_button import PushButton
@@ -51,7 +51,7 @@ SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
 
 
 @dataclass(frozen=True)
-class Sight:
+class SpotArrays:
     """What there is to complain about a step in a language at a size.
 
     Attributes
@@ -126,7 +126,7 @@ def scrolled_sideways(root: QWidget) -> tuple[str, ...]:
     )
 
 
-def sight_of(window: MainWindow) -> Sight:
+def spot_arrays(window: MainWindow) -> SpotArrays:
     page = window.page()
     layout = page.layout()
     assert layout is not None
@@ -134,16 +134,18 @@ def sight_of(window: MainWindow) -> Sight:
     lack = QSize(
         max(least.width() - page.width(), 0), max(least.height() - page.height(), 0)
     )
-    return Sight(window.size(), lack, clipped_words(window), scrolled_sideways(page))
+    return SpotArrays(
+        window.size(), lack, clipped_words(window), scrolled_sideways(page)
+    )
 
 
 Key = tuple[str, str, int]
 
 
 @pytest.fixture(scope="module")
-def sights(dressed: QApplication) -> Iterator[dict[Key, list[Sight]]]:
+def sights(dressed: QApplication) -> Iterator[dict[Key, list[SpotArrays]]]:
     """What is seen of each step in each language and width, a sight for each tab."""
-    found: dict[Key, list[Sight]] = {}
+    found: dict[Key, list[SpotArrays]] = {}
     with SCREENS.anywhere():
         stage = SCREENS.Stage(dressed)
         window = stage.wizard.window
@@ -164,10 +166,10 @@ def sights(dressed: QApplication) -> Iterator[dict[Key, list[Sight]]]:
         stage.close()
 
 
-def _seen(stage: object, window: MainWindow) -> Sight:
+def _seen(stage: object, window: MainWindow) -> SpotArrays:
     assert isinstance(stage, SCREENS.Stage)
     stage.picture()  # once nothing moves any more
-    return sight_of(window)
+    return spot_arrays(window)
 
 
 KEYS = [
@@ -180,7 +182,7 @@ KEYS = [
 
 @pytest.mark.parametrize("key", KEYS, ids=lambda key: "-".join(map(str, key)))
 def test_a_step_has_room_in_a_small_window(
-    sights: dict[Key, list[Sight]], key: Key
+    sights: dict[Key, list[SpotArrays]], key: Key
 ) -> None:
     (size,) = (each for each in SIZES if each.width() == key[2])
     for sight in sights[key]:
@@ -191,14 +193,14 @@ def test_a_step_has_room_in_a_small_window(
 
 @pytest.mark.parametrize("key", KEYS, ids=lambda key: "-".join(map(str, key)))
 def test_no_words_of_a_step_are_clipped(
-    sights: dict[Key, list[Sight]], key: Key
+    sights: dict[Key, list[SpotArrays]], key: Key
 ) -> None:
     for sight in sights[key]:
         assert sight.clipped == ()
 
 
 def test_the_tabs_of_the_review_are_all_looked_at(
-    sights: dict[Key, list[Sight]],
+    sights: dict[Key, list[SpotArrays]],
 ) -> None:
     assert len(sights["review", "en", LEAST.width()]) == 1 + 5  # the result is a tab
     assert len(sights["review", "en", 1280]) == 1 + 4

@@ -21,13 +21,13 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.arrays import FloatArray
-from lightpen.session.interrupted import find_unfinished
-from lightpen.session.record import open_record
-from lightpen.session.results import Result, last_result
-from lightpen.session.sources import Surroundings
+from lightpen.live.sources import Surroundings
+from lightpen.record.reading import open_record
+from lightpen.record.results import Result, last_result
+from lightpen.record.unfinished import find_unfinished
 from lightpen.simulator.scenes import Scene
-from lightpen_app.languages import Language
-from lightpen_app.settings import Preferences, Settings, Station
+from lightpen_app.look.languages import Language
+from lightpen_app.work.settings import Preferences, Settings, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -122,7 +122,9 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert walker.says("PASS: Good")
     shown = _read_out(walker)
     # Four standard deviations: U is two.
-    assert (np.abs(shown.tip - walker.bench.around.scene.tip_pen) <= 2 * shown.u).all()
+    assert (
+        np.abs(shown.tip - walker.workbench.around.scene.tip_pen) <= 2 * shown.u
+    ).all()
     walker.click("Accept")
 
     assert walker.says("IN FORCE")
@@ -246,7 +248,7 @@ def test_in_chinese_no_english_word_is_left(
     reading.timeout.connect(read)
     reading.start()
     walker.swing()
-    walker.until(lambda: walker.bench.run.solution is not None)
+    walker.until(lambda: walker.workbench.run.solution is not None)
     reading.stop()
     for _ in ("verdict", "review", "in force", "start"):
         read_and_go_on()
@@ -320,7 +322,7 @@ def _read_out(walker: "Walker") -> ReadOut:
 
 
 def _result_on_disk(walker: "Walker") -> Result:
-    folder = walker.bench.run.results_folder
+    folder = walker.workbench.run.results_folder
     assert len(list(folder.glob("*.json"))) == 1
     result = last_result(folder, NAMES["Pen, serial number"], NAMES["Probe tip"])
     assert result is not None

@@ -14,21 +14,21 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-import lightpen_app.bench
+import lightpen_app.work.workbench
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.cameras.simulated import SimulatedCamera
 from lightpen.formats.pen_files import write_pen
-from lightpen.session.interrupted import find_unfinished
-from lightpen.session.preparation import SourceChoice
-from lightpen.session.record import DISCARDED, open_record
-from lightpen.session.sources import Surroundings, camera_of
-from lightpen.session.swing_state import Phase
+from lightpen.live.preparation import SourceChoice
+from lightpen.live.sources import Surroundings, camera_of
+from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.unfinished import find_unfinished
+from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.sample_pens import eight_led_pen
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
-from lightpen_app.settings import Settings, Station
+from lightpen.swing.state import Phase
+from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
@@ -78,7 +78,7 @@ def cameras(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedCamera]:
         opened.append(camera)
         return camera
 
-    monkeypatch.setattr(lightpen_app.bench, "camera_of", noted)
+    monkeypatch.setattr(lightpen_app.work.workbench, "camera_of", noted)
     return opened
 
 
@@ -113,26 +113,26 @@ def go_to(walker: "Walker", title: str) -> None:
 
 def keep_on(walker: "Walker", n_more: int = 4) -> None:
     """Wait until the swing has kept some more images."""
-    run = walker.bench.run
+    run = walker.workbench.run
     walker.until(lambda: run.state is not None)
     n_before = n_kept(walker)
     walker.until(lambda: n_kept(walker) >= n_before + n_more)
 
 
 def n_kept(walker: "Walker") -> int:
-    state = walker.bench.run.state
+    state = walker.workbench.run.state
     assert state is not None
     return state.n_kept
 
 
 def phase(walker: "Walker") -> Phase:
-    state = walker.bench.run.state
+    state = walker.workbench.run.state
     assert state is not None
     return state.phase
 
 
 def record_folder(walker: "Walker") -> Path:
-    folder = walker.bench.run.record_folder
+    folder = walker.workbench.run.record_folder
     assert folder is not None
     return folder
 
@@ -154,12 +154,12 @@ def picture_in(folder: Path) -> Path:
 
 def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) -> None:
     go_to(prepared, "Camera")
-    before = prepared.bench.preparation.camera_file
+    before = prepared.workbench.preparation.camera_file
 
     give_path(prepared, "Intrinsics file", picture_in(tmp_path))
 
     prepared.until_tells("picture.png is not text")
-    assert prepared.bench.preparation.camera_file is before
+    assert prepared.workbench.preparation.camera_file is before
 
 
 def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(
@@ -338,7 +338,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     for key in (Key.Key_Return, Key.Key_PageDown):
         capturing.press(key)
     assert not capturing.says("IN FORCE")
-    assert not list(capturing.bench.run.results_folder.glob("*"))
+    assert not list(capturing.workbench.run.results_folder.glob("*"))
 
     n_before = n_kept(capturing)
     capturing.click("Capture more")
@@ -346,7 +346,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     assert n_kept(capturing) == n_before
     keep_on(capturing, 8)
     finish_now(capturing)
-    capturing.until(lambda: capturing.bench.run.solution is not None)
+    capturing.until(lambda: capturing.workbench.run.solution is not None)
     capturing.until(capturing.main_button().isEnabled)
     capturing.click("Review")
 
@@ -358,7 +358,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     (again,) = (w for w in capturing.seen() if capturing.names(w) == {"Repeat"})
     capturing.click_on(again)
     capturing.until_shows("Swing")
-    capturing.until(lambda: capturing.bench.run.record_folder not in (None, first))
+    capturing.until(lambda: capturing.workbench.run.record_folder not in (None, first))
     assert open_record(first).verdict == DISCARDED
     assert len(open_record(first).images) >= n_before
     keep_on(capturing)
@@ -378,7 +378,7 @@ def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
     assert capturing.says("The tip is not computed yet.")
 
     capturing.click("Compute again")
-    capturing.until(lambda: capturing.bench.run.solution is not None)
+    capturing.until(lambda: capturing.workbench.run.solution is not None)
     capturing.until(capturing.main_button().isEnabled)
     capturing.click("Review")
 
@@ -461,7 +461,7 @@ def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     capturing.click("Start over")
     assert capturing.tells("Begin anew? The ")
     capturing.click("Begin anew")
-    capturing.until(lambda: capturing.bench.run.record_folder not in (None, first))
+    capturing.until(lambda: capturing.workbench.run.record_folder not in (None, first))
     capturing.until(lambda: open_record(first).verdict == DISCARDED)
     assert len(open_record(first).images) >= n_images
     keep_on(capturing)
@@ -607,7 +607,7 @@ def test_pressing_enter_again_and_again_accepts_once(
     walker = open_wizard()
     go_to(walker, "Swing")
     walker.swing()
-    walker.until(lambda: walker.bench.run.solution is not None)
+    walker.until(lambda: walker.workbench.run.solution is not None)
     walker.until(walker.main_button().isEnabled)
     walker.click("Review")
     button = walker.main_button()
@@ -620,7 +620,7 @@ def test_pressing_enter_again_and_again_accepts_once(
         place,
     )
 
-    assert len(list(walker.bench.run.results_folder.glob("*.json"))) == 1
+    assert len(list(walker.workbench.run.results_folder.glob("*.json"))) == 1
 
 
 @pytest.mark.parametrize("step", ["Start", "Camera", "LEDs", "Swing"])
@@ -655,7 +655,7 @@ def test_any_keys_and_clicks_leave_a_window_that_answers(
     prepared.click_step("Start")
     assert prepared.title() == "Start"
     prepared.enter("Operator", "Bob")
-    prepared.until(lambda: prepared.bench.preparation.names.operator == "Bob")
+    prepared.until(lambda: prepared.workbench.preparation.names.operator == "Bob")
 
 
 def leave_dialog() -> None:

@@ -1,1 +1,1 @@
-"""Widgets that pages and windows share; each shows one value."""
+"""Widgets that several steps share; each shows one value."""

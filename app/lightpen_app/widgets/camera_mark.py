@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QTransform
 
-from lightpen_app.theme import GRID, TextSize, font
+from lightpen_app.look.theme import GRID, TextSize, font
 
 TURNS = (-10.0, 10.0, -20.0, 20.0)  # of the words against the rim, degrees
 FLAGS = int(Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextDontClip)

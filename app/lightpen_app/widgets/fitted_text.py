@@ -5,7 +5,7 @@ from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID, Tone, colors_of, font
+from lightpen_app.look.theme import GRID, Tone, colors_of, font
 
 WRAPPED = int(Qt.TextFlag.TextWordWrap)
 

@@ -19,8 +19,8 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import Image
-from lightpen_app.pooling import pooled
-from lightpen_app.theme import DARK, GRID, TextSize, Tone, font
+from lightpen_app.look.pooling import pooled
+from lightpen_app.look.theme import DARK, GRID, TextSize, Tone, font
 from lightpen_app.widgets.translated import Translated
 
 MAX_ZOOM = 16.0

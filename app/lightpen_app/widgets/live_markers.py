@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
-from lightpen.session.live import LiveImage
-from lightpen_app.theme import Tone
+from lightpen.live.looking import LiveImage
+from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.image_view import Marker
 
 RING = 1.4  # times the radius of its spot

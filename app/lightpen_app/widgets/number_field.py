@@ -5,7 +5,7 @@ from PySide6.QtGui import QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID
+from lightpen_app.look.theme import GRID
 
 INSET = 13  # px; a style sheet cannot pad the text of a spin box
 PAGE_KEYS = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent,
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID, letters_for
+from lightpen_app.look.theme import GRID, letters_for
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.state_banner import State, StateBanner

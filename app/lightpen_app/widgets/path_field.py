@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen_app.theme import GRID, Tone, set_tone
+from lightpen_app.look.theme import GRID, Tone, set_tone
 from lightpen_app.widgets.keys import ENTER_KEYS
 
 QUOTES = "\"'"

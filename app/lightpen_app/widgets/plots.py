@@ -17,8 +17,8 @@ from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
-from lightpen.files import write_whole
-from lightpen_app.theme import GRID, Colors, TextSize, Tone, colors_of, font
+from lightpen.formats.files import write_whole
+from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, font
 
 PNG_SCALE = 2
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up

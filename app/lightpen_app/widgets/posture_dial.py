@@ -18,11 +18,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import IntArray
-from lightpen.coverage import N_DIRECTIONS, TILT_RINGS
-from lightpen.session.posture import Posture
-from lightpen_app.theme import Colors, TextSize, colors_of, font
+from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen.model.posture import Posture
+from lightpen_app.look.signs import Sign, draw_arrow, draw_sign
+from lightpen_app.look.theme import Colors, TextSize, colors_of, font
 from lightpen_app.widgets.camera_mark import Stand, draw_camera
-from lightpen_app.widgets.signs import Sign, draw_arrow, draw_sign
 from lightpen_app.widgets.translated import Translated
 
 MAX_TILT = math.radians(36)  # drawn at the rim

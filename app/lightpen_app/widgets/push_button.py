@@ -4,7 +4,7 @@ from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QPushButton, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID
+from lightpen_app.look.theme import GRID
 
 LEAST_WIDTH = 8 * GRID + 34  # px; with the padding and the border
 

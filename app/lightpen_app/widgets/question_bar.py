@@ -3,7 +3,7 @@
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
-from lightpen_app.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.push_button import PushButton
 
 

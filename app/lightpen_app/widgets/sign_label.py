@@ -7,9 +7,16 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID, TextSize, Tone, colors_of, set_tone, text_label
-from lightpen_app.widgets.signs import Sign, draw_sign
-from lightpen_app.words import breakable
+from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.theme import (
+    GRID,
+    TextSize,
+    Tone,
+    colors_of,
+    set_tone,
+    text_label,
+)
+from lightpen_app.look.words import breakable
 
 SIDE = 2 * GRID
 

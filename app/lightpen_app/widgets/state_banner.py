@@ -7,9 +7,9 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
-from lightpen_app.theme import GRID, TextSize, Tone, colors_of, font
+from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.fitted_text import fitted_size
-from lightpen_app.widgets.signs import Sign, draw_sign
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """What every live source of images offers, and what can go wrong with it.
 
-`lightpen.camera.Camera` holds the intrinsics of a camera; an `ImageCamera` is the thing
-that delivers images. One thread makes all calls of an open one, see
+`lightpen.model.camera.Camera` holds the intrinsics of a camera; an `ImageCamera` is
+the thing that delivers images. One thread makes all calls of an open one, see
 `lightpen.cameras.worker`.
 """
 
@@ -193,7 +193,7 @@ class Caps:
 
 
 @dataclass(frozen=True)
-class Settings:
+class CameraSettings:
     """How a camera is to take images, or takes them.
 
     Attributes
@@ -256,7 +256,7 @@ class ImageCamera(Protocol):
     def close(self) -> None:
         """Stop and let go of the device; seconds if it is dead, but never an error."""
 
-    def configure(self, settings: Settings) -> Settings:
+    def configure(self, settings: CameraSettings) -> CameraSettings:
         """Set up the camera before the start; return what is in force.
 
         Values out of range are brought into it; what the camera has not is left out.

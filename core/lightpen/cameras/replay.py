@@ -9,6 +9,7 @@ from math import inf
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import (
+    CameraSettings,
     Caps,
     ConfigError,
     DeviceInfo,
@@ -19,13 +20,12 @@ from lightpen.cameras.protocol import (
     FrameIncomplete,
     FrameTimeout,
     Range,
-    Settings,
     Stats,
     sealed,
 )
 from lightpen.errors import FileError
-from lightpen.files import printable
-from lightpen.images import ImageSource, find_images
+from lightpen.formats.files import printable
+from lightpen.formats.images import ImageSource, find_images
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
@@ -108,7 +108,7 @@ class ReplayCamera:
         self.stop()
         self._caps = self._source = None
 
-    def configure(self, settings: Settings) -> Settings:
+    def configure(self, settings: CameraSettings) -> CameraSettings:
         """Set the frame rate before the start; return what is in force."""
         (pixel_format,) = self.caps.pixel_formats
         if self._loaders is not None:
@@ -122,7 +122,7 @@ class ReplayCamera:
             raise _no_trigger()
         if settings.frame_rate is not None:
             self._frame_rate = FRAME_RATE.nearest(settings.frame_rate)
-        return Settings(frame_rate=self._frame_rate, pixel_format=pixel_format)
+        return CameraSettings(frame_rate=self._frame_rate, pixel_format=pixel_format)
 
     def set_exposure(self, exposure_us: float) -> float:
         """Refuse: the images are taken."""

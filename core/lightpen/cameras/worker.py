@@ -12,9 +12,10 @@ from threading import Event, Thread
 from typing import TypeAlias
 
 from lightpen.cameras.clock import Clock, MachineClock
-from lightpen.cameras.mailbox import FrameQueue, Mailbox
+from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.protocol import (
     CameraFailure,
+    CameraSettings,
     Caps,
     ConfigError,
     DeviceBusy,
@@ -26,7 +27,6 @@ from lightpen.cameras.protocol import (
     FramesSkipped,
     FrameTimeout,
     ImageCamera,
-    Settings,
     Stats,
 )
 from lightpen.errors import LightpenError
@@ -74,7 +74,7 @@ class ConnectionChanged:
 class SettingsApplied:
     """The camera has these settings in force."""
 
-    settings: Settings
+    settings: CameraSettings
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class CameraWorker:
     ----------
     camera : ImageCamera
         Not open yet. Nobody else may call it any more.
-    settings : Settings
+    settings : CameraSettings
         To be applied, again at each reconnection.
     on_event : callable
         Called in the thread of the worker with what happens; must return at once and
@@ -122,7 +122,7 @@ class CameraWorker:
     def __init__(
         self,
         camera: ImageCamera,
-        settings: Settings,
+        settings: CameraSettings,
         on_event: Callable[[WorkerEvent], None],
         *,
         clock: Clock | None = None,
@@ -134,7 +134,7 @@ class CameraWorker:
         self._caps: Caps | None = None
         self._on_event = on_event
         self._clock = clock or MachineClock()
-        self._mailbox = Mailbox()
+        self._mailbox = FrameBox()
         self._queue = FrameQueue(n_queued)
         self._requests: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._stopping = Event()
@@ -214,7 +214,7 @@ class CameraWorker:
         """
         return self._queue.take(timeout_s)
 
-    def configure(self, settings: Settings) -> None:
+    def configure(self, settings: CameraSettings) -> None:
         """Ask for other settings; images come anew, those of a file from the first."""
         self._requests.put(lambda: self._configure(settings))
 
@@ -350,7 +350,7 @@ class CameraWorker:
         self._caps = self._camera.caps
         self._begin(self._settings)
 
-    def _begin(self, settings: Settings) -> None:
+    def _begin(self, settings: CameraSettings) -> None:
         self._applied = self._camera.configure(settings)
         self._settings = settings
         self._camera.start()
@@ -376,7 +376,7 @@ class CameraWorker:
             except ConfigError as error:
                 self._on_event(Troubled(error))
 
-    def _configure(self, settings: Settings) -> None:
+    def _configure(self, settings: CameraSettings) -> None:
         self._camera.stop()
         try:
             self._begin(settings)
@@ -394,7 +394,7 @@ class CameraWorker:
         self._settings = replace(self._settings, gain_db=applied)
         self._apply(replace(self._applied, gain_db=applied))
 
-    def _apply(self, applied: Settings) -> None:
+    def _apply(self, applied: CameraSettings) -> None:
         self._applied = applied
         self._on_event(SettingsApplied(applied))
 

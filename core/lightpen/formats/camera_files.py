@@ -32,11 +32,11 @@ from typing import Literal
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
 from lightpen.errors import FileError, UsageError
-from lightpen.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_noun
+from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.model.camera import Camera
 
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LARGEST_IMAGE = 100_000  # px, along a side

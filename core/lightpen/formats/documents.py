@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn, TypeAlias
 
 from lightpen.errors import FileError
-from lightpen.files import quoted
+from lightpen.formats.files import quoted
 
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str | bool | None"
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.files import printable, quoted
 from lightpen.formats.documents import Tree
+from lightpen.formats.files import printable, quoted
 from lightpen.formats.tables import number_flaw
 
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it

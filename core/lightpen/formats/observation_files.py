@@ -15,9 +15,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.files import MEGABYTE, write_whole
+from lightpen.formats.files import MEGABYTE, write_whole
 from lightpen.formats.tables import Table, read_table
-from lightpen.rigid import nearest_rotation
+from lightpen.model.rigid import nearest_rotation
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 30_000

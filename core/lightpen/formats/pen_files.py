@@ -28,11 +28,11 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
-from lightpen.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.formats.documents import Tree, parse_json
 from lightpen.formats.entries import Entries
+from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.formats.tables import Table, parse_table
-from lightpen.pen import (
+from lightpen.model.pen import (
     DISC_DIAMETER,
     Pen,
     check_frame,
@@ -114,8 +114,8 @@ def read_raw_pen(
     Returns
     -------
     Pen
-        In the pen frame; see `lightpen.pen.pen_frame_from_raw`. A nominal tip of the
-        file is moved with the LEDs.
+        In the pen frame; see `lightpen.model.pen.pen_frame_from_raw`. A nominal tip of
+        the file is moved with the LEDs.
 
     Raises
     ------

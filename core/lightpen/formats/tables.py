@@ -11,7 +11,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.files import printable, quoted, read_text
+from lightpen.formats.files import printable, quoted, read_text
 
 MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters

@@ -9,7 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.pen_files import LARGEST_DIAMETER, NORMAL_TOLERANCE
 from lightpen.formats.tables import number_flaw
-from lightpen.pen import Pen
+from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import FrameCheck, examine_frame, moved_into_frame
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz")

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.pen import (
+from lightpen.model.pen import (
     FRAME_TOLERANCE,
     Pen,
     check_frame,
@@ -30,7 +30,7 @@ class Rule(StrEnum):
     NORMALS = "normals"  # towards the viewer
 
 
-class Outcome(StrEnum):
+class RuleStatus(StrEnum):
     """How a rule fares."""
 
     MET = "met"
@@ -45,13 +45,13 @@ class RuleCheck:
     Attributes
     ----------
     rule : Rule
-    outcome : Outcome
+    outcome : RuleStatus
     amount : float
         Largest deviation, mm; NaN for a rule without one.
     """
 
     rule: Rule
-    outcome: Outcome
+    outcome: RuleStatus
     amount: float = float("nan")
 
 
@@ -79,7 +79,7 @@ class FrameCheck:
     @property
     def is_a_pen(self) -> bool:
         """Whether the LEDs could be those of a pen, in whatever frame."""
-        return self.checks[0].outcome is Outcome.MET
+        return self.checks[0].outcome is RuleStatus.MET
 
 
 def examine_frame(pen: Pen) -> FrameCheck:
@@ -137,11 +137,11 @@ def _frame_error(pen: Pen) -> str:
 
 def _all_open(broken: Rule | None = None) -> tuple[RuleCheck, ...]:
     """Return checks of which at most one is told, as the others build on it."""
-    outcomes = dict.fromkeys(Rule, Outcome.OPEN)
+    outcomes = dict.fromkeys(Rule, RuleStatus.OPEN)
     if broken is not Rule.LEDS:
-        outcomes[Rule.LEDS] = Outcome.MET
+        outcomes[Rule.LEDS] = RuleStatus.MET
     if broken is not None:
-        outcomes[broken] = Outcome.BROKEN
+        outcomes[broken] = RuleStatus.BROKEN
     return tuple(RuleCheck(rule, outcome) for rule, outcome in outcomes.items())
 
 
@@ -164,7 +164,7 @@ def _measured(pen: Pen) -> tuple[RuleCheck, ...]:
         elif rule is Rule.NORMALS:
             broken = bool(np.any(pen.normals[:, 2] <= 0))
         checks.append(
-            RuleCheck(rule, Outcome.BROKEN if broken else Outcome.MET, amount)
+            RuleCheck(rule, RuleStatus.BROKEN if broken else RuleStatus.MET, amount)
         )
     return tuple(checks)
 

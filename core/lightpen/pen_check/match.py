@@ -16,16 +16,27 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.calibrate import USUAL_SIGMA
-from lightpen.camera import Camera
-from lightpen.ellipse import centers_from_centroids
-from lightpen.labelling.diagnosis import diagnose, diagnose_mirror
-from lightpen.labelling.labels import MODERATE, Labels, Verdict, label_images
-from lightpen.pen import Pen
+from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
+from lightpen.detection.labelling.labels import (
+    MODERATE,
+    Labels,
+    LabelStatus,
+    label_images,
+)
+from lightpen.detection.pose import (
+    MIN_LEDS,
+    Poses,
+    disc_residuals,
+    fit_poses,
+    robust_sigma,
+)
+from lightpen.detection.spots import Flaw, Spots
+from lightpen.estimation.calibrate import USUAL_SIGMA
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import centers_from_centroids
+from lightpen.model.pen import Pen
 from lightpen.pen_check.shifts import Shift, find_shifts, triple
-from lightpen.pen_check.strangers import find_strangers
-from lightpen.pose import MIN_LEDS, Poses, disc_residuals, fit_poses, robust_sigma
-from lightpen.spots import Flaw, Spots
+from lightpen.pen_check.unknown_leds import find_unknown_leds
 
 MAX_VIEWS = 30
 MOVED = 0.006  # of the extent of the spots, by which views differ
@@ -45,7 +56,7 @@ class What(StrEnum):
     SHIFTED = "shifted"  # LED, by
     SHIFTED_EITHER = "shifted either"  # two LEDs, of which one is; by
     UNSEEN = "unseen"  # LED
-    STRANGER = "stranger"  # by: its place in the pen frame
+    UNKNOWN_LED = "stranger"  # by: its place in the pen frame
     MISFIT = "misfit"
 
 
@@ -125,14 +136,14 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
     ----------
     camera : Camera
     pen : Pen
-        One that `lightpen.pen.check_leds` passes.
+        One that `lightpen.model.pen.check_leds` passes.
     views : sequence of Spots
     """
     labels = label_images(views, camera, pen, MODERATE)
     found = [
         i
         for i, each in enumerate(labels)
-        if each.reason is Verdict.LABELLED and each.whole.sum() >= MIN_LEDS
+        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_LEDS
     ]
     if not found or 2 * len(found) < len(views):
         sentence = diagnose(views, camera, pen) if views else ""
@@ -219,7 +230,7 @@ class _Located:
 def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
     """Find LEDs far off their places among the spots left over, then small shifts."""
     missing, poses = seen.missing, seen.poses
-    strangers = find_strangers(camera, poses, seen.left_over)
+    strangers = find_unknown_leds(camera, poses, seen.left_over)
     owners = _owners(pen.leds[missing], strangers.points)
     leds, pixels = pen.leds.copy(), seen.pixels.copy()
     for led, owner in zip(missing, owners, strict=True):
@@ -351,7 +362,7 @@ def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
         findings.append(Finding(what, leds, shift.by, is_sure))
     findings += [Finding(What.UNSEEN, (led,)) for led in located.unseen]
     findings += [
-        Finding(What.STRANGER, by=triple(point)) for point in located.strangers
+        Finding(What.UNKNOWN_LED, by=triple(point)) for point in located.strangers
     ]
     return tuple(findings)
 

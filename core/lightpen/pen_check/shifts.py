@@ -16,9 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.camera import Camera
-from lightpen.pen import Pen
-from lightpen.pose import disc_residuals, fit_poses, normal_equations, robust_sigma
+from lightpen.detection.pose import (
+    disc_residuals,
+    fit_poses,
+    normal_equations,
+    robust_sigma,
+)
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 
 MAX_SHIFTED = 3
 MIN_SHIFT = 0.1  # mm; less is taken up when the tip is solved

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
-from lightpen.ellipse import Ellipses
-from lightpen.simulator.scenery import Finger, Glare, Lamp
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import Ellipses
+from lightpen.simulator.view import Finger, Glare, Lamp
 
 MAX_TRIES = 30
 CLEARANCE = 6.0  # px between a foreign light and a disc

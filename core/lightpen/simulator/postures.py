@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.rigid import rotation_from_vector
+from lightpen.model.rigid import rotation_from_vector
 
 SwingKind: TypeAlias = Literal["field", "cone", "operator", "one-axis", "upright"]
 SWING_KINDS: tuple[SwingKind, ...] = get_args(SwingKind)

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
-from lightpen.pen import Pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.simulator.rims import (
     LightArray,
     Patch,
@@ -20,8 +20,8 @@ from lightpen.simulator.rims import (
     disc_rims,
     ellipse_rim,
 )
-from lightpen.simulator.scenery import Finger, Glare, Lamp, Optics, View
 from lightpen.simulator.swings import faces_camera, leds_in_camera
+from lightpen.simulator.view import Finger, Glare, Lamp, Optics, View
 
 OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
 HIDDEN_SAMPLES = 8  # per pixel and axis

@@ -29,7 +29,7 @@ import numpy.typing as npt
 from scipy.special import ndtr
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
+from lightpen.model.camera import Camera
 
 LightArray: TypeAlias = npt.NDArray[np.float32]
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lightpen.pen import Pen
-from lightpen.rigid import rotation_from_vector
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import flat_pen, paper_pen
 
 FAN_ANGLE = np.radians(20)  # of a fanned column's discs from +z

@@ -11,17 +11,17 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.ellipse import disc_images
 from lightpen.errors import FileError
-from lightpen.files import write_whole
 from lightpen.formats.camera_files import write_camera
+from lightpen.formats.files import write_whole
 from lightpen.formats.pen_files import write_pen
-from lightpen.pen import pen_frame_from_raw
-from lightpen.rigid import fit_rigid, vector_from_rotation
+from lightpen.model.ellipse import disc_images
+from lightpen.model.pen import pen_frame_from_raw
+from lightpen.model.rigid import fit_rigid, vector_from_rotation
+from lightpen.simulator.image_plans import ImagePlan, ScenePlan, plan_scene, render_plan
 from lightpen.simulator.render import hidden_fraction, led_levels
 from lightpen.simulator.rims import disc_rims, measure_insides
 from lightpen.simulator.scenes import Scene
-from lightpen.simulator.shots import ScenePlan, Shot, plan_scene, render_shot
 from lightpen.simulator.swings import leds_in_camera, rim_gaps
 
 Json: TypeAlias = dict[str, Any]
@@ -80,7 +80,7 @@ def write_scene(
     write_pen(anonymous, folder / "leds.csv")
     with ThreadPoolExecutor(N_THREADS) as pool:
         encoded = _in_order(
-            pool, lambda shot: _png(render_shot(scene, shot)), plan.shots
+            pool, lambda shot: _png(render_plan(scene, shot)), plan.shots
         )
         for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
             write_whole(images / name, data)
@@ -177,7 +177,9 @@ def _no_folder(folder: Path, error: OSError) -> FileError:
 
 
 def _in_order(
-    pool: ThreadPoolExecutor, encode: Callable[[Shot], bytes], shots: tuple[Shot, ...]
+    pool: ThreadPoolExecutor,
+    encode: Callable[[ImagePlan], bytes],
+    shots: tuple[ImagePlan, ...],
 ) -> Iterator[bytes]:
     """Yield the results in order, with only a few images in memory at a time."""
     ahead: list[Future[bytes]] = []
@@ -230,7 +232,7 @@ def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Jso
     }
 
 
-def _shot_truth(plan: ScenePlan, shot: Shot) -> Json:
+def _shot_truth(plan: ScenePlan, shot: ImagePlan) -> Json:
     scene, swing, index = plan.scene, plan.swing, shot.index
     tilt, direction, roll = np.degrees(
         [
@@ -271,7 +273,7 @@ def _shot_truth(plan: ScenePlan, shot: Shot) -> Json:
     }
 
 
-def _led_truths(scene: Scene, shot: Shot) -> list[Json]:
+def _led_truths(scene: Scene, shot: ImagePlan) -> list[Json]:
     camera, pen, view = scene.camera, scene.pen, shot.view
     leds, normals = leds_in_camera(pen, shot.rotation, shot.translation)
     ellipses = disc_images(camera, leds, normals, pen.diameter / 2)

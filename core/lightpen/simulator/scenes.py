@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field, fields
 
 from lightpen.arrays import FloatArray
-from lightpen.camera import Camera
-from lightpen.pen import Pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.simulator.postures import SwingKind
-from lightpen.simulator.scenery import Optics
 from lightpen.simulator.sensor import Sensor
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP, paper_camera, paper_pen
+from lightpen.simulator.view import Optics
 
 
 @dataclass(frozen=True)

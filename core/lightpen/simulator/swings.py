@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.camera import Camera
-from lightpen.ellipse import disc_images, ellipse_centers
-from lightpen.pen import Pen
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import disc_images, ellipse_centers
+from lightpen.model.pen import Pen
 from lightpen.simulator.postures import Postures, SwingKind, draw_postures
 
 PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result

@@ -1,0 +1,1 @@
+"""Words, numbers, colours and sounds: how things look and are said."""

@@ -1,0 +1,11 @@
+"""How the grades of a calibration look, wherever they are shown."""
+
+from lightpen.estimation.verdict import Grade
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+
+GRADE_MARKS: dict[Grade, tuple[Sign, Tone]] = {
+    Grade.PASS: (Sign.CHECK, Tone.GOOD),
+    Grade.CHECK: (Sign.WARNING, Tone.WARN),
+    Grade.REPEAT: (Sign.CROSS, Tone.BAD),
+}

@@ -1,0 +1,1 @@
+"""The window about the steps: bars, list of steps, help, options."""

@@ -1,0 +1,63 @@
+"""What the program is, and which versions it is made of."""
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+
+
+class About(QDialog):
+    """Names, versions and licences; the text can be copied into a report.
+
+    Parameters
+    ----------
+    versions : mapping of str to str
+        Version by name.
+    """
+
+    def __init__(
+        self, versions: Mapping[str, str], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(self.tr("About Lightpen"))
+        self.setMinimumWidth(60 * GRID)
+
+        # Widgets
+        heading = text_label(TextSize.TITLE)
+        heading.setText("Lightpen")
+        purpose = text_label(TextSize.BODY)
+        purpose.setText(self.tr("Calibrates the probe tip of a light pen."))
+        self._versions = text_label(TextSize.BODY)
+        self._versions.setText(
+            "\n".join(f"{name} {number}" for name, number in versions.items())
+        )
+        licences = text_label(TextSize.SMALL, Tone.QUIET)
+        licences.setText(
+            self.tr(
+                "Lightpen: MIT licence. Qt and PySide6: LGPL 3. Fonts: cut from Noto "
+                "Sans and Noto Sans CJK, SIL Open Font License 1.1."
+            )
+        )
+        for label in (self._versions, licences):
+            label.setTextInteractionFlags(
+                Qt.TextInteractionFlag.TextSelectableByMouse
+                | Qt.TextInteractionFlag.TextSelectableByKeyboard
+            )
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        margin = 3 * GRID
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.setSpacing(2 * GRID)
+        for widget in (heading, purpose, self._versions, licences, buttons):
+            layout.addWidget(widget)
+
+        # Connections
+        buttons.rejected.connect(self.reject)
+
+    def text(self) -> str:
+        """Return the versions as they are shown."""
+        return self._versions.text()

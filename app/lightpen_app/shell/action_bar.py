@@ -1,0 +1,99 @@
+"""The foot of the window: the status line, Back, and the main button."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
+
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.shell.room import Room
+from lightpen_app.steps.page import MainAction
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border
+HEIGHT, LOW_HEIGHT = 9 * GRID, 8 * GRID  # px, at least
+
+
+class ActionBar(Translated, QFrame):
+    """One main button, with the reason when it cannot be pressed.
+
+    Signals
+    -------
+    main_pressed(), back_pressed()
+        The buttons.
+    """
+
+    main_pressed = Signal()
+    back_pressed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("bottom_bar")
+
+        # Widgets
+        self._why_not = text_label(TextSize.BODY, Tone.WARN)
+        self._status = text_label(TextSize.SMALL, Tone.QUIET)
+        self._back = PushButton()
+        self._main = PushButton(MAIN_WIDTH)
+        self._main.setObjectName("main_button")
+
+        # Layout
+        words = QVBoxLayout()
+        words.setSpacing(0)
+        words.addStretch(1)
+        words.addWidget(self._why_not)
+        words.addWidget(self._status)
+        words.addStretch(1)
+        self._layout = layout = QHBoxLayout(self)
+        layout.setSpacing(2 * GRID)
+        layout.addLayout(words, 1)
+        layout.addWidget(self._back)
+        layout.addWidget(self._main)
+
+        # Connections
+        self._back.clicked.connect(self.back_pressed)
+        self._main.clicked.connect(self.main_pressed)
+
+        self.set_room(Room())
+        self.set_status("")
+        self._retranslate()
+
+    def set_action(self, action: MainAction, *, can_go_back: bool) -> None:
+        """Show another main action."""
+        self._main.setText(action.text)
+        if action.why_not and self._main.hasFocus():
+            self.setFocus()  # kept for the button, until it can be pressed again
+        self._main.setEnabled(not action.why_not)
+        if not action.why_not and self.hasFocus():
+            self._main.setFocus()
+        self._main.setAccessibleDescription(action.why_not)
+        self._why_not.setText(action.why_not)
+        self._why_not.setVisible(bool(action.why_not))
+        self._back.setVisible(can_go_back)
+
+    def set_status(self, text: str) -> None:
+        """Show a sentence in the status line, or none."""
+        self._status.setText(text)
+        self._status.setAccessibleName(text)
+        self._status.setVisible(bool(text))
+
+    def set_room(self, room: Room) -> None:
+        """Take less of a window that has little."""
+        self.setMinimumHeight(LOW_HEIGHT if room.is_low else HEIGHT)
+        side = room.margin
+        self._layout.setContentsMargins(side, GRID, side, GRID)
+
+    def words(self) -> tuple[str, str]:
+        """Return why the main button cannot be pressed, and the status."""
+        return self._why_not.text(), self._status.text()
+
+    def press_main(self) -> None:
+        """Press the main button, if it can be pressed."""
+        if self._main.isEnabled():
+            self._main.click()
+
+    def focus_main(self) -> None:
+        """Put the focus on the main button."""
+        self._main.setFocus(Qt.FocusReason.TabFocusReason)
+
+    def _retranslate(self) -> None:
+        self._back.setText(self.tr("Back"))

@@ -1,0 +1,92 @@
+"""Help about one step, in a window of its own."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import (
+    QKeyEvent,
+    QTextBlockFormat,
+    QTextCursor,
+    QTextDocument,
+    QTextTable,
+)
+from PySide6.QtWidgets import QTextBrowser, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.languages import Language
+from lightpen_app.look.theme import GRID, RESOURCES
+from lightpen_app.widgets.translated import Translated
+
+HELP = RESOURCES / "help"
+_PROPORTIONAL = QTextBlockFormat.LineHeightTypes.ProportionalHeight.value
+
+
+def help_text(key: str, language: Language) -> str:
+    """Return the help about a step, as Markdown; in English if need be."""
+    for folder in (language, Language.ENGLISH):
+        path = HELP / folder / f"{key}.md"
+        if path.is_file():
+            return path.read_text("utf-8")
+    raise ValueError(f"There is no help about {key!r}.")
+
+
+class HelpWindow(Translated, QWidget):
+    """Shows one help text; Escape or F1 closes it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self.setObjectName("help")
+        self._key = ""
+        self._language = Language.ENGLISH
+        self.resize(80 * GRID, 90 * GRID)
+
+        # Widgets
+        self._browser = QTextBrowser()
+        self._browser.setOpenLinks(False)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
+        layout.addWidget(self._browser)
+
+        self._retranslate()
+
+    def text(self) -> str:
+        """Return the words shown."""
+        return self._browser.toPlainText()
+
+    def set_topic(self, key: str, language: Language) -> None:
+        """Show the help about a step."""
+        self._key, self._language = key, language
+        self._browser.setMarkdown(help_text(key, language))
+        _space_out(self._browser.document())
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in (Qt.Key.Key_Escape, Qt.Key.Key_F1):
+            self.close()
+        else:
+            super().keyPressEvent(event)
+
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Help"))
+        self._browser.setAccessibleName(self.tr("Help"))
+
+
+def _space_out(document: QTextDocument) -> None:
+    """Put the paragraphs on the grid; Markdown comes without any space."""
+    document.setIndentWidth(3 * GRID)
+    document.setDocumentMargin(2 * GRID)
+    block = document.begin()
+    while block.isValid():
+        layout = block.blockFormat()
+        in_table = QTextCursor(block).currentTable() is not None
+        layout.setTopMargin(2 * GRID if layout.headingLevel() > 1 else 0)
+        layout.setBottomMargin(0 if in_table else GRID)
+        layout.setLineHeight(120, _PROPORTIONAL)
+        QTextCursor(block).setBlockFormat(layout)
+        block = block.next()
+    for frame in document.rootFrame().childFrames():
+        if isinstance(frame, QTextTable):
+            table = frame.format().toTableFormat()
+            table.setCellPadding(GRID // 2)
+            table.setBorder(0)
+            frame.setFormat(table)

@@ -1,0 +1,447 @@
+"""The window of the wizard: steps at the left, one page, one main button."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QAction,
+    QCloseEvent,
+    QGuiApplication,
+    QIcon,
+    QKeyEvent,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QCheckBox,
+    QGridLayout,
+    QMainWindow,
+    QMessageBox,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.errors import FileError
+from lightpen_app.crash import versions
+from lightpen_app.look.theme import (
+    GRID,
+    RESOURCES,
+    Tone,
+)
+from lightpen_app.shell.about import About
+from lightpen_app.shell.action_bar import ActionBar
+from lightpen_app.shell.help_window import HelpWindow
+from lightpen_app.shell.options_menu import OptionsMenu
+from lightpen_app.shell.page_area import PageArea
+from lightpen_app.shell.placement import FRAME, fitted_place
+from lightpen_app.shell.room import Room
+from lightpen_app.shell.sidebar import Sidebar
+from lightpen_app.shell.step_states import Status, Step, list_steps
+from lightpen_app.steps.page import Page
+from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.operator_view import OperatorView
+from lightpen_app.work.settings import Preferences, Settings
+
+LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
+FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
+
+
+class MainWindow(QMainWindow):
+    """Shows one page at a time and leads from step to step.
+
+    Keys: Enter and PageDown press the main button, PageUp goes back, Space pauses,
+    F1 helps, F10 opens the options, F11 the operator view, B mutes. Escape does
+    nothing here, so that it cannot end a capture.
+
+    Parameters
+    ----------
+    pages : sequence of Page
+        In the order of the steps; at least one.
+    settings : Settings
+        Where the window's place is kept.
+    preferences : Preferences
+        What is in use now.
+
+    Signals
+    -------
+    preferences_changed(Preferences)
+        The user chose otherwise.
+    closing()
+        The pages are shut down; what they share must be, too, and whoever does so
+        waits for what is still under way.
+    """
+
+    preferences_changed = Signal(object)
+    closing = Signal()
+
+    def __init__(
+        self,
+        pages: Sequence[Page],
+        settings: Settings,
+        preferences: Preferences,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        if not pages:
+            raise ValueError("`pages` must hold at least one page.")
+        self.setObjectName("main")
+        self.setWindowIcon(QIcon(str(RESOURCES / "icons" / "lightpen.svg")))
+        self._pages = tuple(pages)
+        self._settings = settings
+        self._now = 0
+        self._room = Room()
+        self._notice_is_of_page = False
+        self._asks = True
+
+        # Widgets: the order of making them is the order of the Tab key
+        self._sidebar = Sidebar()
+        self._area = PageArea(self._pages)
+        self._notice = self._area.notice()
+        self._action_bar = ActionBar()
+        self._operator_view = OperatorView()
+        self._operator_view.set_distance_m(preferences.distance_m)
+        self._help_window = HelpWindow()
+        self._options = OptionsMenu(preferences, self)
+        self._make_actions()
+
+        # Layout
+        self.setCentralWidget(self._arranged())
+
+        # Connections
+        self._sidebar.step_chosen.connect(self.go_to)
+        self._sidebar.operator_view_chosen.connect(self._operator_action.toggle)
+        self._sidebar.help_chosen.connect(self._on_help_triggered)
+        self._sidebar.options_chosen.connect(self._show_options)
+        self._action_bar.main_pressed.connect(self._on_main_pressed)
+        self._action_bar.back_pressed.connect(self.go_back)
+        self._options.value_changed.connect(self._on_options_changed)
+        self._options.mute_action.toggled.connect(self._on_mute_toggled)
+        self._options.about_chosen.connect(self._on_about_chosen)
+        self._operator_view.closed.connect(self._on_operator_view_closed)
+        self._operator_view.advance_requested.connect(self._on_advance_pressed)
+        self._operator_view.back_requested.connect(self.go_back)
+        self._operator_view.pause_requested.connect(self._on_pause_pressed)
+        for page in self._pages:
+            self._connect_page(page)
+
+        self._use_room()
+        self._retranslate()
+        if settings.restore_geometry(self):
+            self._fit_screen()
+        else:
+            available = self.screen().availableGeometry()
+            self.resize(FIRST_SIZE.boundedTo(available.size() - FRAME))
+        self._pages[0].entered()
+        self._refresh()
+        self._focus_page()
+
+    def page(self) -> Page:
+        """Return the page that is shown."""
+        return self._pages[self._now]
+
+    def go_to(self, index: int) -> None:
+        """Show a page, or say why it is closed."""
+        if index == self._now:
+            return
+        why_closed = self._pages[index].why_closed()
+        if why_closed:
+            self._action_bar.set_status(why_closed)
+            return
+        self.page().left()
+        self._now = index
+        self._action_bar.set_status("")
+        if self._notice_is_of_page:
+            self._notice.clear()
+        self._area.show_page(self.page())
+        self.page().entered()
+        self._refresh()
+        self._focus_page()
+
+    def go_back(self) -> None:
+        """Show the page before this one."""
+        if self._now > 0:
+            self.go_to(self._now - 1)
+
+    def advance(self) -> None:
+        """Show the page after this one."""
+        if self._now + 1 < len(self._pages):
+            self.go_to(self._now + 1)
+
+    def press_main(self) -> None:
+        """Press the main button, if it can be pressed."""
+        self._action_bar.press_main()
+
+    def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
+        """Show a sentence until the user has read it."""
+        self._notice_is_of_page = False
+        self._notice.show_text(text, tone)
+
+    def drop_notice(self, text: str) -> None:
+        """Take a sentence away whose cause is gone, and no other."""
+        if self._notice.text() == text:
+            self._notice.clear()
+
+    def show_crash_report(self, path: str) -> None:
+        """Tell that the program met a bug of its own; path "" if none is written."""
+        if path:
+            text = self.tr(
+                "The program made a mistake of its own and goes on. All images taken "
+                "so far are safe. Please send this report to its makers: {0}"
+            ).format(path)
+        else:
+            text = self.tr(
+                "The program made a mistake of its own and goes on. All images taken "
+                "so far are safe. No report could be written: the disk is full or not "
+                "yours to write."
+            )
+        self.show_notice(text)
+
+    def close_unasked(self) -> None:
+        """Close without a question, as there may be nobody to answer."""
+        self._asks = False
+        self.close()
+
+    def steps(self) -> tuple[Step, ...]:
+        """Return the list of steps as it is shown."""
+        return self._sidebar.steps()
+
+    def words(self) -> tuple[str, ...]:
+        """Return what the window itself says now, besides the page."""
+        said = (
+            self._sidebar.subject(),
+            *self._area.words(),
+            *self._action_bar.words(),
+        )
+        return tuple(filter(None, said))
+
+    def help_window(self) -> HelpWindow:
+        """Return the help."""
+        return self._help_window
+
+    def operator_view(self) -> OperatorView:
+        """Return the operator view."""
+        return self._operator_view
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Take the keys that no control has taken."""
+        key = event.key()
+        if key in ENTER_KEYS:
+            focused = QApplication.focusWidget()
+            if (
+                isinstance(focused, QAbstractButton)
+                and not isinstance(focused, QCheckBox)
+                and focused.isEnabled()
+            ):
+                focused.click()
+            else:
+                self._action_bar.press_main()
+        elif key == Qt.Key.Key_PageDown:
+            self._on_advance_pressed()
+        elif key == Qt.Key.Key_PageUp:
+            self.go_back()
+        else:
+            super().keyPressEvent(event)
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        room = Room.of(event.size())
+        if room != self._room:
+            self._room = room
+            self._use_room()
+
+    @override
+    def closeEvent(self, event: QCloseEvent) -> None:
+        questions = [page.unsaved() for page in self._pages if page.unsaved()]
+        if self._asks and questions and not self._confirmed("\n\n".join(questions)):
+            event.ignore()
+            return
+        self._settings.save_geometry(self)
+        self.hide()  # what is under way may take its time to end
+        self._operator_view.close()
+        self._help_window.close()
+        self.page().left()
+        for page in self._pages:
+            page.shut_down()
+        with suppress(FileError):  # nobody is left to tell; it was told at the choice
+            self._settings.sync()
+        self.closing.emit()
+        super().closeEvent(event)
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.LanguageChange:
+            self._retranslate()
+            self._refresh()
+            self._help_window.set_topic(self.page().key, self._options.value().language)
+
+    def _connect_page(self, page: Page) -> None:
+        page.changed.connect(self._refresh)
+        page.advance_requested.connect(self.advance)
+        page.step_requested.connect(self._on_step_requested)
+        page.status_changed.connect(self._action_bar.set_status)
+        page.notice_raised.connect(self._on_notice_raised)
+        page.subject_changed.connect(self._sidebar.set_subject)
+        page.operator_value_changed.connect(self._operator_view.set_value)
+
+    def _make_actions(self) -> None:
+        """Make the actions whose keys work wherever the focus is."""
+        self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
+        self._operator_action = QAction(self, checkable=True)
+        self._operator_action.setShortcut(Qt.Key.Key_F11)
+        self._operator_action.toggled.connect(self._on_operator_toggled)
+        self._action(Qt.Key.Key_F10, self._show_options)
+        # A presenter's remote sends the page keys.
+        self._hands_free_actions = (
+            self._action(Qt.Key.Key_Space, self._on_pause_pressed),
+            self._action(Qt.Key.Key_PageDown, self._on_advance_pressed),
+            self._action(Qt.Key.Key_PageUp, self.go_back),
+        )
+        self.addActions(
+            [
+                self._operator_action,
+                self._options.mute_action,
+                *self._hands_free_actions,
+            ]
+        )
+        self._operator_view.addActions(
+            [self._help_action, self._operator_action, self._options.mute_action]
+        )
+        self._help_window.addActions([self._operator_action, self._options.mute_action])
+
+    def _action(self, key: Qt.Key, slot: Callable[[], object]) -> QAction:
+        action = QAction(self)
+        action.setShortcut(key)
+        action.triggered.connect(lambda _=False: slot())
+        self.addAction(action)
+        return action
+
+    def _arranged(self) -> QWidget:
+        """Return all widgets in their places."""
+        central = QWidget()
+        layout = QGridLayout(central)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self._sidebar, 0, 0, 2, 1)
+        layout.addWidget(self._area, 0, 1)
+        layout.addWidget(self._action_bar, 1, 1)
+        layout.setRowStretch(0, 1)
+        return central
+
+    def _fit_screen(self) -> None:
+        """Keep the window within its screen, its buttons with it."""
+        if self.isMaximized() or self.isFullScreen():
+            return
+        place = self.geometry()
+        screen = QGuiApplication.screenAt(place.center()) or self.screen()
+        fitted = fitted_place(place, screen.availableGeometry())
+        if fitted != place:
+            self.setGeometry(fitted)
+
+    def _use_room(self) -> None:
+        """Arrange what is about the page as the size of the window allows."""
+        self._area.set_room(self._room)
+        self._sidebar.set_room(self._room)
+        self._action_bar.set_room(self._room)
+
+    def _refresh(self) -> None:
+        """Show what the pages say of themselves now."""
+        page = self.page()
+        statuses = [
+            Status(each.title(), each.is_complete(), each.why_closed())
+            for each in self._pages
+        ]
+        self._sidebar.set_steps(list_steps(statuses, self._now))
+        self._area.set_heading(page.title(), page.lead())
+        self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
+        for each in self._hands_free_actions:
+            each.setEnabled(page.is_hands_free())
+
+    def _focus_page(self) -> None:
+        """Put the focus on the control that the page chose, or on its first one."""
+        page = self.page()
+        first = page.first_control()
+        if first is not None:
+            first.setFocus(Qt.FocusReason.TabFocusReason)
+            return
+        widget = page.nextInFocusChain()
+        while widget is not None and page.isAncestorOf(widget):
+            takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
+            if takes_tab and widget.isEnabled() and widget.isVisibleTo(page):
+                widget.setFocus(Qt.FocusReason.TabFocusReason)
+                return
+            widget = widget.nextInFocusChain()
+        self._action_bar.focus_main()
+
+    def _show_options(self) -> None:
+        """Open the options above their button."""
+        menu = self._options
+        corner = self._sidebar.options_corner()
+        menu.popup(corner - QPoint(0, menu.sizeHint().height()))
+
+    def _on_main_pressed(self) -> None:
+        self.page().run_main_action()
+
+    def _on_advance_pressed(self) -> None:
+        """Do as a presenter's remote asks, unless someone must be at the screen."""
+        if self.page().main_action().at_screen:
+            self._action_bar.set_status(self.tr("Press this button at the screen."))
+        else:
+            self._action_bar.press_main()
+
+    def _on_step_requested(self, key: str) -> None:
+        keys = [page.key for page in self._pages]
+        self.go_to(keys.index(key))
+
+    def _on_notice_raised(self, text: str) -> None:
+        if text:
+            self._notice_is_of_page = True
+            self._notice.show_text(text)
+        elif self._notice_is_of_page:
+            self._notice.clear()
+
+    def _on_pause_pressed(self) -> None:
+        self.page().toggle_pause()
+
+    def _on_help_triggered(self) -> None:
+        self._help_window.set_topic(self.page().key, self._options.value().language)
+        self._help_window.show()
+        self._help_window.activateWindow()
+
+    def _on_operator_toggled(self, shown: bool) -> None:
+        if shown:
+            self._operator_view.open_beside(self)
+        else:
+            self._operator_view.close()
+
+    def _on_operator_view_closed(self) -> None:
+        self._operator_action.setChecked(False)
+
+    def _on_options_changed(self, preferences: Preferences) -> None:
+        self._operator_view.set_distance_m(preferences.distance_m)
+        self.preferences_changed.emit(preferences)
+
+    def _on_mute_toggled(self, muted: bool) -> None:
+        words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
+        self._action_bar.set_status(words)
+
+    def _on_about_chosen(self) -> None:
+        About(versions(), self).exec()
+
+    def _confirmed(self, question: str) -> bool:
+        box = QMessageBox(self)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setText(question)
+        stay = box.addButton(self.tr("Stay"), QMessageBox.ButtonRole.RejectRole)
+        box.addButton(self.tr("Close anyway"), QMessageBox.ButtonRole.AcceptRole)
+        box.setDefaultButton(stay)
+        box.setEscapeButton(stay)
+        box.exec()
+        return box.clickedButton() is not stay
+
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Pen tip calibration"))

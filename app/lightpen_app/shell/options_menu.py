@@ -1,0 +1,115 @@
+"""The options of the program: language, appearance, viewing distance, sounds."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtWidgets import QMenu, QWidget
+
+from lightpen_app.look.languages import Language
+from lightpen_app.look.theme import Appearance
+from lightpen_app.widgets.operator_view import DISTANCES_M
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.settings import Preferences
+
+
+class OptionsMenu(Translated, QMenu):
+    """Shows and changes the preferences.
+
+    Parameters
+    ----------
+    preferences : Preferences
+        What is in use now.
+
+    Attributes
+    ----------
+    mute_action : QAction
+        Its key, B, works in every window that it is added to.
+
+    Signals
+    -------
+    value_changed(Preferences)
+        The user chose otherwise.
+    about_chosen()
+        The user wants to know what the program is.
+    """
+
+    value_changed = Signal(object)
+    about_chosen = Signal()
+
+    def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = preferences
+        self._choices: list[tuple[QAction, object]] = []
+
+        # Widgets
+        self._languages = self._choice_menu(
+            "language", tuple(Language), preferences.language
+        )
+        self._appearances = self._choice_menu(
+            "appearance", tuple(Appearance), preferences.appearance
+        )
+        self._distances = self._choice_menu(
+            "distance_m", tuple(map(float, DISTANCES_M)), preferences.distance_m
+        )
+        self.mute_action = QAction(self)
+        self.mute_action.setCheckable(True)
+        self.mute_action.setChecked(preferences.muted)
+        self.mute_action.setShortcut(Qt.Key.Key_B)
+        self.addAction(self.mute_action)
+        self.addSeparator()
+        self._about = self.addAction("")
+
+        # Connections
+        self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
+        self._about.triggered.connect(self.about_chosen)
+
+        self._retranslate()
+
+    def value(self) -> Preferences:
+        """Return the preferences in use."""
+        return self._value
+
+    def _choice_menu(
+        self, preference: str, choices: Sequence[object], chosen: object
+    ) -> QMenu:
+        """Add a menu of the values that a preference may have."""
+        menu = self.addMenu("")
+        group = QActionGroup(menu)
+        for value in choices:
+            action = group.addAction("")
+            action.setCheckable(True)
+            action.setChecked(value == chosen)
+            action.triggered.connect(
+                lambda _=False, value=value: self._choose(**{preference: value})
+            )
+            self._choices.append((action, value))
+        menu.addActions(group.actions())
+        return menu
+
+    def _choose(self, **changes: object) -> None:
+        # Menus name the field that they change, whose type mypy cannot know.
+        self._value = replace(self._value, **changes)  # type: ignore[arg-type]
+        self.value_changed.emit(self._value)
+
+    def _choice_name(self, value: object) -> str:
+        match value:
+            case Language():
+                return value.own_name
+            case Appearance.SYSTEM:
+                return self.tr("As the system")
+            case Appearance.LIGHT:
+                return self.tr("Light")
+            case Appearance.DARK:
+                return self.tr("Dark")
+        return self.tr("{0} m").format(f"{value:g}")
+
+    def _retranslate(self) -> None:
+        self._languages.setTitle(self.tr("Language"))
+        self._appearances.setTitle(self.tr("Appearance"))
+        self._distances.setTitle(self.tr("Viewing distance"))
+        self.mute_action.setText(self.tr("Mute the sounds"))
+        self._about.setText(self.tr("About Lightpen"))
+        for action, value in self._choices:
+            action.setText(self._choice_name(value))

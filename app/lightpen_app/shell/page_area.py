@@ -1,0 +1,89 @@
+"""The part of the window that the page has: above it a notice, its title and lead."""
+
+from collections.abc import Sequence
+
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFrame,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.shell.notice_bar import NoticeBar
+from lightpen_app.shell.room import Room
+
+
+class PageArea(QFrame):
+    """Shows one page of several.
+
+    Parameters
+    ----------
+    pages : sequence of QWidget
+        At least one; the first is shown.
+    """
+
+    def __init__(self, pages: Sequence[QWidget], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("page_area")
+        self._pages = tuple(pages)
+
+        # Widgets: the order of making them is the order of the Tab key
+        self._notice = NoticeBar()
+        self._title = text_label(TextSize.TITLE)
+        self._title.setWordWrap(False)
+        self._lead = text_label(TextSize.BODY, Tone.QUIET)
+        self._stack = QStackedWidget()
+        self._stack.setMinimumSize(1, 1)  # the pages ask for none: they scroll
+        for page in self._pages:
+            self._stack.addWidget(page)
+
+        # Layout
+        self._heading = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._heading.addWidget(self._title)
+        self._heading.addWidget(self._lead, 1)
+        self._layout = layout = QVBoxLayout(self)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._notice)
+        layout.addSpacing(GRID)
+        layout.addLayout(self._heading)
+        layout.addSpacing(GRID)
+        layout.addWidget(self._stack, 1)
+
+        self.show_page(self._pages[0])
+
+    def notice(self) -> NoticeBar:
+        """Return the bar of the notice."""
+        return self._notice
+
+    def words(self) -> tuple[str, ...]:
+        """Return what is said about the page."""
+        return self._notice.text(), self._title.text(), self._lead.text()
+
+    def show_page(self, page: QWidget) -> None:
+        """Show a page; only that one may ask for room."""
+        for each in self._pages:
+            policy = QSizePolicy.Policy
+            wish = policy.Preferred if each is page else policy.Ignored
+            each.setSizePolicy(wish, wish)
+        self._stack.setCurrentWidget(page)
+
+    def set_heading(self, title: str, lead: str) -> None:
+        """Say which page it is, and what to do on it."""
+        self._title.setText(title)
+        self._lead.setText(lead)
+        self._lead.setVisible(bool(lead))
+
+    def set_room(self, room: Room) -> None:
+        """Arrange title, lead and margins as the size of the window allows."""
+        side = room.margin
+        if room.is_low:
+            self._layout.setContentsMargins(side, 0, side, GRID)
+            self._heading.setDirection(QBoxLayout.Direction.LeftToRight)
+            self._heading.setSpacing(3 * GRID)
+        else:
+            self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
+            self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
+            self._heading.setSpacing(GRID)

@@ -1,0 +1,128 @@
+"""The left side of the window: what is calibrated, the steps, and where help is."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QPoint, Signal
+from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
+
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.shell.room import Room
+from lightpen_app.shell.step_list import StepList
+from lightpen_app.shell.step_states import Step
+from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
+
+
+class Sidebar(Translated, QFrame):
+    """The steps, with buttons for what has a function key.
+
+    Signals
+    -------
+    step_chosen(int)
+        Index of the step, which may be closed.
+    operator_view_chosen(), help_chosen(), options_chosen()
+        The buttons.
+    """
+
+    step_chosen = Signal(int)
+    operator_view_chosen = Signal()
+    help_chosen = Signal()
+    options_chosen = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("sidebar")
+        self._room = Room()
+
+        # Widgets
+        self._name = text_label(TextSize.LEAD)
+        self._subject = text_label(TextSize.SMALL, Tone.QUIET)
+        self._steps = StepList()
+        self._operator_view = PushButton()
+        self._help = PushButton()
+        self._options = PushButton()
+        buttons = (self._operator_view, self._help, self._options)
+
+        # Layout
+        self._head = head = QVBoxLayout()
+        head.setSpacing(GRID // 2)
+        head.addWidget(self._name)
+        head.addWidget(self._subject)
+        self._foot = foot = QVBoxLayout()
+        foot.setSpacing(0)
+        for button in buttons:
+            button.setFlat(True)
+            foot.addWidget(button)
+        content = QWidget()
+        steps = QVBoxLayout(content)
+        steps.setContentsMargins(0, 0, 0, 0)
+        steps.addWidget(self._steps)
+        steps.addStretch(1)
+        scroll = PageScroll()
+        scroll.setWidget(content)
+        self._layout = layout = QVBoxLayout(self)
+        layout.setSpacing(GRID)
+        layout.addLayout(head)
+        layout.addWidget(scroll, 1)
+        layout.addLayout(foot)
+
+        # Connections
+        self._steps.step_chosen.connect(self.step_chosen)
+        self._operator_view.clicked.connect(self.operator_view_chosen)
+        self._help.clicked.connect(self.help_chosen)
+        self._options.clicked.connect(self.options_chosen)
+
+        self.set_subject("")
+        self.set_room(Room())
+
+    def steps(self) -> tuple[Step, ...]:
+        """Return the steps shown."""
+        return self._steps.steps()
+
+    def set_steps(self, steps: Sequence[Step]) -> None:
+        """Show these steps."""
+        self._steps.set_steps(steps)
+
+    def subject(self) -> str:
+        """Return what is being calibrated."""
+        return self._subject.text()
+
+    def set_subject(self, text: str) -> None:
+        """Say what is being calibrated, such as pen and cone."""
+        self._subject.setText(text)
+        self._subject.setVisible(bool(text))
+
+    def set_room(self, room: Room) -> None:
+        """Take less of a window that has little."""
+        self._room = room
+        narrow = room.is_narrow
+        self.setFixedWidth(NARROW_WIDTH if narrow else WIDTH)
+        if narrow:
+            self._head.setContentsMargins(GRID, 0, GRID, GRID)
+        else:
+            self._head.setContentsMargins(5 * GRID // 2, 0, 2 * GRID, 2 * GRID)
+        side = 0 if narrow else GRID
+        self._foot.setContentsMargins(side, 0, side, 0)
+        top, bottom = (GRID, GRID) if room.is_low else (3 * GRID, 2 * GRID)
+        self._layout.setContentsMargins(0, top, 0, bottom)
+        self._steps.set_narrow(narrow)
+        self._retranslate()
+
+    def options_corner(self) -> QPoint:
+        """Return where on the screen the top left of the options' button is."""
+        return self._options.mapToGlobal(QPoint(0, 0))
+
+    def _retranslate(self) -> None:
+        self._name.setText(self.tr("Pen tip calibration"))
+        for button, text, key in (
+            (self._operator_view, self.tr("Operator view"), "F11"),
+            (self._help, self.tr("Help"), "F1"),
+            (self._options, self.tr("Options"), "F10"),
+        ):
+            with_key = f"{text}  \u00b7  {key}"
+            button.setText(text if self._room.is_narrow else with_key)
+            button.setToolTip(with_key if self._room.is_narrow else "")
+            button.setAccessibleName(text)

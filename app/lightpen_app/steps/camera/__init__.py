@@ -1,0 +1,1 @@
+"""The step Camera: source, exposure, intrinsics, stray light."""

@@ -1,0 +1,228 @@
+"""Exposure and focus: what the image says of them, and what to do."""
+
+from collections import deque
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.cameras.protocol import CameraSettings, Caps, Range
+from lightpen.detection.exposure_advice import Advice, advise
+from lightpen.detection.inspection import Exposure, Inspection
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.steps.camera.focus_meter import N_TRACED, FocusMeter
+from lightpen_app.widgets.keys import ENTER_KEYS
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.translated import Translated
+
+US_PER_MS = 1000.0
+PADDING = 3 * GRID // 2
+FIELD_WIDTH = 12 * GRID  # px, at least
+
+
+class SettingField(NumberField):
+    """A number that takes effect when it is stepped, or typed and Enter pressed."""
+
+    def __init__(self, unit: str, limits: tuple[float, float], n_decimals: int) -> None:
+        super().__init__(unit, limits, n_decimals)
+        self.setKeyboardTracking(False)
+        self.setMinimumWidth(FIELD_WIDTH)
+        self.setStepType(QAbstractSpinBox.StepType.AdaptiveDecimalStepType)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        super().keyPressEvent(event)
+        if event.key() in ENTER_KEYS:
+            event.accept()  # else the window would press its main button
+
+    def set_offered(self, offered: Range, value: float) -> None:
+        """Show what the camera offers and has in force, in the unit of the field."""
+        with QSignalBlocker(self):
+            self.setRange(offered.low, offered.high)
+            self.setValue(value)
+
+
+class ExposurePanel(Translated, QFrame):
+    """The brightness of the LEDs, the settings that change it, and the advice.
+
+    Signals
+    -------
+    exposure_changed(float)
+        Asked for, us.
+    gain_changed(float)
+        Asked for, dB.
+    """
+
+    exposure_changed = Signal(float)
+    gain_changed = Signal(float)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("area", "panel")
+        self._caps: Caps | None = None
+        self._settings = CameraSettings()
+
+        # Widgets
+        self._bar = ExposureBar()
+        self._advice = text_label(TextSize.SMALL, Tone.QUIET)
+        self._exposure_name = QLabel()
+        self._exposure = SettingField("ms", (0.01, 1000.0), 2)
+        self._exposure_name.setBuddy(self._exposure)
+        self._gain_name = QLabel()
+        self._gain = SettingField("dB", (0.0, 48.0), 1)
+        self._gain_name.setBuddy(self._gain)
+        self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)
+        self._why_fixed.setMinimumHeight(5 * GRID)  # that of the fields it stands for
+
+        # Layout
+        fields = QHBoxLayout()
+        fields.setSpacing(GRID)
+        fields.addWidget(self._exposure_name)
+        fields.addWidget(self._exposure, 1)
+        fields.addWidget(self._gain_name)
+        fields.addWidget(self._gain, 1)
+        fields.addWidget(self._why_fixed, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(PADDING, PADDING, PADDING, PADDING)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._bar)
+        layout.addLayout(fields)
+        layout.addWidget(self._advice)
+
+        # Connections
+        self._exposure.valueChanged.connect(self._on_exposure_edited)
+        self._gain.valueChanged.connect(self.gain_changed)
+
+        self._retranslate()
+        self.set_camera(None, CameraSettings())
+
+    def set_value(self, value: Exposure) -> None:
+        """Show the LEDs of another image."""
+        self._bar.set_value(value)
+        self._refresh()
+
+    def set_camera(self, caps: Caps | None, settings: CameraSettings) -> None:
+        """Show what a camera offers and has in force; None where none is open."""
+        self._caps, self._settings = caps, settings
+        exposures = None if caps is None else caps.exposure_us
+        gains = None if caps is None else caps.gain_db
+        exposure_us, gain_db = settings.exposure_us, settings.gain_db
+        if exposures is not None and exposure_us is not None:
+            in_ms = Range(exposures.low / US_PER_MS, exposures.high / US_PER_MS)
+            self._exposure.set_offered(in_ms, exposure_us / US_PER_MS)
+        if gains is not None and gain_db is not None:
+            self._gain.set_offered(gains, gain_db)
+        for widget in (self._exposure_name, self._exposure):
+            widget.setVisible(exposures is not None)
+        for widget in (self._gain_name, self._gain):
+            widget.setVisible(gains is not None)
+        self._why_fixed.setVisible(exposures is None and gains is None)
+        self._refresh()
+
+    def advice(self) -> str:
+        """Return what to do, a sentence."""
+        return self._advice.text()
+
+    def _on_exposure_edited(self, exposure_ms: float) -> None:
+        self.exposure_changed.emit(exposure_ms * US_PER_MS)
+
+    def _retranslate(self) -> None:
+        self._exposure_name.setText(self.tr("E&xposure"))
+        self._exposure.setAccessibleName(self.tr("Exposure"))
+        self._gain_name.setText(self.tr("&Gain"))
+        self._gain.setAccessibleName(self.tr("Gain"))
+        for field in (self._exposure, self._gain):
+            field.setToolTip(
+                self.tr("Up and Down change it; Enter takes a typed number.")
+            )
+        self._refresh()
+
+    def _refresh(self) -> None:
+        if self._caps is None:
+            self._why_fixed.setText(self.tr("No images come."))
+            self._advice.setText("")
+            return
+        self._why_fixed.setText(
+            self.tr("Recorded: exposure and gain are as they were taken.")
+        )
+        advice = advise(self._bar.value(), self._settings, self._caps)
+        self._advice.setText(self._words(advice, self._caps))
+
+    def _words(self, advice: Advice, caps: Caps) -> str:
+        is_recorded = caps.exposure_us is None and caps.gain_db is None
+        match advice:
+            case Advice.SHOW_PEN:
+                return self.tr("Hold the pen so that the camera sees its LEDs.")
+            case Advice.LEAVE:
+                return self.tr("All lie in the good part of the scale.")
+            case Advice.LOWER_GAIN:
+                return self.tr("Lower the gain until no LED is saturated.")
+            case Advice.SHORTEN_EXPOSURE:
+                return self.tr("Shorten the exposure until no LED is saturated.")
+            case Advice.LENGTHEN_EXPOSURE:
+                return self.tr("Lengthen the exposure until all LEDs are good.")
+            case Advice.RAISE_GAIN:
+                return self.tr(
+                    "Raise the gain: a longer exposure would smear the moving pen."
+                )
+            case Advice.EVEN_OUT:
+                return self.tr(
+                    "The LEDs differ too much in brightness. Clean them, and check "
+                    "their supply."
+                )
+            case Advice.CLOSE_APERTURE if is_recorded:
+                return self.tr("Take the images again with a shorter exposure.")
+            case Advice.OPEN_APERTURE if is_recorded:
+                return self.tr("Take the images again with a longer exposure.")
+            case Advice.CLOSE_APERTURE:
+                return self.tr("Close the aperture of the lens a little.")
+            case Advice.OPEN_APERTURE:
+                return self.tr("Open the aperture of the lens a little.")
+
+
+class FocusPanel(Translated, QFrame):
+    """The sharpness of the LEDs, and what to do."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("area", "panel")
+        self._widths: deque[float] = deque(maxlen=N_TRACED)
+
+        # Widgets
+        self._meter = FocusMeter()
+        self._hint = text_label(TextSize.SMALL, Tone.QUIET)
+        self._hint.setAlignment(Qt.AlignmentFlag.AlignTop)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(PADDING, PADDING, PADDING, PADDING)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._meter)
+        layout.addWidget(self._hint, 1)
+
+        self._retranslate()
+
+    def add(self, inspection: Inspection) -> None:
+        """Show one more image."""
+        self._widths.append(inspection.edge_width)
+        self._meter.set_value(self._widths)
+
+    def clear(self) -> None:
+        """Forget the images, as those of another camera."""
+        self._widths.clear()
+        self._meter.set_value(())
+
+    def _retranslate(self) -> None:
+        self._hint.setText(self.tr("Turn the focus ring until the rims are narrowest."))
+        self._meter.setToolTip(
+            self.tr("Width of the LEDs' rims from dark to bright. Hold the pen still.")
+        )

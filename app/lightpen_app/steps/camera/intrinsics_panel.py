@@ -1,0 +1,203 @@
+"""The intrinsics of the camera: their file, what is in it, and whether it fits."""
+
+import numpy as np
+from PySide6.QtCore import QDate, QLocale, Qt, Signal
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QGroupBox,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.live.preparation import CameraFile
+from lightpen.model.camera import Camera
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+FILES = "*.yaml *.yml *.json *.xml"
+N_FACTS = 5
+COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+
+
+class IntrinsicsPanel(Translated, QGroupBox):
+    """Shows the file in use beside the size of the live image.
+
+    Signals
+    -------
+    path_chosen(str)
+        A file is to be read.
+    """
+
+    path_chosen = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._file: CameraFile | None = None
+        self._image_size: tuple[int, int] | None = None
+
+        # Widgets
+        self._path = PathField()
+        self._open = PushButton()
+        self._path.add_button(self._open)
+        self._problem = SignLabel()
+        self._check = SignLabel()
+        self._names = [text_label(TextSize.SMALL, Tone.QUIET) for _ in range(N_FACTS)]
+        self._facts = [text_label(TextSize.SMALL) for _ in range(N_FACTS)]
+
+        # Layout
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(2 * GRID)
+        grid.setVerticalSpacing(GRID // 2)
+        grid.setColumnStretch(1, 1)
+        for row, (name, fact) in enumerate(zip(self._names, self._facts, strict=True)):
+            name.setWordWrap(False)
+            grid.addWidget(name, row, 0, Qt.AlignmentFlag.AlignTop)
+            grid.addWidget(fact, row, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._path)
+        layout.addWidget(self._problem)
+        layout.addWidget(self._check)
+        layout.addLayout(grid)
+
+        # Connections
+        self._path.value_changed.connect(self._on_path_changed)
+        self._open.clicked.connect(self._on_open_clicked)
+
+        self._retranslate()
+
+    def value(self) -> CameraFile | None:
+        """Return the file in use."""
+        return self._file
+
+    def set_value(self, value: CameraFile | None) -> None:
+        """Show another file in use; a complaint about one that is not goes away."""
+        if value is self._file:
+            return
+        self._file = value
+        self._path.set_value("" if value is None else str(value.path))
+        self.set_problem("")
+
+    def set_image_size(self, image_size: tuple[int, int] | None) -> None:
+        """Compare with other live images, width and height in px, or with none."""
+        if image_size != self._image_size:
+            self._image_size = image_size
+            self._refresh()
+
+    def set_problem(self, sentence: str) -> None:
+        """Say why the file that was chosen is not used, or nothing."""
+        self._path.set_faulty(bool(sentence))
+        self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
+        self._refresh()
+
+    def _on_path_changed(self, path: str) -> None:
+        if path:
+            self.path_chosen.emit(path)
+
+    def _on_open_clicked(self) -> None:
+        self._path.pick(
+            QFileDialog.FileMode.ExistingFile,
+            self.tr("Intrinsics of camera and lens"),
+            self.tr("Intrinsics of OpenCV, ROS, Kalibr, MATLAB ({0})").format(FILES),
+        )
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Intrinsics of camera and lens"))
+        edit = self._path.edit()
+        edit.setAccessibleName(self.tr("Intrinsics file"))
+        edit.setPlaceholderText(self.tr("Intrinsics file"))
+        self._open.setText(self.tr("Open..."))
+        for label, name in zip(
+            self._names,
+            (
+                self.tr("In use"),
+                self.tr("Focal lengths"),
+                self.tr("Principal point"),
+                self.tr("Distortion"),
+                self.tr("Calibrated"),
+            ),
+            strict=True,
+        ):
+            label.setText(name)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        camera = None if self._file is None else self._file.camera
+        self._check.set_value(self._checked(camera))
+        facts = [""] * N_FACTS if camera is None else self._told(camera)
+        for name, label, fact in zip(self._names, self._facts, facts, strict=True):
+            label.setText(fact)
+            _let_select(label, bool(fact))
+            label.setVisible(bool(fact))
+            name.setVisible(bool(fact))
+
+    def _checked(self, camera: Camera | None) -> Remark:
+        """Return whether the file goes with the live images."""
+        if camera is None:
+            return Remark(
+                self.tr("Open the file with the calibration of camera and lens."),
+                Sign.WARNING,
+                Tone.WARN,
+            )
+        made_for = self._size_text(camera.width, camera.height)
+        if self._image_size is None:
+            words = self.tr("Made for images of {0}")
+            return Remark(words.format(made_for), Sign.WAIT, Tone.QUIET)
+        if self._image_size == (camera.width, camera.height):
+            words = self.tr("Fits the live images: {0}")
+            return Remark(words.format(made_for), Sign.CHECK, Tone.GOOD)
+        words = self.tr(
+            "The camera sends {0}, the calibration file was made for {1}. Choose the "
+            "file for this camera or switch off binning."
+        )
+        sent = self._size_text(*self._image_size)
+        return Remark(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
+
+    def _told(self, camera: Camera) -> list[str]:
+        """Return what is in the file, a text for each name."""
+        assert self._file is not None
+        stated = camera.covariance
+        u = None if stated is None else np.sqrt(np.diag(stated)).tolist()
+        values = [camera.fx, camera.fy, camera.cx, camera.cy]
+        fx, fy, cx, cy = (
+            f"{value:.2f}" if u is None else f"{value:.2f} \u00b1 {u[i]:.2f}"
+            for i, value in enumerate(values)
+        )
+        distortion = ", ".join(
+            f"{name}\u00a0{value:.4g}"
+            for name, value in zip(COEFFICIENTS, camera.distortion, strict=False)
+        )
+        day = camera.calibrated_on
+        if day is None:
+            date = self.tr("no date")
+        else:
+            form = QLocale.FormatType.LongFormat
+            date = QLocale().toString(QDate(day.year, day.month, day.day), form)
+        if u is None:
+            date += self.tr(", no uncertainty in the file")
+        pair = self.tr("{0} and {1} px")
+        return [
+            self._file.path.name if self._problem.value().text else "",
+            pair.format(fx, fy),
+            pair.format(cx, cy),
+            distortion,
+            date,
+        ]
+
+    def _size_text(self, width: int, height: int) -> str:
+        return self.tr("{0} x {1}").format(width, height)
+
+
+def _let_select(label: QLabel, selectable: bool) -> None:
+    """Let the words of a label be selected, or let it take no focus."""
+    flags = Qt.TextInteractionFlag
+    label.setTextInteractionFlags(
+        flags.TextSelectableByMouse if selectable else flags.NoTextInteraction
+    )

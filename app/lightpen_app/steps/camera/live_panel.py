@@ -1,0 +1,184 @@
+"""The live image with the state of the camera above it."""
+
+from collections import deque
+from collections.abc import Sequence
+from math import hypot
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+
+from lightpen.cameras.protocol import Stats
+from lightpen.cameras.worker import Connection
+from lightpen.detection.reasons import Reason
+from lightpen.live.looking import LiveImage
+from lightpen_app.look.phrases import reason_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED
+from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.live_markers import led_numbers, live_markers
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.live_view import Shown
+
+N_TIMED = 40  # images of which the rate is the mean: two seconds
+WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
+
+
+class LivePanel(Translated, QWidget):
+    """Shows images and how they come."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._connection = Connection.CLOSED
+        self._sentence = ""
+        self._times_ns: deque[int] = deque(maxlen=N_TIMED)
+        self._seen: LiveImage | None = None
+        self._n_lost: deque[int] = deque(maxlen=N_TIMED)
+        self._extra: tuple[Marker, ...] = ()
+
+        # Widgets
+        self._state = SignLabel(wraps=False)
+        self._figures = text_label(TextSize.SMALL, Tone.QUIET)
+        self._figures.setWordWrap(False)
+        self._figures.setAlignment(
+            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        )
+        self._figures.setSizePolicy(
+            QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
+        )
+        self._view = ImageView()
+
+        # Layout
+        head = QHBoxLayout()
+        head.setSpacing(3 * GRID)
+        head.addWidget(self._state)
+        head.addWidget(self._figures, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addLayout(head)
+        layout.addWidget(self._view, 1)
+
+        self._retranslate()
+
+    def state(self) -> Remark:
+        """Return how the camera is."""
+        return self._state.value()
+
+    def figures(self) -> str:
+        """Return what the last image shows, and how images come."""
+        return self._figures.text()
+
+    def view(self) -> ImageView:
+        """Return the image."""
+        return self._view
+
+    def set_image(self, shown: Shown, stats: Stats) -> None:
+        """Show another image, and what became of those before."""
+        self._seen = shown.seen
+        self._times_ns.append(shown.seen.frame.host_ts_ns)
+        self._n_lost.append(stats.missed + stats.incomplete)
+        rings = live_markers(shown.seen)
+        free = (ring for ring in rings if not self._is_found(ring))
+        markers = (*free, *self._extra)
+        self._view.set_half(shown.half, shown.size, markers)
+        self._figures.setText(self._told())
+
+    def set_extra_markers(self, markers: Sequence[Marker]) -> None:
+        """Draw other marks besides the rings about what is seen."""
+        self._extra = tuple(markers)
+
+    def set_connection(self, connection: Connection, sentence: str) -> None:
+        """Show how the camera is; ``sentence`` says why no images come."""
+        if connection in WITHOUT_IMAGES or connection is Connection.OPENING:
+            self._view.set_image(None)
+            self._seen = None
+            self._times_ns.clear()
+            self._n_lost.clear()
+            self._figures.clear()
+        self._connection, self._sentence = connection, sentence
+        self._refresh()
+
+    def _retranslate(self) -> None:
+        self._view.setToolTip(
+            self.tr("Wheel or + and - enlarge, arrow keys move, 0 shows all.")
+        )
+        self._refresh()
+
+    def _refresh(self) -> None:
+        self._state.set_value(self._remark())
+        self._view.set_message(self._message())
+        if self._seen is not None:
+            self._figures.setText(self._told())
+
+    def _remark(self) -> Remark:
+        match self._connection:
+            case Connection.OPENING:
+                return Remark(self.tr("Connecting"), Sign.WAIT, Tone.ACTIVE)
+            case Connection.STREAMING:
+                return Remark(self.tr("Live"), Sign.PLAY, Tone.GOOD)
+            case Connection.SILENT:
+                return Remark(self.tr("Silent"), Sign.PAUSE, Tone.WARN)
+            case Connection.LOST:
+                words = self.tr("Lost, reconnecting")
+                return Remark(words, Sign.WARNING, Tone.BAD)
+            case Connection.CLOSED:
+                return Remark(self.tr("Not connected"), Sign.CROSS, Tone.WARN)
+
+    def _message(self) -> str:
+        match self._connection:
+            case Connection.OPENING:
+                return self.tr("The camera is being opened.")
+            case Connection.STREAMING:
+                return self.tr("The first image is on its way.")
+            case Connection.SILENT:
+                return self.tr(
+                    "The camera answers but sends no images. Check its trigger and "
+                    "its cable."
+                )
+            case Connection.LOST:
+                words = self.tr("{0} It is looked for until it is back.")
+                return words.format(self._sentence)
+            case Connection.CLOSED:
+                return self._sentence
+
+    def _told(self) -> str:
+        seen = self._seen
+        assert seen is not None
+        height, width = seen.frame.image.shape
+        parts = [
+            self._leds_told(seen),
+            self.tr("{0} x {1} px").format(width, height),
+            self.tr("{0} images/s").format(f"{self._rate():.0f}"),
+        ]
+        n_lost = self._n_lost[-1] - self._n_lost[0]
+        if n_lost > 0:
+            parts.append(self.tr("lost: {0}").format(n_lost))
+        return PARTED.join(parts)
+
+    def _leds_told(self, seen: LiveImage) -> str:
+        sighting = seen.sighting
+        if sighting is None:
+            return self.tr("bright spots: {0}").format(len(seen.spots))
+        if sighting.reason is not Reason.NONE:
+            return reason_text(sighting.reason)
+        n_labelled = len(led_numbers(seen))
+        words = self.tr("{0} of {1} LEDs").format(n_labelled, len(sighting.pixels))
+        n_others = len(seen.spots) - n_labelled
+        if n_others:
+            words += self.tr(", other spots: {0}").format(n_others)
+        return words
+
+    def _is_found(self, ring: Marker) -> bool:
+        """Return whether a ring is about what another mark stands for already."""
+        return ring.tone is not Tone.GOOD and any(
+            hypot(ring.x - mark.x, ring.y - mark.y) < mark.radius
+            for mark in self._extra
+        )
+
+    def _rate(self) -> float:
+        """Return how many images come, 1/s."""
+        times = self._times_ns
+        seconds = (times[-1] - times[0]) * 1e-9
+        return (len(times) - 1) / seconds if seconds > 0 else 0.0

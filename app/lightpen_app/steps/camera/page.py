@@ -1,0 +1,350 @@
+"""The step Camera: images come, well exposed, sharp, and with their intrinsics."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.worker import Connection
+from lightpen.detection.inspection import Exposure, inspect
+from lightpen.errors import FileError
+from lightpen.live.preparation import CameraFile, Lack, SourceChoice
+from lightpen.simulator.hand import Doing
+from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
+from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.steps.camera.live_panel import LivePanel
+from lightpen_app.steps.camera.source_panel import SourcePanel
+from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.widgets.live_markers import mask_markers, stray_markers
+from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.work.job import Job
+from lightpen_app.work.live_view import Shown
+
+SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
+NARROW = 120 * GRID  # px; a page of less width has its panels all at the side
+
+
+class CameraPage(Page):
+    """The step Camera.
+
+    Parameters
+    ----------
+    services : Services
+    """
+
+    key = "camera"
+
+    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = services.workbench
+        self._live = services.workbench.live
+        self._is_shown = False
+        self._is_narrow = False
+        self._settings = CameraSettings()  # in force
+        self._trouble = ""  # the last, of the camera or of a swing
+        self._sentence = ""  # why no images come
+        self._reading: Job | None = None
+
+        # Widgets
+        self._swing_remark = SignLabel()
+        self._source = SourcePanel()
+        self._intrinsics = IntrinsicsPanel()
+        self._stray = StrayLightPanel()
+        self._images = LivePanel()
+        self._exposure = ExposurePanel()
+        self._focus = FocusPanel()
+
+        # Layout
+        self._arrange()
+
+        # Connections
+        self._source.value_changed.connect(self._on_source_chosen)
+        self._source.retry_requested.connect(self._workbench.open_camera)
+        self._intrinsics.path_chosen.connect(self._on_path_chosen)
+        self._source.samples_requested.connect(self._on_samples_requested)
+        self._stray.found_changed.connect(self._mark)
+        self._stray.mask_requested.connect(self._on_mask_requested)
+        self._stray.clear_requested.connect(self._on_clear_requested)
+        self._stray.cover_requested.connect(self._on_cover_requested)
+        self._exposure.exposure_changed.connect(self._live.set_exposure)
+        self._exposure.gain_changed.connect(self._live.set_gain)
+        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.run.changed.connect(self._remark_swing)
+        self._live.image_shown.connect(self._on_image_shown)
+        self._live.connection_changed.connect(self._on_connection_changed)
+        self._live.settings_applied.connect(self._on_settings_applied)
+        self._live.troubled.connect(self._on_troubled)
+        self._live.failed.connect(self._on_failed)
+
+        self._retranslate()
+        self._on_bench_changed()
+
+    @override
+    def title(self) -> str:
+        return self.tr("Camera")
+
+    @override
+    def lead(self) -> str:
+        return self.tr(
+            "See that the LEDs are bright and sharp, that the intrinsics are those of "
+            "this camera, and that nothing else shines."
+        )
+
+    @override
+    def is_complete(self) -> bool:
+        return not self._workbench.preparation.camera_lacks()
+
+    @override
+    def why_closed(self) -> str:
+        return _first_text(self._workbench.preparation.start_lacks())
+
+    @override
+    def main_action(self) -> MainAction:
+        why_not = _first_text(self._workbench.preparation.camera_lacks())
+        if not why_not and self._live.connection is Connection.LOST:
+            why_not = self.tr("The camera is lost. It is looked for until it is back.")
+        return MainAction(self.tr("Continue to the LEDs"), why_not)
+
+    @override
+    def entered(self) -> None:
+        self._is_shown = True
+        if not self._live.is_open:
+            self._workbench.open_camera()
+        self._show_connection()
+        self._show_pen()
+
+    @override
+    def left(self) -> None:
+        self._is_shown = False
+        self._stray.give_up()
+        self._stray.uncover()
+
+    @override
+    def shut_down(self) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        is_narrow = event.size().width() < NARROW
+        if is_narrow != self._is_narrow:
+            self._is_narrow = is_narrow
+            self._use_width()
+
+    @override
+    def _retranslate(self) -> None:
+        self._remark_swing()
+        self._show_connection()
+        self.changed.emit()
+
+    def _arrange(self) -> None:
+        side = QWidget()
+        self._panels = panels = QVBoxLayout(side)
+        panels.setContentsMargins(0, 0, 0, 0)
+        panels.setSpacing(2 * GRID)
+        panels.addWidget(self._swing_remark)
+        for panel in (self._source, self._intrinsics, self._stray):
+            panels.addWidget(panel)
+        panels.addStretch(1)
+        self._side = scroll = PageScroll()
+        scroll.setWidget(side)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+        self._foot = foot = QHBoxLayout()
+        foot.setSpacing(2 * GRID)
+        self._layout = layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._images, 0, 0)
+        layout.addLayout(foot, 1, 0)
+        self._use_width()  # before the side: the order of the Tab key
+        layout.addWidget(scroll, 0, 1, 2, 1)
+        layout.setRowStretch(0, 1)
+        layout.setColumnStretch(0, 1)
+
+    def _use_width(self) -> None:
+        """Put exposure and focus below the image, or at the side of a narrow page."""
+        if self._is_narrow:
+            self._panels.insertWidget(0, self._exposure)
+            self._panels.insertWidget(1, self._focus)
+        else:
+            self._foot.addWidget(self._exposure, 3)
+            self._foot.addWidget(self._focus, 2)
+        space = 2 * GRID if self._is_narrow else 3 * GRID
+        self._layout.setHorizontalSpacing(space)
+        # The layout spaces out an empty foot, too.
+        self._layout.setVerticalSpacing(0 if self._is_narrow else 2 * GRID)
+        self._side.setFixedWidth(NARROW_SIDE_WIDTH if self._is_narrow else SIDE_WIDTH)
+
+    # What is chosen
+
+    def _on_bench_changed(self) -> None:
+        now = self._workbench.preparation
+        self._source.set_value(now.source)
+        self._intrinsics.set_value(now.camera_file)
+        self._intrinsics.set_image_size(now.image_size)
+        self._stray.set_n_masked(len(now.mask))
+        self._mark()
+        self.changed.emit()
+
+    def _on_source_chosen(self, source: SourceChoice) -> None:
+        self._forget_trouble()
+        now = self._workbench.preparation
+        mask = now.mask if source == now.source else np.zeros((0, 3))
+        self._workbench.set_preparation(replace(now, source=source, mask=mask))
+
+    def _on_path_chosen(self, path: str) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+        self._reading = job = Job(lambda _: CameraFile.read(Path(path)), self)
+
+        # Connections
+        job.succeeded.connect(self._on_file_read)
+        job.failed.connect(self._on_file_refused)
+        job.start()
+
+    def _on_file_read(self, camera_file: CameraFile) -> None:
+        self._reading = None
+        now = self._workbench.preparation
+        self._workbench.set_preparation(replace(now, camera_file=camera_file))
+
+    def _on_file_refused(self, sentence: str) -> None:
+        self._reading = None
+        self._intrinsics.set_problem(sentence)
+
+    def _on_samples_requested(self) -> None:
+        try:
+            self._workbench.use_sample_files()
+        except FileError as error:
+            self._intrinsics.set_problem(str(error))
+
+    def _on_mask_requested(self, circles: FloatArray) -> None:
+        now = self._workbench.preparation
+        mask = np.concatenate([now.mask, circles])
+        self._workbench.set_preparation(replace(now, mask=mask))
+
+    def _on_clear_requested(self) -> None:
+        now = self._workbench.preparation
+        self._workbench.set_preparation(replace(now, mask=np.zeros((0, 3))))
+
+    # What the camera does
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        is_live = self._live.connection is Connection.STREAMING
+        if not (self._is_shown and is_live):  # the last image comes after the loss
+            return
+        seen = shown.seen
+        labels = None if seen.sighting is None else seen.sighting.labels
+        inspection = inspect(seen.spots, labels)
+        self._images.set_image(shown, self._live.stats)
+        self._exposure.set_value(inspection.exposure)
+        self._focus.add(inspection)
+        self._stray.feed(seen)
+
+    def _on_connection_changed(self, connection: Connection) -> None:
+        if connection in (Connection.OPENING, Connection.STREAMING):
+            self._forget_trouble()
+        if connection is Connection.LOST:
+            self._raise_trouble(self._trouble)
+        if connection is Connection.OPENING:
+            self._stray.uncover()  # another operator holds the pen
+        if connection is not Connection.STREAMING:
+            self._exposure.set_value(Exposure())
+            self._focus.clear()
+        if connection is Connection.STREAMING:
+            self._show_pen()
+        self._show_connection()
+        self.changed.emit()
+
+    def _on_settings_applied(self, settings: CameraSettings) -> None:
+        self._settings = settings
+        self._show_connection()
+
+    def _on_troubled(self, sentence: str) -> None:
+        self._trouble = sentence
+
+    def _on_failed(self, sentence: str) -> None:
+        self._raise_trouble(sentence)
+        self._show_connection()
+
+    def _on_cover_requested(self, covers: bool) -> None:
+        operator = self._live.operator
+        if operator is None:
+            return
+        if covers:
+            operator.cover()
+        else:
+            operator.uncover()
+
+    def _raise_trouble(self, sentence: str) -> None:
+        """Say why no images come, in a notice that goes once they do."""
+        self._sentence = sentence
+        self.notice_raised.emit(sentence)
+
+    def _forget_trouble(self) -> None:
+        """Take away what the camera's last trouble said: it is over."""
+        if self._sentence:
+            self._sentence = ""
+            self.notice_raised.emit("")
+
+    def _show_connection(self) -> None:
+        connection = self._live.connection
+        is_live = connection is Connection.STREAMING
+        is_closed = connection is Connection.CLOSED
+        self._images.set_connection(connection, self._sentence or self._why_closed())
+        self._source.set_faulty(is_closed and bool(self._sentence))
+        self._stray.set_live(is_live)
+        self._stray.set_has_operator(self._live.operator is not None)
+        self._exposure.set_camera(self._live.caps if is_live else None, self._settings)
+
+    def _why_closed(self) -> str:
+        """Return why no camera is open though none has failed."""
+        if Lack.SOURCE_PLACE in self._workbench.preparation.camera_lacks():
+            return lack_text(Lack.SOURCE_PLACE)
+        return self.tr("No camera is open.")
+
+    def _show_pen(self) -> None:
+        """Let the simulated operator bring the pen, so that there is something to see.
+
+        Only while he does nothing else.
+        """
+        operator = self._live.operator
+        if self._is_shown and operator is not None and operator.doing is Doing.ABSENT:
+            operator.seat()
+
+    def _mark(self) -> None:
+        """Mark what is masked, and what the search for stray light found."""
+        masked = mask_markers(self._workbench.preparation.mask)
+        found = stray_markers(self._stray.found(), self.tr("stray"))
+        self._images.set_extra_markers((*masked, *found))
+
+    def _remark_swing(self) -> None:
+        remark = Remark()
+        if self._workbench.run.is_capturing:
+            words = self.tr(
+                "A swing is under way. Another source ends it; other intrinsics and "
+                "another mask count from the next swing on."
+            )
+            remark = Remark(words, Sign.WARNING, Tone.WARN)
+        self._swing_remark.set_value(remark)
+
+
+def _first_text(lacks: tuple[Lack, ...]) -> str:
+    return lack_text(lacks[0]) if lacks else ""

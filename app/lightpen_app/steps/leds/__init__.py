@@ -1,0 +1,1 @@
+"""The step LEDs: the geometry file, checked and matched with live images."""

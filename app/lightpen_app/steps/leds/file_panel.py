@@ -1,0 +1,244 @@
+"""The file of the LEDs: opened, saved under another name, or why it cannot be."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.formats.pen_files import UNITS
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+
+class LedFilePanel(Translated, QWidget):
+    """A path with its buttons; below it what has to be said or asked about the file.
+
+    Signals
+    -------
+    path_chosen(str)
+        A file is to be opened.
+    units_chosen(str, str)
+        The path of a file that does not say its units, and the units.
+    save_chosen(Path)
+        The LEDs are to be saved there; a file that exists may be replaced.
+    samples_requested()
+        The file of the simulated pen is to be used.
+    """
+
+    path_chosen = Signal(str)
+    units_chosen = Signal(str, str)
+    save_chosen = Signal(object)
+    samples_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = ""
+        self._suffix = "csv"
+        self._why_no_save = ""
+        self._agreed: Callable[[], None] | None = None
+
+        # Widgets
+        self._label = QLabel()
+        self._path = PathField()
+        self._open = PushButton()
+        self._path.add_button(self._open)
+        self._save = PushButton()
+        self._samples = PushButton()
+        self._label.setBuddy(self._path.edit())
+        self._units = _UnitsRow()
+        self._problem = SignLabel()
+        self._question = QuestionBar()
+
+        # Layout
+        row = QHBoxLayout()
+        row.setSpacing(GRID)
+        row.addWidget(self._label)
+        row.addWidget(self._path, 1)
+        row.addWidget(self._save)
+        row.addWidget(self._samples)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addLayout(row)
+        layout.addWidget(self._units)
+        layout.addWidget(self._problem)
+        layout.addWidget(self._question)
+
+        # Connections
+        self._path.value_changed.connect(self._on_path_changed)
+        self._open.clicked.connect(self._on_open_clicked)
+        self._save.clicked.connect(self._on_save_clicked)
+        self._samples.clicked.connect(self.samples_requested)
+        self._units.value_changed.connect(self._on_units_chosen)
+        self._question.agreed.connect(self._on_agreed)
+        self._question.declined.connect(self._on_declined)
+
+        self._retranslate()
+
+    def value(self) -> str:
+        """Return the path of the file that is open, not one that is only typed."""
+        return self._value
+
+    def set_value(self, path: str) -> None:
+        """Show the path of another file."""
+        self._value = path
+        self._path.set_value(path)
+
+    def problem(self) -> str:
+        """Return what is said about the file."""
+        return self._problem.value().text
+
+    def set_problem(self, sentence: str) -> None:
+        """Say what is wrong, or nothing."""
+        self._path.set_faulty(bool(sentence))
+        self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
+
+    def ask_units(self, name: str) -> None:
+        """Ask for the units of a file that does not say them; empty asks no more."""
+        self._units.ask(name)
+
+    def ask(self, question: str, yes: str, agreed: Callable[[], None]) -> None:
+        """Ask before something is lost; ``agreed`` is called if it may be."""
+        self._agreed = agreed
+        self._question.set_words(question, yes, self.tr("Cancel"))
+        self._question.ask()
+
+    def question(self) -> str:
+        """Return what is asked now, or nothing."""
+        return self._question.words()
+
+    def set_savable(self, why_not: str, suffix: str) -> None:
+        """Tell whether there is something to save, and as what it is best saved."""
+        self._suffix = suffix
+        self._why_no_save = why_not
+        self._refresh_save_words()
+
+    def set_has_samples(self, has_samples: bool) -> None:
+        """Offer the file of the simulated pen, or not."""
+        self._samples.setVisible(has_samples)
+
+    def _on_path_changed(self, path: str) -> None:
+        if path:
+            self.path_chosen.emit(path)
+
+    def _on_open_clicked(self) -> None:
+        self._path.pick(
+            QFileDialog.FileMode.ExistingFile,
+            self.tr("LEDs of the pen"),
+            self.tr("LEDs of a pen ({0})").format("*.csv *.txt *.json"),
+        )
+
+    def _on_units_chosen(self, units: str) -> None:
+        self.units_chosen.emit(self._path.value(), units)
+
+    def _on_save_clicked(self) -> None:
+        dialog = QFileDialog(self, self.tr("Save the LEDs"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)
+        filters = {
+            "csv": self.tr("Tables ({0})").format("*.csv"),
+            "json": self.tr("With name and nominal tip ({0})").format("*.json"),
+        }
+        dialog.setNameFilters(list(filters.values()))
+        dialog.selectNameFilter(filters[self._suffix])
+        dialog.setDefaultSuffix(self._suffix)
+        folder = Path(self._path.value()).parent
+        if folder.is_dir():
+            dialog.setDirectory(str(folder))
+        dialog.fileSelected.connect(self._on_save_path_picked)
+        dialog.open()
+
+    def _on_save_path_picked(self, text: str) -> None:
+        path = Path(text)
+        if not path.exists():
+            self.save_chosen.emit(path)
+            return
+        self.ask(
+            self.tr("{0} exists already. Replace it by these LEDs?").format(path.name),
+            self.tr("Replace"),
+            lambda: self.save_chosen.emit(path),
+        )
+
+    def _on_agreed(self) -> None:
+        agreed, self._agreed = self._agreed, None
+        if agreed is not None:
+            agreed()
+
+    def _on_declined(self) -> None:
+        self._agreed = None
+        self.ask_units("")
+        self._path.set_value(self._value)
+
+    def _retranslate(self) -> None:
+        self._label.setText(self.tr("LED &file"))
+        self._path.edit().setAccessibleName(self.tr("LED file"))
+        self._path.edit().setPlaceholderText(self.tr("Table (CSV) or JSON file"))
+        self._open.setText(self.tr("Open..."))
+        self._save.setText(self.tr("Save as..."))
+        self._samples.setText(self.tr("Use the simulated pen's file"))
+        self._refresh_save_words()
+
+    def _refresh_save_words(self) -> None:
+        told = self.tr("Save the LEDs and use that file.")
+        self._save.set_why_not(self._why_no_save, told)
+
+
+class _UnitsRow(Translated, QWidget):
+    """Asks for the units of a file that does not say them; hidden otherwise."""
+
+    value_changed = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._file_name = ""
+
+        # Widgets
+        self._words = SignLabel(wraps=False)
+        self._choice = QComboBox()
+        self._choice.addItems(["", *UNITS])
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._words)
+        layout.addWidget(self._choice)
+        layout.addStretch(1)
+
+        # Connections
+        self._choice.textActivated.connect(self._on_activated)
+
+        self._retranslate()
+        self.hide()
+
+    def ask(self, file_name: str) -> None:
+        self._file_name = file_name
+        self._choice.setCurrentIndex(0)
+        self._retranslate()
+        self.setVisible(bool(file_name))
+        if file_name:
+            self._choice.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _on_activated(self, units: str) -> None:
+        if units:
+            self.value_changed.emit(units)
+
+    def _retranslate(self) -> None:
+        words = self.tr("{0} does not say the units of its coordinates. Choose them:")
+        text = words.format(self._file_name)
+        self._words.set_value(Remark(text, Sign.WARNING, Tone.WARN))
+        self._choice.setAccessibleName(self.tr("Units of the file"))

@@ -1,0 +1,158 @@
+"""The pen in space, and whether it stands in the pen frame."""
+
+import math
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QGroupBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.pen_check.frame import FrameCheck, Rule, RuleCheck, RuleStatus
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.leds.pen_view import PenPicture, PenView
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+SIGNS = {
+    RuleStatus.MET: (Sign.CHECK, Tone.GOOD),
+    RuleStatus.BROKEN: (Sign.CROSS, Tone.BAD),
+}
+LONG = (Rule.LINE, Rule.ORIGIN, Rule.AXIS, Rule.PLANE)  # that have a deviation
+
+
+class FramePanel(Translated, QGroupBox):
+    """Draws a pen and lists the rules of its frame.
+
+    Signals
+    -------
+    led_chosen(int)
+        The LED of this number was clicked.
+    move_requested()
+        The coordinates are to be put into the pen frame.
+    """
+
+    led_chosen = Signal(int)
+    move_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: FrameCheck | None = None
+
+        # Widgets
+        self._view = PenView()
+        self._rules = {rule: SignLabel(wraps=False) for rule in Rule}
+        self._amounts = {rule: text_label(TextSize.SMALL, Tone.QUIET) for rule in LONG}
+        self._layout_note = SignLabel()
+        self._move = PushButton()
+
+        # Layout
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(GRID)
+        grid.setVerticalSpacing(GRID // 4)
+        grid.setColumnStretch(0, 1)
+        for row, rule in enumerate(Rule):
+            grid.addWidget(self._rules[rule], row, 0, 1, 1 if rule in LONG else 2)
+            if rule in LONG:
+                self._amounts[rule].setWordWrap(False)
+                right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+                grid.addWidget(self._amounts[rule], row, 1, right)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._view, 1)
+        layout.addLayout(grid)
+        layout.addWidget(self._layout_note)
+        layout.addWidget(self._move)
+
+        # Connections
+        self._view.led_chosen.connect(self.led_chosen)
+        self._move.clicked.connect(self.move_requested)
+
+        self._retranslate()
+
+    def view(self) -> PenView:
+        """Return the pen in space."""
+        return self._view
+
+    def set_picture(self, picture: PenPicture) -> None:
+        """Draw another pen."""
+        self._view.set_value(picture)
+
+    def value(self) -> FrameCheck | None:
+        """Return what is listed."""
+        return self._value
+
+    def set_value(self, value: FrameCheck | None) -> None:
+        """List how another pen fares; None lists nothing."""
+        self._value = value
+        self._refresh()
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Pen and its frame"))
+        self._move.setText(self.tr("Put into the pen frame"))
+        self._move.setToolTip(
+            self.tr(
+                "These are coordinates in another frame, such as a measuring machine's."
+            )
+        )
+        self._refresh()
+
+    def _refresh(self) -> None:
+        value = self._value
+        checks = {} if value is None else {each.rule: each for each in value.checks}
+        for rule in Rule:
+            self._show(rule, checks.get(rule))
+        self._move.setVisible(value is not None and value.can_be_moved)
+        note = Remark()
+        if value is not None and value.remark:
+            words = self.tr(
+                "Not the layout of the ten-LED pen: the frame of the file is taken as "
+                "it is."
+            )
+            note = Remark(words, Sign.WARNING, Tone.QUIET)
+            self._layout_note.setToolTip(value.remark)
+        self._layout_note.set_value(note)
+
+    def _show(self, rule: Rule, check: RuleCheck | None) -> None:
+        label, amount = self._rules[rule], self._amounts.get(rule)
+        known = check is not None and not math.isnan(check.amount)
+        if amount is not None:
+            amount.setVisible(known)
+            amount.setText(_length(check.amount) if check is not None else "")
+        if check is None or check.outcome is RuleStatus.OPEN:
+            label.set_value(Remark())
+            return
+        label.set_value(Remark(self._words(rule), *SIGNS[check.outcome]))
+        met = check.outcome is RuleStatus.MET
+        outcome = self.tr("fulfilled") if met else self.tr("not fulfilled")
+        label.setAccessibleDescription(outcome)
+        label.setToolTip(outcome)
+
+    def _words(self, rule: Rule) -> str:
+        match rule:
+            case Rule.LEDS:
+                return self.tr("LEDs well apart")
+            case Rule.NUMBERS:
+                return self.tr("Numbers in order")
+            case Rule.LINE:
+                return self.tr("LEDs 1 to 4 in a line")
+            case Rule.ORIGIN:
+                return self.tr("LED 1 over the origin")
+            case Rule.AXIS:
+                return self.tr("y along LEDs 1 to 4")
+            case Rule.PLANE:
+                return self.tr("LEDs 5 to 10 at z = 0")
+            case Rule.HANDED:
+                return self.tr("Axes right-handed")
+            case Rule.NORMALS:
+                return self.tr("Discs face the viewer")
+
+
+def _length(amount: float) -> str:
+    """Return a length with some three digits."""
+    return f"{amount:.2f} mm" if amount < 10 else f"{amount:.0f} mm"

@@ -1,0 +1,250 @@
+"""The live image, and how the LEDs seen in it fit the table."""
+
+import math
+from collections import deque
+from collections.abc import Iterable
+
+import numpy as np
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.estimation.calibrate import USUAL_SIGMA
+from lightpen.pen_check.match import Finding, PenMatch, What
+from lightpen.pen_check.shifts import MIN_SHIFT
+from lightpen_app.look.phrases import reason_text
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone
+from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.live_markers import live_markers
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.live_view import Shown
+
+N_SMOOTHED = 20  # images that are told of together: one second
+N_FINDINGS = 4
+TALLEST = 0.9  # height of the image over its width; sensors are flatter
+
+
+class MatchPanel(Translated, QGroupBox):
+    """Shows images with numbered LEDs, how many fit, and which do not."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._match: PenMatch | None = None
+        self._sighting: Sighting | None = None
+        self._sigmas: deque[float] = deque(maxlen=N_SMOOTHED)
+        self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
+        self._why_none = ""
+        self._has_frame = True
+
+        # Widgets
+        self._view = ImageView()
+        self._banner = StateBanner(TextSize.TITLE)
+        self._remarks = tuple(SignLabel() for _ in range(N_FINDINGS))
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._view, 1)
+        layout.addWidget(self._banner)
+        for remark in self._remarks:
+            layout.addWidget(remark)
+        layout.addStretch(0)
+
+        self._retranslate()
+
+    def view(self) -> ImageView:
+        """Return the live image."""
+        return self._view
+
+    def state(self) -> State:
+        """Return what is said about the last images."""
+        return self._banner.value()
+
+    def remarks(self) -> tuple[str, ...]:
+        """Return what is said about the views so far."""
+        texts = (remark.value().text for remark in self._remarks)
+        return tuple(filter(None, texts))
+
+    def set_image(self, shown: Shown) -> None:
+        """Show another image."""
+        sighting = shown.seen.sighting
+        if sighting is None or not sighting.has_pose:
+            self._forget()
+        else:
+            self._sigmas.append(sighting.sigma)
+            self._counts.append(sighting.n_leds)
+        self._sighting = sighting
+        markers = self._toned(live_markers(shown.seen))
+        self._view.set_half(shown.half, shown.size, tuple(markers))
+        self._refresh_state()
+
+    def clear(self) -> None:
+        """Show no image."""
+        self._sighting = None
+        self._forget()
+        self._view.set_image(None)
+        self._refresh_state()
+
+    def set_why_unknown(self, sentence: str) -> None:
+        """Say what is missing to find the pen in the images, or nothing."""
+        if sentence != self._why_none:
+            self._why_none = sentence
+            self._refresh()
+
+    def set_has_frame(self, has_frame: bool) -> None:
+        """Say whether the pen stands in its frame; if not, fitting is not enough."""
+        if has_frame != self._has_frame:
+            self._has_frame = has_frame
+            self._refresh()
+
+    def value(self) -> PenMatch | None:
+        """Return how the pen fits the views so far."""
+        return self._match
+
+    def set_value(self, value: PenMatch | None) -> None:
+        """Show how the pen fits other views; None while that is not known."""
+        self._match = value
+        self._refresh()
+
+    def reasons(self) -> dict[int, str]:
+        """Return what is wrong with LEDs, by number."""
+        findings = () if self._match is None else self._match.findings
+        return {led: self._words(each) for each in findings for led in each.leds}
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        width = self.contentsRect().width()
+        self._view.setMaximumHeight(round(TALLEST * width))
+
+    def _forget(self) -> None:
+        self._sigmas.clear()
+        self._counts.clear()
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Live match"))
+        self._view.setToolTip(
+            self.tr("Wheel or + and - enlarge, arrow keys move, 0 shows all.")
+        )
+        self._view.set_message(self.tr("No image comes yet."))
+        self._refresh()
+
+    def _refresh(self) -> None:
+        found = self._found()
+        for i, label in enumerate(self._remarks):
+            label.set_value(found[i] if i < len(found) else Remark())
+        self._refresh_state()
+
+    def _refresh_state(self) -> None:
+        self._banner.set_value(self._state())
+
+    def _toned(self, markers: Iterable[Marker]) -> Iterable[Marker]:
+        """Yield the rings, those of LEDs that do not fit in another tone."""
+        marked = {str(led) for led in self.reasons()}
+        for marker in markers:
+            if marker.label in marked:
+                tone = Tone.WARN
+                yield Marker(marker.x, marker.y, marker.radius, marker.label, tone)
+            else:
+                yield marker
+
+    def _state(self) -> State:
+        sighting = self._sighting
+        if sighting is None or self._why_none:
+            return State(self.tr("No match yet"), "", Sign.WAIT, Tone.QUIET)
+        if sighting.reason is not Reason.NONE:
+            word = self.tr("Pen not found")
+            text = reason_text(sighting.reason)
+            return State(word, text[:1].upper() + text[1:], Sign.WARNING, Tone.WARN)
+        n_leds = len(sighting.pixels)
+        sigma = float(np.median(self._sigmas))
+        n_seen = max(self._counts)  # two that meet in one image are no matter
+        word = self.tr("{0} of {1} LEDs").format(n_seen, n_leds)
+        detail = self.tr("misfit {0} px").format(_pixels(sigma))
+        good = n_seen == n_leds and sigma <= USUAL_SIGMA
+        if good and self._has_frame and not self.reasons():
+            return State(word, detail, Sign.CHECK, Tone.GOOD)
+        return State(word, detail, Sign.WARNING, Tone.WARN)
+
+    def _found(self) -> list[Remark]:
+        match = self._match
+        if self._why_none:
+            return [Remark(self._why_none, Sign.WARNING, Tone.WARN)]
+        if match is None:
+            return []
+        if match.findings:
+            remarks = [
+                Remark(self._words(each), Sign.WARNING, Tone.WARN)
+                for each in match.findings[:N_FINDINGS]
+            ]
+        elif not match.fits:
+            words = self.tr("Lean and turn the pen, so that it is seen from all sides.")
+            remarks = [Remark(words, Sign.WAIT, Tone.QUIET)]
+        elif not self._has_frame:
+            words = self.tr(
+                "The LEDs fit the images, but not the pen frame: see what is told of "
+                "the file."
+            )
+            remarks = [Remark(words, Sign.WARNING, Tone.WARN)]
+        else:
+            words = self.tr(
+                "Every LED is within {0} mm of its place in the table, in {1} views."
+            )
+            text = words.format(f"{MIN_SHIFT:g}", match.n_views)
+            remarks = [Remark(text, Sign.CHECK, Tone.GOOD)]
+        return remarks
+
+    def _words(self, finding: Finding) -> str:
+        place = [
+            f"{axis}\N{NO-BREAK SPACE}{number_text(each, 2)}"
+            for axis, each in zip("xyz", finding.by, strict=True)
+        ]
+        length = f"{math.hypot(*finding.by):.2f}"
+        match finding.what:
+            case What.ADVICE:
+                return finding.text
+            case What.EXCHANGED:
+                words = self.tr("{0} of LEDs {1} and {2} are exchanged in the table.")
+                return words.format(finding.text, *finding.leds)
+            case What.SHIFTED if finding.is_sure:
+                words = self.tr("LED {0} sits {1} mm off its place: {2}, {3}, {4} mm.")
+                return words.format(finding.leds[0], length, *place)
+            case What.SHIFTED:
+                words = self.tr(
+                    "LED {0} sits off its place. Lean and turn the pen to see by how "
+                    "much."
+                )
+                return words.format(finding.leds[0])
+            case What.SHIFTED_EITHER:
+                words = self.tr("LED {0} or {1} sits off its place, by {2} mm.")
+                return words.format(*finding.leds, length)
+            case What.UNSEEN:
+                words = self.tr(
+                    "LED {0} is not seen where the table has it. A finger may cover "
+                    "it, it is off, or its place is wrong."
+                )
+                return words.format(finding.leds[0])
+            case What.UNKNOWN_LED:
+                words = self.tr(
+                    "A light at {0}, {1}, {2} mm moves with the pen. Is an LED "
+                    "missing in the table?"
+                )
+                return words.format(*place)
+            case What.MISFIT:
+                assert self._match is not None
+                words = self.tr(
+                    "The LEDs fit to {0} px, {1} px or less is usual. Is this the LED "
+                    "file of this pen, and the intrinsics file of this camera and lens?"
+                )
+                return words.format(_pixels(self._match.sigma), USUAL_SIGMA)
+
+
+def _pixels(sigma: float) -> str:
+    return number_text(sigma, 2 if sigma >= USUAL_SIGMA else 3)

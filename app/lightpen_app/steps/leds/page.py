@@ -1,0 +1,413 @@
+"""The step LEDs: their places on the pen, checked against its frame and live images."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.cameras.worker import Connection
+from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.live.preparation import PenFile, SourceKind
+from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
+from lightpen.pen_check.match import PenMatch
+from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.theme import GRID
+from lightpen_app.steps.leds.file_panel import LedFilePanel
+from lightpen_app.steps.leds.frame_panel import FramePanel
+from lightpen_app.steps.leds.match_panel import MatchPanel
+from lightpen_app.steps.leds.match_watch import PenWatch
+from lightpen_app.steps.leds.pen_view import PenPicture
+from lightpen_app.steps.leds.table_panel import Changes, LedTablePanel
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.work.live_view import Shown
+
+NARROW = 110 * GRID  # px; a page of less width has two panels side by side, not three
+LOW = 62 * GRID  # px; a page of less height scrolls
+
+
+class LedsPage(Page):
+    """Opens, shows, mends and saves the LED file.
+
+    The table shows a draft. The live match follows it at once; a swing needs a file, so
+    a draft that differs from the file in use has to be saved before the next step.
+
+    Parameters
+    ----------
+    services : Services
+    """
+
+    key = "leds"
+
+    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = services.workbench
+        self._is_shown = False
+        self._is_narrow = False
+        self._in_use: PenFile | None = None
+        self._draft = self._opened = PenDraft()
+        self._is_foreign = False  # opened from a file that cannot be used
+        self._check = DraftCheck()
+
+        # Widgets
+        self._file = LedFilePanel()
+        self._table = LedTablePanel()
+        self._space = FramePanel()
+        self._match = MatchPanel()
+        self._watch = PenWatch(self)
+
+        # Layout
+        self._content = Squeezed()
+        self._rows = QVBoxLayout(self._content)
+        self._rows.setContentsMargins(0, 0, 0, 0)
+        self._rows.setSpacing(2 * GRID)
+        self._panels = panels = QHBoxLayout()
+        panels.setSpacing(2 * GRID)
+        panels.addWidget(self._table, 40)
+        self._use_width()
+        panels.addWidget(self._match, 31)
+        self._rows.addWidget(self._file)
+        self._rows.addLayout(panels, 1)
+        scroll = PageScroll()
+        scroll.setWidget(self._content)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scroll)
+
+        # Connections
+        self._file.path_chosen.connect(self._on_path_chosen)
+        self._file.units_chosen.connect(self._on_units_chosen)
+        self._file.save_chosen.connect(self._on_save_chosen)
+        self._file.samples_requested.connect(self._on_samples_requested)
+        self._table.value_changed.connect(self._set_draft)
+        self._table.discard_requested.connect(self._on_discard_requested)
+        self._table.led_chosen.connect(self._space.view().set_chosen)
+        self._space.led_chosen.connect(self._table.set_chosen)
+        self._space.move_requested.connect(self._on_move_requested)
+        self._watch.value_changed.connect(self._on_match_changed)
+        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.live.image_shown.connect(self._on_image_shown)
+        self._workbench.live.connection_changed.connect(self._on_connection_changed)
+
+        self._on_bench_changed()
+
+    @override
+    def title(self) -> str:
+        return self.tr("LEDs")
+
+    @override
+    def lead(self) -> str:
+        return self.tr(
+            "Open the file of this pen's LEDs and hold the pen before the camera."
+        )
+
+    @override
+    def is_complete(self) -> bool:
+        return not self._workbench.preparation.leds_lacks()
+
+    @override
+    def why_closed(self) -> str:
+        preparation = self._workbench.preparation
+        for lack in preparation.start_lacks() + preparation.camera_lacks():
+            return lack_text(lack)
+        return ""
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction(self.tr("Continue to the swing"), self._why_not())
+
+    @override
+    def entered(self) -> None:
+        self._is_shown = True
+        self._match.clear()
+        self._watch.start()
+        self._aim()
+        self._refresh_live()
+
+    @override
+    def left(self) -> None:
+        self._is_shown = False
+        self._watch.stop()
+        if self._is_pending and not self._workbench.run.is_capturing:
+            self._workbench.live.set_aim(self._workbench.preparation.aim)
+
+    @override
+    def unsaved(self) -> str:
+        if not self._is_edited:
+            return ""
+        return self.tr("The LED table has changes that are not saved.")
+
+    @override
+    def shut_down(self) -> None:
+        self._watch.stop()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._content.set_squeezed(event.size().height() >= LOW)
+        is_narrow = event.size().width() < NARROW
+        if is_narrow != self._is_narrow:
+            self._is_narrow = is_narrow
+            self._use_width()
+
+    @override
+    def _retranslate(self) -> None:
+        self._refresh()
+
+    def _use_width(self) -> None:
+        """Put the pen in space between the others, or below them on a narrow page."""
+        if self._is_narrow:
+            self._rows.addWidget(self._space)
+        else:
+            self._panels.insertWidget(1, self._space, 29)
+
+    @property
+    def _is_edited(self) -> bool:
+        return self._draft != self._opened
+
+    @property
+    def _is_pending(self) -> bool:
+        """Whether the table shows something else than the file in use."""
+        return self._is_edited or self._is_foreign
+
+    @property
+    def _changes(self) -> Changes:
+        if self._is_edited:
+            return Changes.EDITED
+        return Changes.FOREIGN if self._is_foreign else Changes.NONE
+
+    def _why_not(self) -> str:
+        if self._is_pending:
+            if self._check.usable is None:
+                return self.tr("Mend the LED table first: what is wrong is told above.")
+            return self.tr("Save the LED table first: the record needs its file.")
+        for lack in self._workbench.preparation.leds_lacks():
+            return lack_text(lack)
+        return ""
+
+    def _on_bench_changed(self) -> None:
+        preparation = self._workbench.preparation
+        file = preparation.pen_file
+        if file is not self._in_use:
+            self._in_use = file
+            changed = self._draft if self._is_edited else None
+            self._open_in_use()
+            if changed is not None:
+                self._set_draft(changed)
+        self._file.set_has_samples(preparation.source.kind is SourceKind.SIMULATED)
+        self._refresh()
+        self._aim()
+
+    def _open_in_use(self) -> None:
+        file = self._in_use
+        self._file.set_value("" if file is None else str(file.path))
+        draft = PenDraft() if file is None else PenDraft.of(file.pen)
+        self._open_draft(draft, foreign=False)
+
+    def _open_draft(self, draft: PenDraft, *, foreign: bool) -> None:
+        """Show a draft as it was opened, with nothing to complain about yet."""
+        self._opened, self._is_foreign = draft, foreign
+        self._file.ask_units("")
+        self._set_draft(draft)
+
+    def _set_draft(self, draft: PenDraft) -> None:
+        self._draft = draft
+        self._table.set_value(draft, self._changes)
+        in_use = None if self._is_pending else self._in_use
+        self._check = check_draft(draft, None if in_use is None else in_use.pen)
+        frame = self._check.frame
+        self._table.set_flaw(self._check.flaw)
+        self._file.set_problem("" if frame is None else frame.error)
+        self._match.set_has_frame(frame is None or not frame.error)
+        preparation = self._workbench.preparation
+        if preparation.has_unsaved_leds is not self._is_pending:
+            self._workbench.set_preparation(
+                replace(preparation, has_unsaved_leds=self._is_pending)
+            )
+        self._refresh()
+        self._aim()
+        self.changed.emit()
+
+    def _refresh(self) -> None:
+        """Show what follows from the draft."""
+        pen = self._check.pen
+        tip = self._workbench.preparation.nominal_tip
+        if tip is None and pen is not None:
+            tip = pen.nominal_tip
+        marked = frozenset(self._match.reasons())
+        self._space.set_value(self._check.frame)
+        self._space.set_picture(PenPicture(pen, tip, marked))
+        self._table.set_overriding_tip(self._overriding_tip())
+        why_not = ""
+        if not self._draft.rows:
+            why_not = self.tr("There are no LEDs yet.")
+        elif self._check.usable is None:
+            why_not = self.tr("Mend the LEDs first: a file of these cannot be used.")
+        with_more = bool(self._draft.name or any(self._draft.tip))
+        self._file.set_savable(why_not, "json" if with_more else "csv")
+
+    def _overriding_tip(self) -> str:
+        """Return the nominal tip in force where it is not that of the table."""
+        tip = self._workbench.preparation.nominal_tip
+        if tip is None or self._check.pen is None:
+            return ""
+        return "  ".join(f"{each:g}" for each in tip.tolist())
+
+    # Files
+
+    def _on_path_chosen(self, path: str) -> None:
+        self._unless_lost(partial(self._open, Path(path)))
+
+    def _on_units_chosen(self, path: str, units: str) -> None:
+        self._unless_lost(partial(self._open, Path(path), units))
+
+    def _on_samples_requested(self) -> None:
+        self._unless_lost(self._use_samples)
+
+    def _on_discard_requested(self) -> None:
+        self._unless_lost(self._discard)
+
+    def _discard(self) -> None:
+        """Go back to what was opened; from what cannot be used, to the file in use."""
+        if self._is_edited:
+            self._set_draft(self._opened)
+        else:
+            self._open_in_use()
+
+    def _unless_lost(self, act: Callable[[], None]) -> None:
+        """Do what gives up the changes of the table, but ask before."""
+        if not self._is_edited:
+            act()
+            return
+        question = self.tr("The LED table has changes that are not saved.")
+        self._file.ask(question, self.tr("Discard them"), act)
+
+    def _open(self, path: Path, units: str | None = None) -> None:
+        self.status_changed.emit("")
+        self._file.ask_units("")
+        try:
+            file = PenFile.read(path, units)
+        except UsageError as error:
+            if units is None:
+                self._file.set_problem("")
+                self._file.ask_units(path.name)
+            else:
+                self._refuse(str(error))
+        except FileError as error:
+            self._open_to_mend(path, units, str(error))
+        else:
+            self._use(file)
+
+    def _open_to_mend(self, path: Path, units: str | None, sentence: str) -> None:
+        """Show LEDs that cannot be used; those in use stay in use."""
+        try:
+            pen = read_unchecked_pen(path, units)
+        except LightpenError:
+            self._refuse(sentence)
+            return
+        self._open_draft(PenDraft.of(pen), foreign=True)
+        self._file.set_value(str(path))
+        self._file.set_problem(sentence)
+
+    def _refuse(self, sentence: str) -> None:
+        """Say why a file cannot be opened, and which one is open."""
+        still_open = self._file.value()
+        if still_open:
+            kept = self.tr("{0} stays open.").format(Path(still_open).name)
+            sentence = f"{sentence} {kept}"
+        self._file.set_problem(sentence)
+
+    def _use(self, file: PenFile) -> None:
+        preparation = self._workbench.preparation
+        self._workbench.set_preparation(replace(preparation, pen_file=file))
+        self._open_in_use()
+        self._file.set_problem("")
+        self.changed.emit()
+
+    def _use_samples(self) -> None:
+        try:
+            self._workbench.use_sample_files()
+        except FileError as error:
+            self._file.set_problem(str(error))
+        else:
+            self._open_in_use()
+
+    def _on_save_chosen(self, path: Path) -> None:
+        pen = self._check.usable
+        if pen is None:
+            return
+        try:
+            write_pen(pen, path)
+            file = PenFile.read(path)
+        except LightpenError as error:
+            self._file.set_problem(str(error))
+            return
+        self._use(file)
+        words = self.tr("The LEDs are saved as {0} and in use.")
+        self.status_changed.emit(words.format(path.name))
+
+    # The table
+
+    def _on_move_requested(self) -> None:
+        if self._check.sought is not None:
+            self._set_draft(PenDraft.of(self._check.sought))
+
+    # Live images
+
+    def _aim(self) -> None:
+        """Look for the pen of the table, also before it is saved."""
+        if not self._is_shown:
+            return
+        pen = self._check.sought
+        preparation = self._workbench.preparation
+        self._watch.set_pen(preparation.camera, pen)
+        if not self._workbench.run.is_capturing:
+            aimed = replace(preparation.aim, pen=pen)
+            self._workbench.live.set_aim(aimed if self._is_pending else preparation.aim)
+        self._refresh_live()
+
+    def _refresh_live(self) -> None:
+        """Say what is missing to find the pen in the images."""
+        preparation = self._workbench.preparation
+        if not self._workbench.live.is_open:
+            why = self.tr("The camera is not open. See the step Camera.")
+        elif self._workbench.live.connection is Connection.LOST:
+            why = self.tr("The camera is lost. It is looked for until it is back.")
+        elif preparation.camera is None:
+            why = self.tr("The intrinsics are missing. See the step Camera.")
+        elif self._check.sought is None:
+            why = self.tr("Enter or mend the LEDs, so that they can be looked for.")
+        else:
+            why = ""
+        self._match.set_why_unknown(why)
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        if not self._is_shown:
+            return
+        self._match.set_image(shown)
+        self._watch.add(shown.seen.spots)
+
+    def _on_connection_changed(self) -> None:
+        if self._is_shown:
+            if self._workbench.live.connection is not Connection.STREAMING:
+                self._match.clear()
+            self._refresh_live()
+
+    def _on_match_changed(self, match: PenMatch | None) -> None:
+        self._match.set_value(match)
+        misfits = {} if match is None else _misfits(match)
+        self._table.set_misfits(misfits)
+        self._table.set_marked(self._match.reasons())
+        self._refresh()
+
+
+def _misfits(match: PenMatch) -> dict[int, float]:
+    """Return the misfit of each LED that is seen, px, by its number."""
+    numbered = enumerate(match.rms.tolist(), 1)
+    return {led: rms for led, rms in numbered if rms == rms}

@@ -1,0 +1,224 @@
+"""The LEDs as a table with what belongs to them: discs and nominal tip."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum, auto
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.model.pen import MAX_LEDS, MIN_LEDS
+from lightpen.pen_check.draft import PenDraft
+from lightpen_app.look.quantities import AXES
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.leds.led_table import LedTable
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+
+class Changes(Enum):
+    """How the table differs from the file in use."""
+
+    NONE = auto()
+    FOREIGN = auto()  # it shows another file, which cannot be used
+    EDITED = auto()
+
+
+class LedTablePanel(Translated, QGroupBox):
+    """Shows a draft and lets it be changed.
+
+    Signals
+    -------
+    value_changed(PenDraft)
+        The user changed it.
+    discard_requested()
+        The changes are to be given up.
+    led_chosen(int)
+        The number of the LED that is now current, 0 for none.
+    """
+
+    value_changed = Signal(object)
+    discard_requested = Signal()
+    led_chosen = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = PenDraft()
+        self._changes = Changes.NONE
+        self._override = ""
+
+        # Widgets
+        self._table = LedTable()
+        self._flaw = SignLabel()
+        self._add = PushButton()
+        self._remove = PushButton()
+        self._discard = PushButton()
+        self._normals = QCheckBox()
+        self._diameter_label, self._diameter = QLabel(), EnterEdit()
+        self._diameter_label.setBuddy(self._diameter)
+        self._tip_label = QLabel()
+        self._tip = tuple(EnterEdit() for _ in AXES)
+        self._tip_label.setBuddy(self._tip[0])
+        self._override_label = text_label(TextSize.SMALL, Tone.QUIET)
+
+        # Layout
+        buttons = QHBoxLayout()
+        buttons.setSpacing(GRID)
+        for button in (self._add, self._remove, self._discard):
+            buttons.addWidget(button, 1)
+        fields = QGridLayout()
+        fields.setSpacing(GRID)
+        fields.addWidget(self._diameter_label, 0, 0)
+        fields.addWidget(self._diameter, 0, 1)
+        fields.addWidget(self._normals, 0, 2, 1, 2)
+        fields.addWidget(self._tip_label, 1, 0)
+        for column, edit in enumerate(self._tip, 1):
+            fields.addWidget(edit, 1, column)
+            fields.setColumnStretch(column, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._table, 1)
+        layout.addWidget(self._flaw)
+        layout.addLayout(buttons)
+        layout.addLayout(fields)
+        layout.addWidget(self._override_label)
+
+        # Connections
+        self._table.value_changed.connect(self._take)
+        self._table.led_chosen.connect(self._on_led_chosen)
+        self._add.clicked.connect(self._on_add_clicked)
+        self._remove.clicked.connect(self._on_remove_clicked)
+        self._discard.clicked.connect(self.discard_requested)
+        self._normals.toggled.connect(self._table.show_normals)
+        self._diameter.textEdited.connect(self._on_diameter_edited)
+        for edit in self._tip:
+            edit.textEdited.connect(self._on_tip_edited)
+
+        self._retranslate()
+
+    def value(self) -> PenDraft:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: PenDraft, changes: Changes) -> None:
+        """Show another draft; one that differs from the file can be discarded."""
+        self._value = value
+        self._changes = changes
+        self._table.set_value(value)
+        if value.has_normals:
+            self._normals.setChecked(True)
+        _show(self._diameter, value.diameter)
+        for edit, text in zip(self._tip, value.tip, strict=True):
+            _show(edit, text)
+        self._refresh()
+
+    def set_flaw(self, sentence: str) -> None:
+        """Say which cell is wrong, or nothing."""
+        self._flaw.set_value(Remark(sentence, Sign.WARNING, Tone.BAD))
+
+    def flaw(self) -> str:
+        """Return what is said about the cells."""
+        return self._flaw.value().text
+
+    def set_overriding_tip(self, point: str) -> None:
+        """Say that another nominal tip is in force, or nothing."""
+        self._override = point
+        self._refresh()
+
+    def set_misfits(self, misfits: Mapping[int, float]) -> None:
+        """Show how far LEDs, by number, are seen from their places, px."""
+        self._table.set_misfits(misfits)
+
+    def set_marked(self, reasons: Mapping[int, str]) -> None:
+        """Mark LEDs, by number, with what is wrong with them."""
+        self._table.set_marked(reasons)
+
+    def set_chosen(self, led: int) -> None:
+        """Make the row of another LED current."""
+        self._table.set_chosen(led)
+
+    def _take(self, draft: PenDraft) -> None:
+        self.value_changed.emit(draft)
+
+    def _on_led_chosen(self, led: int) -> None:
+        self._refresh()
+        self.led_chosen.emit(led)
+
+    def _on_add_clicked(self) -> None:
+        self._take(self._value.with_led())
+        self._table.set_chosen(self._value.n_leds)
+        self._table.setFocus()
+
+    def _on_remove_clicked(self) -> None:
+        self._take(self._value.without_led(self._table.chosen() - 1))
+
+    def _on_diameter_edited(self, text: str) -> None:
+        self._take(replace(self._value, diameter=text.strip()))
+
+    def _on_tip_edited(self) -> None:
+        tip = tuple(edit.text().strip() for edit in self._tip)
+        self._take(replace(self._value, tip=tip))
+
+    def _refresh(self) -> None:
+        self.setTitle(
+            self.tr("Places of the LEDs in mm, changed")
+            if self._changes is Changes.EDITED
+            else self.tr("Places of the LEDs in mm")
+        )
+        n_leds, chosen = self._value.n_leds, self._table.chosen()
+        self._add.setEnabled(n_leds < MAX_LEDS)
+        self._add.setToolTip(self.tr("Add an LED after the last."))
+        if not chosen:
+            why_not = self.tr("Choose an LED in the table first.")
+        elif n_leds <= MIN_LEDS:
+            why_not = self.tr("A pen needs at least {0} LEDs.").format(MIN_LEDS)
+        else:
+            why_not = ""
+        told = self.tr("Remove LED {0}; later ones get lower numbers.").format(chosen)
+        self._remove.set_why_not(why_not, told)
+        unchanged = self._changes is Changes.NONE
+        why_not = self.tr("Nothing is changed.") if unchanged else ""
+        told = (
+            self.tr("Go back to what the file has.")
+            if self._changes is Changes.EDITED
+            else self.tr("Go back to the file in use.")
+        )
+        self._discard.set_why_not(why_not, told)
+        text = self.tr("In force is the nominal tip of the step Start: {0} mm.")
+        self._override_label.setText(text.format(self._override))
+        self._override_label.setVisible(bool(self._override))
+
+    def _retranslate(self) -> None:
+        self._add.setText(self.tr("Add"))
+        self._remove.setText(self.tr("Remove"))
+        self._discard.setText(self.tr("Discard"))
+        self._normals.setText(self.tr("Show normals"))
+        self._diameter_label.setText(self.tr("&Disc \u00d8, mm"))
+        self._diameter.setAccessibleName(self.tr("Diameter of the LED discs, mm"))
+        self._tip_label.setText(self.tr("&Tip x y z, mm"))
+        for axis, edit in zip(AXES, self._tip, strict=True):
+            name = self.tr("Nominal centre of the tip, {0}, mm").format(axis)
+            edit.setAccessibleName(name)
+            edit.setToolTip(name)
+            edit.setPlaceholderText(axis)
+        self._diameter.setToolTip(self._diameter.accessibleName())
+        self._refresh()
+
+
+def _show(edit: QLineEdit, text: str) -> None:
+    """Show a text, but leave what the user types as it is typed."""
+    if edit.text().strip() != text:
+        edit.setText(text)

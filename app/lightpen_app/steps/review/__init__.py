@@ -1,0 +1,1 @@
+"""The step Review: the verdict, the tip and every image."""

@@ -1,0 +1,202 @@
+"""The images of a solved swing as a table, the worst first."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QItemSelection,
+    QItemSelectionModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    Qt,
+    Signal,
+)
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from typing_extensions import override
+
+from lightpen.record.image_rows import ImageRow
+from lightpen_app.look.phrases import reason_text
+from lightpen_app.look.quantities import decimals_for, number_text
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.translated import Translated
+
+Index = QModelIndex | QPersistentModelIndex
+NUMBER, MISFIT, LEDS, STATE = range(4)
+ROW_HEIGHT = 7 * GRID // 2
+
+
+class ImageModel(QAbstractTableModel):
+    """Number, misfit, LEDs and state of each image."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._rows: tuple[ImageRow, ...] = ()
+        self._decimals = 3
+
+    def rows(self) -> tuple[ImageRow, ...]:
+        """Return the images in their order."""
+        return self._rows
+
+    def set_rows(self, rows: Sequence[ImageRow]) -> None:
+        """Show other images."""
+        self.beginResetModel()
+        self._rows = tuple(rows)
+        misfits = sorted(row.misfit for row in rows if row.is_used)
+        middle = misfits[len(misfits) // 2] if misfits else 0.01
+        self._decimals = decimals_for(middle)
+        self.endResetModel()
+
+    @override
+    def rowCount(self, parent: Index | None = None) -> int:
+        return 0 if parent is not None and parent.isValid() else len(self._rows)
+
+    @override
+    def columnCount(self, parent: Index | None = None) -> int:
+        return 0 if parent is not None and parent.isValid() else STATE + 1
+
+    @override
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._text(self._rows[index.row()], index.column())
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return self._text(self._rows[index.row()], STATE)
+        if role == Qt.ItemDataRole.TextAlignmentRole and index.column() != STATE:
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        return None
+
+    @override
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> Any:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            side = Qt.AlignmentFlag.AlignLeft
+            if section != STATE:
+                side = Qt.AlignmentFlag.AlignRight
+            return side | Qt.AlignmentFlag.AlignVCenter
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        return (
+            self.tr("Image"),
+            self.tr("Misfit / px"),
+            self.tr("LEDs"),
+            self.tr("State"),
+        )[section]
+
+    def _text(self, row: ImageRow, column: int) -> str:
+        if column == NUMBER:
+            return str(row.number)
+        if column == LEDS:
+            return str(row.n_leds)
+        if column == STATE:
+            return self.tr("used") if row.is_used else reason_text(row.reason)
+        known = row.misfit == row.misfit
+        return number_text(row.misfit, self._decimals) if known else ""
+
+
+class ImageTable(Translated, QTableView):
+    """Shows the images; the current one and the selected ones are kept over changes.
+
+    Signals
+    -------
+    number_changed(int)
+        Of the current image.
+    selection_changed()
+        Other images are selected, or what they are has changed.
+    """
+
+    number_changed = Signal(int)
+    selection_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._model = ImageModel(self)
+        self.setModel(self._model)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setTabKeyNavigation(False)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        across = self.horizontalHeader()
+        across.setHighlightSections(False)
+        across.setStretchLastSection(True)
+        for column, width in ((NUMBER, 7.5), (MISFIT, 11.5), (LEDS, 6.5)):
+            self.setColumnWidth(column, round(width * GRID))
+
+        # Connections
+        chosen = self.selectionModel()
+        chosen.currentRowChanged.connect(self._on_current_row_changed)
+        chosen.selectionChanged.connect(self.selection_changed)
+
+        self._retranslate()
+
+    def value(self) -> tuple[ImageRow, ...]:
+        """Return the images in their order."""
+        return self._model.rows()
+
+    def set_value(self, rows: Sequence[ImageRow]) -> None:
+        """Show images; those that were current or selected stay so."""
+        current = self.number()
+        selected = {row.number for row in self.selected()}
+        chosen = self.selectionModel()
+        blocked = chosen.blockSignals(True)
+        self._model.set_rows(rows)
+        places = {row.number: place for place, row in enumerate(self._model.rows())}
+        whole = QItemSelection()
+        for number in selected & places.keys():
+            first = self._model.index(places[number], NUMBER)
+            last = self._model.index(places[number], STATE)
+            whole.select(first, last)
+        at = self._model.index(places.get(current, 0) if current else 0, NUMBER)
+        chosen.setCurrentIndex(at, QItemSelectionModel.SelectionFlag.NoUpdate)
+        if whole.isEmpty() and at.isValid():
+            whole.select(at, self._model.index(at.row(), STATE))
+        chosen.select(whole, QItemSelectionModel.SelectionFlag.ClearAndSelect)
+        chosen.blockSignals(blocked)
+        self.viewport().update()
+        if at.isValid():
+            self.scrollTo(at)
+            if self.number() != current:
+                self.number_changed.emit(self._model.rows()[at.row()].number)
+        self.selection_changed.emit()
+
+    def number(self) -> int | None:
+        """Return the number of the current image."""
+        row = self.current()
+        return None if row is None else row.number
+
+    def current(self) -> ImageRow | None:
+        """Return the current image."""
+        at = self.currentIndex()
+        return self._model.rows()[at.row()] if at.isValid() else None
+
+    def selected(self) -> tuple[ImageRow, ...]:
+        """Return the images that are selected."""
+        places = self.selectionModel().selectedRows()
+        return tuple(self._model.rows()[index.row()] for index in places)
+
+    def choose(self, number: int) -> None:
+        """Make an image current and the only one selected."""
+        for place, row in enumerate(self._model.rows()):
+            if row.number == number:
+                self.selectRow(place)
+                return
+
+    @override
+    def _retranslate(self) -> None:
+        self.viewport().update()
+        self.horizontalHeader().viewport().update()
+        self.setAccessibleName(self.tr("Images, the worst first"))
+
+    def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:
+        if now.isValid():
+            self.number_changed.emit(self._model.rows()[now.row()].number)

@@ -1,0 +1,316 @@
+"""The images of a solved swing: a list, the image itself, and its misfit among all."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+
+from lightpen.arrays import Image
+from lightpen.record.image_rows import ImageRow, count_left_out, worst_first
+from lightpen.record.reading import RecordSource
+from lightpen.record.solving import Solution, load_image
+from lightpen_app.look.phrases import reason_text
+from lightpen_app.look.pooling import pooled
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.review.image_table import ImageTable
+from lightpen_app.steps.review.plot_card import PlotCard
+from lightpen_app.steps.review.residual_plots import MisfitPlot, arrow_scale
+from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualView
+from lightpen_app.widgets.image_view import Marker
+from lightpen_app.widgets.plots import Axes
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job, Report
+
+TABLE_WIDTH = 40 * GRID
+LEAST_HEIGHT = 22 * GRID  # px, of the image
+RING = 10.0  # image px about an LED
+
+
+@dataclass(frozen=True, eq=False)
+class _Decoded:
+    """A recorded image, ready to be shown."""
+
+    source: RecordSource
+    number: int
+    half: Image
+    size: QSize
+
+
+class ImagesPanel(Translated, QWidget):
+    """Shows the images of a solution; asks for some to be taken out or put back.
+
+    Delete takes the selected images out, Insert puts them back.
+
+    Signals
+    -------
+    take_out_requested(list of int), put_back_requested(list of int)
+        Numbers of images.
+    saved(str), failed(str)
+        A sentence on a plot that was saved, or could not be.
+    """
+
+    take_out_requested = Signal(list)
+    put_back_requested = Signal(list)
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._solution: Solution | None = None
+        self._why_locked = ""
+        self._job: Job | None = None
+        self._loading: tuple[RecordSource, int] | None = None
+        self._shown: int | None = None
+
+        # Widgets
+        self._table = ImageTable()
+        self._take_out = PushButton()
+        self._put_back = PushButton()
+        self._count = text_label(TextSize.SMALL, Tone.QUIET)
+        self._view = ResidualView()
+        self._view.setMinimumHeight(LEAST_HEIGHT)
+        self._caption = text_label(TextSize.SMALL, Tone.QUIET)
+        self._misfits = MisfitPlot(Axes(""))
+        self._card = PlotCard(self._misfits, "misfit-of-images")
+
+        # Layout
+        buttons = QHBoxLayout()
+        buttons.setSpacing(GRID)
+        buttons.addWidget(self._take_out, 1)
+        buttons.addWidget(self._put_back, 1)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, GRID, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._table, 0, 0, 3, 1)
+        layout.addWidget(self._count, 3, 0)
+        layout.addLayout(buttons, 4, 0)
+        layout.addWidget(self._view, 0, 1)
+        layout.addWidget(self._caption, 1, 1)
+        layout.addWidget(self._card, 2, 1, 3, 1)
+        layout.setColumnMinimumWidth(0, TABLE_WIDTH)
+        layout.setColumnStretch(1, 1)
+        layout.setRowStretch(0, 3)
+        layout.setRowStretch(2, 2)
+
+        # Connections
+        self._table.number_changed.connect(self._on_number_changed)
+        self._table.selection_changed.connect(self._refresh_buttons)
+        self._misfits.number_chosen.connect(self._table.choose)
+        self._take_out.clicked.connect(self._on_take_out_clicked)
+        self._put_back.clicked.connect(self._on_put_back_clicked)
+        self._card.saved.connect(self.saved)
+        self._card.failed.connect(self.failed)
+        self._shortcut(QKeySequence.StandardKey.Delete, self._take_out.click)
+        self._shortcut(Qt.Key.Key_Insert, self._put_back.click)
+
+        self._retranslate()
+
+    def value(self) -> Solution | None:
+        """Return the solution whose images are shown."""
+        return self._solution
+
+    def set_value(self, solution: Solution | None) -> None:
+        """Show the images of another solution; the chosen ones stay chosen."""
+        before, self._solution = self._solution, solution
+        if solution is None or before is None or before.source != solution.source:
+            self.shut_down()
+            self._clear_view()
+        rows = () if solution is None else worst_first(solution)
+        self._table.set_value(rows)
+        self._refresh_misfits()
+        self._refresh_texts()
+        self._mark()
+        if self._shown is None and self._job is None:
+            self._load_wanted()
+
+    def set_locked(self, why: str) -> None:
+        """Keep images from being taken out or put back, for a reason, or let them."""
+        self._why_locked = why
+        self._refresh_buttons()
+
+    def number(self) -> int | None:
+        """Return the number of the image that is shown."""
+        return self._table.number()
+
+    def shut_down(self) -> None:
+        """Stop reading an image."""
+        job, self._job = self._job, None
+        if job is not None:
+            job.cancel()
+
+    def _shortcut(
+        self, key: QKeySequence.StandardKey | Qt.Key, act: Callable[[], None]
+    ) -> None:
+        shortcut = QShortcut(QKeySequence(key), self)
+        shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        shortcut.activated.connect(act)
+
+    def _retranslate(self) -> None:
+        self._take_out.setText(self.tr("Take out"))
+        self._put_back.setText(self.tr("Put back"))
+        self._misfits.set_axes(
+            Axes(self.tr("Misfit / px (x: left out)"), self.tr("image"))
+        )
+        self._refresh_texts()
+        self._refresh_buttons()
+        self._mark()
+
+    def _refresh_misfits(self) -> None:
+        solution = self._solution
+        if solution is None:
+            empty = np.zeros(0)
+            self._misfits.set_data(empty.astype(np.int64), empty, empty.astype(bool))
+            return
+        used = solution.calibration.used
+        self._misfits.set_data(solution.numbers, solution.misfits, used)
+
+    def _refresh_texts(self) -> None:
+        solution = self._solution
+        if solution is None:
+            self._count.clear()
+            return
+        used = solution.calibration.used
+        counted = self.tr("{0} of {1} used").format(int(used.sum()), len(used))
+        reasons = count_left_out(solution).items()
+        each = self.tr("{0} {1}")
+        parts = [each.format(count, reason_text(reason)) for reason, count in reasons]
+        self._count.setText(self.tr("; ").join([counted, *parts]))
+
+    def _refresh_buttons(self) -> None:
+        rows = self._table.selected()
+        why_not_out, why_not_back = self._why_locked, self._why_locked
+        if not rows:
+            why_not_out = why_not_back = why_not_out or self.tr("No image is selected.")
+        elif not any(row.is_used for row in rows):
+            why_not_out = why_not_out or self.tr("It does not take part already.")
+        if not why_not_back and not any(row.is_taken_out for row in rows):
+            why_not_back = self._why_not_back(rows[0])
+        self._take_out.set_why_not(
+            why_not_out,
+            self.tr("Leave the selected images out and solve again (Delete)"),
+        )
+        self._put_back.set_why_not(
+            why_not_back,
+            self.tr("Let the selected images take part again (Insert)"),
+        )
+
+    def _why_not_back(self, row: ImageRow) -> str:
+        if row.is_used:
+            return self.tr("It takes part already.")
+        text = self.tr("It would be left out again: {0}.")
+        return text.format(reason_text(row.reason))
+
+    def _mark(self) -> None:
+        """Draw what was seen in the image that is shown, and tell of it."""
+        solution, number = self._solution, self._table.number()
+        self._misfits.set_number(number)
+        if solution is None or number is None:
+            self._caption.clear()
+            return
+        index = int(np.searchsorted(solution.numbers, number))
+        points = solution.observations.seen_pixels[index]
+        residuals = solution.residuals[index]
+        seen = np.isfinite(points[:, 0])
+        fitted = np.isfinite(residuals[:, 0])
+        extent = np.ptp(points[seen], axis=0).max() if seen.any() else 1.0
+        scale = arrow_scale(residuals[fitted], 2 * float(extent))
+        if number == self._shown:
+            used = solution.calibration.leds_used[index]
+            takes_part = bool(solution.calibration.used[index])
+            self._view.set_markers(
+                [
+                    _ring(x, y, led + 1, bool(used[led]) or not takes_part, takes_part)
+                    for led, (x, y) in enumerate(points.tolist())
+                    if seen[led]
+                ]
+            )
+            arrows = Arrows(points[fitted], residuals[fitted], scale)
+            self._view.set_arrows(arrows)
+        detail = solution.observations.details[index]
+        if fitted.any():
+            text = self.tr("Image {0}; arrows: residuals \xd7 {1}")
+            self._caption.setText(text.format(number, f"{scale:g}"))
+        else:
+            text = self.tr("Image {0}: the pen is not found. {1}")
+            self._caption.setText(text.format(number, detail))
+
+    def _on_number_changed(self, number: int) -> None:
+        self._mark()
+        if self._job is None:
+            self._load_wanted()
+
+    def _load_wanted(self) -> None:
+        """Read the image that is chosen off the thread of the GUI, one at a time."""
+        self._loading = self._wanted()
+        if self._loading is None or self._solution is None:
+            return
+        number = self._loading[1]
+        self._job = job = Job(partial(_decoded, self._solution, number), self)
+
+        # Connections
+        job.succeeded.connect(self._on_decoded)
+        job.failed.connect(self._on_undecoded)
+        job.crashed.connect(self._on_crashed)
+        job.start()
+
+    def _on_decoded(self, image: _Decoded) -> None:
+        self._job = None
+        if (image.source, image.number) != self._wanted():
+            self._load_wanted()
+            return
+        self._shown = image.number
+        self._view.set_half(image.half, image.size)
+        self._mark()
+        rings = [(ring.x, ring.y) for ring in self._view.markers()]
+        self._view.show_around(np.array(rings).reshape(-1, 2))
+
+    def _on_undecoded(self, sentence: str) -> None:
+        self._job = None
+        if self._loading != self._wanted():
+            self._load_wanted()
+            return
+        self._clear_view()
+        self._view.set_message(sentence)
+
+    def _on_crashed(self) -> None:
+        self._on_undecoded(self.tr("The image cannot be shown."))
+
+    def _wanted(self) -> tuple[RecordSource, int] | None:
+        """Return the image that is chosen, and whose it is."""
+        number = self._table.number()
+        if self._solution is None or number is None:
+            return None
+        return self._solution.source, number
+
+    def _clear_view(self) -> None:
+        self._shown = None
+        self._view.set_image(None)
+        self._view.set_arrows(NO_ARROWS)
+
+    def _on_take_out_clicked(self) -> None:
+        numbers = [row.number for row in self._table.selected() if row.is_used]
+        self.take_out_requested.emit(numbers)
+
+    def _on_put_back_clicked(self) -> None:
+        numbers = [row.number for row in self._table.selected() if row.is_taken_out]
+        self.put_back_requested.emit(numbers)
+
+
+def _decoded(solution: Solution, number: int, report: Report) -> _Decoded:
+    report(0.0)
+    image = load_image(solution, number)
+    height, width = image.shape
+    bits = 8 * image.dtype.itemsize
+    half = pooled(image, bits)
+    return _Decoded(solution.source, number, half, QSize(width, height))
+
+
+def _ring(x: float, y: float, led: int, fits: bool, takes_part: bool) -> Marker:
+    """Return the marker of an LED; one that the fit left out is crossed."""
+    tone = (Tone.GOOD if fits else Tone.WARN) if takes_part else Tone.ACTIVE
+    return Marker(x, y, RING, str(led), tone, crossed=not fits)

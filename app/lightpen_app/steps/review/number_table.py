@@ -1,0 +1,112 @@
+"""Figures in rows and columns, to be read and copied."""
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QSizePolicy,
+    QTableWidget,
+    QTableWidgetItem,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen_app.look.theme import GRID
+
+ROW_HEIGHT = 3 * GRID
+HEAD_HEIGHT = 3 * GRID
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a table shows.
+
+    Attributes
+    ----------
+    columns, rows : tuple of str
+        Names.
+    cells : tuple of tuple of str
+        Row by row.
+    """
+
+    columns: tuple[str, ...] = ()
+    rows: tuple[str, ...] = ()
+    cells: tuple[tuple[str, ...], ...] = ()
+
+
+class NumberTable(QTableWidget):
+    """Shows figures whole, without scrolling; Ctrl+C copies what is selected."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = Figures()
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setTabKeyNavigation(False)
+        self.setShowGrid(False)
+        self.setWordWrap(False)
+        self.setFrameShape(QTableWidget.Shape.NoFrame)
+        self.setProperty("role", "figures")
+        never = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(never)
+        self.setHorizontalScrollBarPolicy(never)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setCornerButtonEnabled(False)
+        across, down = self.horizontalHeader(), self.verticalHeader()
+        across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        across.setDefaultAlignment(_RIGHT)
+        across.setHighlightSections(False)
+        across.setFixedHeight(HEAD_HEIGHT)
+        down.setDefaultAlignment(_LEFT)
+        down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        down.setDefaultSectionSize(ROW_HEIGHT)
+        down.setHighlightSections(False)
+
+    def value(self) -> Figures:
+        """Return the figures that are shown."""
+        return self._value
+
+    def set_value(self, value: Figures) -> None:
+        """Show other figures."""
+        if value == self._value:
+            return
+        self._value = value
+        self.setRowCount(len(value.rows))
+        self.setColumnCount(len(value.columns))
+        self.setHorizontalHeaderLabels(value.columns)
+        self.setVerticalHeaderLabels(value.rows)
+        for i, row in enumerate(value.cells):
+            for j, text in enumerate(row):
+                item = QTableWidgetItem(text)
+                item.setTextAlignment(_RIGHT)
+                self.setItem(i, j, item)
+        self.updateGeometry()
+
+    @override
+    def sizeHint(self) -> QSize:
+        height = HEAD_HEIGHT + ROW_HEIGHT * self.rowCount() + 2
+        return QSize(super().sizeHint().width(), height)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(20 * GRID, self.sizeHint().height())
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.matches(QKeySequence.StandardKey.Copy):
+            QGuiApplication.clipboard().setText(self._selected_text())
+        else:
+            super().keyPressEvent(event)
+
+    def _selected_text(self) -> str:
+        """Return the selected cells: tabs between columns, lines between rows."""
+        lines: dict[int, list[str]] = {}
+        for index in sorted(self.selectedIndexes()):
+            lines.setdefault(index.row(), []).append(index.data() or "")
+        return "\n".join("\t".join(cells) for cells in lines.values())
+
+
+_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+_LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter

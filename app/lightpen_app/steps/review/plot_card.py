@@ -1,0 +1,170 @@
+"""A plot with its menu: enlarge it, save it as a picture or as numbers."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction, QMouseEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QGridLayout,
+    QMenu,
+    QToolButton,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.errors import FileError
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.plots import Plot
+from lightpen_app.widgets.translated import Translated
+
+
+class PlotCard(Translated, QFrame):
+    """Frames a plot and offers what can be done with it.
+
+    Parameters
+    ----------
+    plot : Plot
+    file_stem : str
+        Name that a saved file is given at first.
+
+    Signals
+    -------
+    enlarge_toggled(bool)
+        The plot shall fill the place of its neighbours, too, or no longer.
+    saved(str)
+        A sentence that says where.
+    failed(str)
+        A sentence to be read: nothing was saved.
+    """
+
+    enlarge_toggled = Signal(bool)
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self, plot: Plot, file_stem: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._plot = plot
+        self._file_stem = file_stem
+        self.setProperty("area", "panel")
+
+        # Widgets
+        self._menu = QMenu(self)
+        self._enlarge = QAction(self, checkable=True)
+        self._save_png = QAction(self)
+        self._save_csv = QAction(self)
+        self._menu.addActions([self._enlarge, self._save_png, self._save_csv])
+        self._button = QToolButton()
+        self._button.setText("\N{HORIZONTAL ELLIPSIS}")
+        self._button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self._button.setProperty("role", "more")
+        self._button.setMenu(self._menu)
+
+        # Layout
+        layout = QGridLayout(self)
+        margin = GRID // 2
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.addWidget(plot, 0, 0)
+        corner = Qt.AlignmentFlag.AlignTop | Qt.AlignmentFlag.AlignRight
+        layout.addWidget(self._button, 0, 0, corner)
+
+        # Connections
+        self._enlarge.toggled.connect(self.enlarge_toggled)
+        self._save_png.triggered.connect(lambda _=False: self._ask_place(".png"))
+        self._save_csv.triggered.connect(lambda _=False: self._ask_place(".csv"))
+
+        self._retranslate()
+
+    def plot(self) -> Plot:
+        """Return the plot."""
+        return self._plot
+
+    def actions_offered(self) -> Sequence[QAction]:
+        """Return what the menu offers: enlarge, save as PNG, save as CSV."""
+        return self._enlarge, self._save_png, self._save_csv
+
+    def save(self, path: Path) -> None:
+        """Save as the suffix of the file says: numbers as CSV, else a picture."""
+        try:
+            if path.suffix.lower() == ".csv":
+                self._plot.save_csv(path)
+            else:
+                self._plot.save_png(path)
+        except FileError as error:
+            self.failed.emit(str(error))
+            return
+        self.saved.emit(self.tr("Saved as {0}").format(path))
+
+    @override
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self._enlarge.toggle()
+
+    def _ask_place(self, suffix: str) -> None:
+        dialog = QFileDialog(self, self.tr("Save plot"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+        dialog.setNameFilter(f"{suffix[1:].upper()} (*{suffix})")
+        dialog.setDefaultSuffix(suffix[1:])
+        dialog.selectFile(self._file_stem + suffix)
+        dialog.fileSelected.connect(lambda path: self.save(Path(path)))
+        dialog.open()
+
+    def _retranslate(self) -> None:
+        self._enlarge.setText(self.tr("Enlarge"))
+        self._save_png.setText(self.tr("Save picture (PNG)"))
+        self._save_csv.setText(self.tr("Save numbers (CSV)"))
+        self._button.setToolTip(self.tr("Enlarge or save this plot"))
+        words = f"{self._plot.accessibleName()}: {self._button.toolTip()}"
+        self._button.setAccessibleName(words)
+
+
+class PlotGrid(QWidget):
+    """Plots side by side, of which one can be enlarged to fill the place of all.
+
+    Parameters
+    ----------
+    cards : sequence of PlotCard
+    n_columns : int
+
+    Signals
+    -------
+    saved(str), failed(str)
+        Of any of the cards.
+    """
+
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self,
+        cards: Sequence[PlotCard],
+        n_columns: int = 2,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._cards = tuple(cards)
+
+        # Layout
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        for i, card in enumerate(self._cards):
+            layout.addWidget(card, *divmod(i, n_columns))
+
+        # Connections
+        for card in self._cards:
+            card.enlarge_toggled.connect(self._on_enlarge_toggled)
+            card.saved.connect(self.saved)
+            card.failed.connect(self.failed)
+
+    def cards(self) -> Sequence[PlotCard]:
+        """Return the plots with their menus."""
+        return self._cards
+
+    def _on_enlarge_toggled(self, enlarged: bool) -> None:
+        for card in self._cards:
+            card.setVisible(card is self.sender() or not enlarged)

@@ -1,0 +1,296 @@
+"""The plots of a review: residuals, uncertainty, postures, and the paper's method."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.report import result_of
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.record.solving import Solution
+from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.review.number_table import Figures, NumberTable
+from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
+from lightpen_app.steps.review.residual_plots import (
+    ArrowPlot,
+    DotPlot,
+    Histogram,
+)
+from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.plots import Axes, Curve
+from lightpen_app.widgets.translated import Translated
+
+SETTLED = 1e-5  # mm; later steps of the iteration cannot be told apart on a plot
+
+
+class PlotsPanel(Translated, QWidget):
+    """Base of the panels: shows plots of a solution.
+
+    Signals
+    -------
+    saved(str), failed(str)
+        A sentence on a plot that was saved, or could not be.
+    """
+
+    saved = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self, cards: Sequence[PlotCard], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._solution: Solution | None = None
+
+        # Widgets
+        self._grid = PlotGrid(cards)
+
+        # Layout
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, GRID, 0, 0)
+        self._layout.setSpacing(GRID)
+        self._layout.addWidget(self._grid, 1)
+
+        # Connections
+        self._grid.saved.connect(self.saved)
+        self._grid.failed.connect(self.failed)
+
+    def value(self) -> Solution | None:
+        """Return the solution that is shown."""
+        return self._solution
+
+    def set_value(self, solution: Solution | None) -> None:
+        """Show another solution."""
+        self._solution = solution
+        if solution is not None:
+            self._show(solution)
+
+    def cards(self) -> Sequence[PlotCard]:
+        """Return the plots with their menus."""
+        return self._grid.cards()
+
+    def _show(self, solution: Solution) -> None:
+        raise NotImplementedError
+
+    def _retranslate(self) -> None:
+        raise NotImplementedError
+
+
+class ResidualsPanel(PlotsPanel):
+    """Residuals over the image, by axis, by LED, and how they are distributed."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        # Widgets
+        self._arrows = ArrowPlot(Axes(""))
+        self._dots = DotPlot(Axes(""), ("residual_x_px", "residual_y_px"))
+        self._leds = BarPlot(
+            Axes(""), [Curve("rms_px"), Curve("mean_x_px"), Curve("mean_y_px")], "led"
+        )
+        self._histogram = Histogram(Axes(""), "residual_px")
+        super().__init__(
+            [
+                PlotCard(self._arrows, "residuals-over-image"),
+                PlotCard(self._leds, "residuals-of-leds"),
+                PlotCard(self._dots, "residuals-by-axis"),
+                PlotCard(self._histogram, "residuals-histogram"),
+            ],
+            parent,
+        )
+        self._advice = text_label(TextSize.SMALL, Tone.QUIET)
+
+        # Layout
+        self._layout.addWidget(self._advice)
+
+        self._retranslate()
+
+    @override
+    def _show(self, solution: Solution) -> None:
+        calibration, camera = solution.calibration, solution.source.camera
+        used = calibration.leds_used & calibration.used[:, None]
+        points = calibration.observations.seen_pixels[used]
+        residuals = solution.residuals[used]
+        size = camera.width, camera.height
+        self._arrows.set_data(size, points, residuals)
+        self._dots.set_data(residuals[:, 0], residuals[:, 1])
+        self._histogram.set_data(residuals.ravel())
+        leds = calibration.leds
+        numbers = [str(led + 1) for led in range(len(leds.rms))]
+        self._leds.set_data(numbers, leds.rms, leds.mean[:, 0], leds.mean[:, 1])
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        enlarged = self.tr("Residuals \xd7 {0}")
+        x, y = self.tr("x / px"), self.tr("y / px")
+        scale = f"{self._arrows.scale():g}"
+        self._arrows.set_axes(Axes(enlarged.format(scale), x, y))
+        self._dots.set_axes(Axes(self.tr("By axis / px"), x, y))
+        self._leds.set_axes(Axes(self.tr("By LED / px"), self.tr("LED")))
+        self._leds.set_names([self.tr("rms"), self.tr("mean x"), self.tr("mean y")])
+        self._histogram.set_axes(
+            Axes(
+                self.tr("Beside the normal curve"),
+                self.tr("residual / px"),
+                self.tr("count"),
+            )
+        )
+        self._advice.setText(
+            self.tr(
+                "The arrows should look random. A pattern points to the intrinsics "
+                "file, one LED that stands out to the LED file."
+            )
+        )
+
+
+class UncertaintyPanel(PlotsPanel):
+    """What the uncertainty of the tip is made of, and the postures behind it."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        # Widgets
+        self._budget = BarPlot(
+            Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES], "part"
+        )
+        self._postures = PosturePlot(Axes(""))
+        super().__init__(
+            [
+                PlotCard(self._budget, "uncertainty-budget"),
+                PlotCard(self._postures, "postures"),
+            ],
+            parent,
+        )
+        self._remark = text_label(TextSize.SMALL, Tone.QUIET)
+
+        # Layout
+        self._layout.addWidget(self._remark)
+
+        self._retranslate()
+
+    @override
+    def _show(self, solution: Solution) -> None:
+        coverage = solution.calibration.coverage
+        self._postures.set_data(coverage.tilts, coverage.directions)
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        self._budget.set_axes(Axes(self.tr("Parts of U (k = 2) / \xb5m")))
+        self._postures.set_axes(
+            Axes(
+                self.tr("Postures: tilt / \xb0"),
+                self.tr("to the right"),
+                self.tr("away from the camera"),
+            )
+        )
+        if self._solution is not None:
+            self._show_budget(self._solution)
+
+    def _show_budget(self, solution: Solution) -> None:
+        budget = solution.calibration.budget
+        parts = {
+            self.tr("noise"): budget.correlation_factor * budget.noise,
+            self.tr("LEDs"): budget.leds,
+            self.tr("camera"): budget.camera,
+            self.tr("all"): budget.covariance,
+        }
+        expanded = np.array([_expanded(part) for part in parts.values()]) * MICROMETRES
+        self._budget.set_data(list(parts), *expanded.T)
+        weakest = self.tr("Weakest direction ({0}): U = {1} \xb5m.").format(
+            ", ".join(f"{share:.2f}" for share in budget.weakest_direction.tolist()),
+            _digits(budget.weakest_uncertainty * MICROMETRES),
+        )
+        texts = [weakest]
+        if not budget.camera.any():
+            texts.append(self.tr("The intrinsics file tells no uncertainty."))
+        if budget.correlation_factor > 1:
+            text = self.tr(
+                "Images hang together: their noise counts {0} times (variance)."
+            )
+            texts.append(text.format(f"{budget.correlation_factor:.2f}"))
+        self._remark.setText(" ".join(texts))
+
+
+class MethodsPanel(PlotsPanel):
+    """The paper's iteration, and its result beside that of the joint fit."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        # Widgets
+        self._objective = LinePlot(Axes(""), [Curve("objective_mm2")], "iteration")
+        self._change = LinePlot(
+            Axes(""), [Curve(f"{axis}_um", axis) for axis in AXES], "iteration"
+        )
+        super().__init__(
+            [
+                PlotCard(self._objective, "convergence-objective"),
+                PlotCard(self._change, "convergence-tip"),
+            ],
+            parent,
+        )
+        self._table = NumberTable()
+
+        # Layout
+        self._layout.addWidget(self._table)
+
+        self._retranslate()
+
+    @override
+    def _show(self, solution: Solution) -> None:
+        fit = solution.calibration.two_stage
+        steps = np.arange(len(fit.objectives), dtype=np.float64)
+        settled = float(np.sum(fit.increments > SETTLED) + 1)
+        self._objective.set_data(steps, fit.objectives, until=settled)
+        tips = (fit.iterates[:, :3] - fit.tip_pen) * MICROMETRES
+        self._change.set_data(steps, *tips.T, until=settled)
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        self._objective.set_axes(
+            Axes(self.tr("Objective / mm\xb2"), self.tr("iteration"))
+        )
+        self._change.set_axes(
+            Axes(
+                self.tr("Tip minus its end / \xb5m"),
+                self.tr("iteration"),
+            )
+        )
+        self._table.setAccessibleName(self.tr("Two-stage method beside the joint fit"))
+        if self._solution is not None:
+            self._table.set_value(self._figures(self._solution))
+
+    def _figures(self, solution: Solution) -> Figures:
+        joint = result_of(solution.calibration, "joint")
+        paper = result_of(solution.calibration, "two-stage")
+        joint_u, paper_u = joint.expanded_uncertainty, paper.expanded_uncertainty
+        within = np.hypot(joint_u, paper_u)
+        rows = (
+            (self.tr("Joint fit"), joint.tip_pen, joint_u, joint.rms_mm),
+            (self.tr("its U (k = 2)"), joint_u, joint_u, None),
+            (self.tr("Two-stage (paper)"), paper.tip_pen, paper_u, paper.rms_mm),
+            (self.tr("its U, of noise alone"), paper_u, paper_u, None),
+            (self.tr("difference"), paper.tip_pen - joint.tip_pen, within, None),
+        )
+        columns = (*(f"{axis} / mm" for axis in AXES), self.tr("rms / mm"))
+        cells = tuple(
+            (*_rounded(values[:3], u[:3]), "" if rms is None else f"{rms:.4f}")
+            for _, values, u, rms in rows
+        )
+        return Figures(columns, tuple(name for name, *_ in rows), cells)
+
+
+def _expanded(covariance: FloatArray) -> FloatArray:
+    """Return U (k = 2) of the tip, (3,), mm, from a covariance (6, 6), mm^2."""
+    return COVERAGE_FACTOR * np.sqrt(np.diag(covariance)[:3])
+
+
+def _digits(value: float) -> str:
+    """Return an uncertainty by two significant digits."""
+    return number_text(value, decimals_for(value))
+
+
+def _rounded(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:
+    """Return numbers, each to the digit that its uncertainty warrants."""
+    decimals = map(decimals_for, uncertainties.tolist())
+    return tuple(map(number_text, values.tolist(), decimals))

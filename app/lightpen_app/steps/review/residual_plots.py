@@ -1,0 +1,336 @@
+"""Plots of residuals: image by image, over the image, and how they are distributed."""
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPoint, QPointF, QRectF, Signal
+from PySide6.QtGui import QColor, QPen
+from PySide6.QtWidgets import QGraphicsRectItem, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen_app.look.theme import colors_of
+from lightpen_app.widgets.plots import Axes, Plot
+
+MANY = 400  # arrows; more are told by their means
+N_CELLS = 20  # across, of which each shows the mean of its arrows
+HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
+
+
+class MisfitPlot(Plot):
+    """The misfit of each image over its number; a click chooses an image.
+
+    Images that do not take part are crosses. Where they are far off, they are drawn at
+    the upper rim, so that the others can still be told apart.
+
+    Signals
+    -------
+    number_chosen(int)
+        Of the image that was clicked.
+    """
+
+    number_chosen = Signal(int)
+
+    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+        self._used: pg.ScatterPlotItem | None = None
+        super().__init__(axes, parent)
+        self._places: dict[int, tuple[float, float]] = {}
+        self._number: int | None = None
+
+        # Widgets
+        self._used = pg.ScatterPlotItem(pxMode=True, size=5)
+        self._out = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
+        self._chosen = pg.ScatterPlotItem(pxMode=True, size=15, symbol="o")
+        for item in (self._chosen, self._used, self._out):
+            self._item.addItem(item)
+
+        # Connections
+        self._used.sigClicked.connect(self._on_clicked)
+        self._out.sigClicked.connect(self._on_clicked)
+
+        self._restyle()
+
+    def set_data(self, numbers: IntArray, misfits: FloatArray, used: BoolArray) -> None:
+        """Show misfits (N,), px, of images by number (N,), and which take part (N,)."""
+        assert self._used is not None
+        top = HEADROOM * float(np.max(misfits[used], initial=0.0)) or 1.0
+        shown = np.isfinite(misfits)
+        heights = np.minimum(np.where(shown, misfits, top), top)
+        x = numbers.astype(np.float64)
+        self._used.setData(x[used], heights[used], data=numbers[used])
+        self._out.setData(x[~used], heights[~used], data=numbers[~used])
+        places = zip(x.tolist(), heights.tolist(), strict=True)
+        self._places = dict(zip(numbers.tolist(), places, strict=True))
+        self._columns = {
+            "image": x,
+            "misfit_px": misfits,
+            "used": used.astype(np.float64),
+        }
+        self._fit(x, np.append(heights, 1.1 * heights.max(initial=0.0)), y_zero=True)
+        self.set_number(self._number)
+
+    def number(self) -> int | None:
+        """Return the number of the image that is marked."""
+        return self._number
+
+    def set_number(self, number: int | None) -> None:
+        """Mark an image by its number, or none."""
+        self._number = number
+        place = None if number is None else self._places.get(number)
+        points = [] if place is None else [place]
+        self._chosen.setData(pos=np.array(points).reshape(-1, 2))
+
+    def place_of(self, number: int) -> tuple[float, float]:
+        """Return x and y at which an image is drawn."""
+        return self._places[number]
+
+    def pixel_of(self, number: int) -> QPoint:
+        """Return where an image is drawn, in px of `canvas`."""
+        scene = self._item.vb.mapViewToScene(QPointF(*self._places[number]))
+        return QPoint(self._graphics.mapFromScene(scene))
+
+    def canvas(self) -> QWidget:
+        """Return the widget on which dots are clicked."""
+        canvas: QWidget = self._graphics.viewport()
+        return canvas
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._used is None:
+            return
+        colors = colors_of(self.palette())
+        self._used.setPen(pg.mkPen(None))
+        self._used.setBrush(pg.mkBrush(colors.accent))
+        self._out.setPen(pg.mkPen(colors.warn, width=2))
+        self._out.setBrush(pg.mkBrush(None))
+        self._chosen.setPen(pg.mkPen(colors.text, width=2))
+        self._chosen.setBrush(pg.mkBrush(None))
+
+    def _on_clicked(
+        self, _plot: object, points: "list[pg.SpotItem]", _event: object
+    ) -> None:
+        if len(points):
+            self.number_chosen.emit(int(points[0].data()))
+
+
+class SquarePlot(Plot):
+    """A plot that shows a unit of x as long as one of y, and keeps a range in sight."""
+
+    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+        super().__init__(axes, parent)
+        self._range = QRectF(0, 0, 1, 1)
+        self._item.setAspectLocked(True)
+
+        # Connections
+        self._item.vb.sigResized.connect(self._show_range)
+
+    def set_range(self, shown: QRectF) -> None:
+        """Keep a range in sight, whatever the size of the plot."""
+        self._range = shown
+        self._show_range()
+
+    def _show_range(self, _view: object = None) -> None:
+        self._item.setRange(self._range, padding=0.02)
+
+
+class DotPlot(SquarePlot):
+    """Dots of (x, y), such as residuals along the axes of the image.
+
+    Parameters
+    ----------
+    names : pair of str
+        Columns of the CSV file.
+    """
+
+    def __init__(
+        self, axes: Axes, names: tuple[str, str], parent: QWidget | None = None
+    ) -> None:
+        self._dots: pg.ScatterPlotItem | None = None
+        super().__init__(axes, parent)
+        self._names = names
+        self._dots = pg.ScatterPlotItem(pxMode=True, size=4)
+        self._item.addItem(self._dots)
+        self._restyle()
+
+    def set_data(self, x: FloatArray, y: FloatArray) -> None:
+        """Show dots at x (N,), y (N,); zero is in the middle."""
+        assert self._dots is not None
+        self._dots.setData(x, y)
+        self._columns = dict(zip(self._names, (x, y), strict=True))
+        reach = float(np.abs(np.concatenate([x, y])).max(initial=0.0)) or 1.0
+        self.set_range(QRectF(-reach, -reach, 2 * reach, 2 * reach))
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._dots is not None:
+            color = QColor(colors_of(self.palette()).accent)
+            color.setAlphaF(0.6)
+            self._dots.setPen(pg.mkPen(None))
+            self._dots.setBrush(pg.mkBrush(color))
+
+
+class ArrowPlot(SquarePlot):
+    """Residuals as enlarged arrows over the image, where they should look random.
+
+    Of many arrows, the means in cells of the image are drawn: a pattern stands out of
+    the noise then. The CSV file holds them all.
+    """
+
+    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+        self._shafts: pg.PlotCurveItem | None = None
+        super().__init__(axes, parent)
+        self._scale = 1.0
+        self._item.invertY(True)
+        self._frame = QGraphicsRectItem()
+        self._shafts = pg.PlotCurveItem(connect="pairs")
+        self._item.addItem(self._frame, ignoreBounds=True)
+        self._item.addItem(self._shafts)
+        self._restyle()
+
+    def scale(self) -> float:
+        """Return by how much the arrows are enlarged."""
+        return self._scale
+
+    def set_data(
+        self, image_size: tuple[int, int], points: FloatArray, residuals: FloatArray
+    ) -> None:
+        """Show residuals (N, 2) at points (N, 2), px, in an image (width, height)."""
+        assert self._shafts is not None
+        frame = QRectF(-0.5, -0.5, *image_size)
+        shown = _around(points) if len(points) else frame
+        starts, vectors = points, residuals
+        if len(points) > MANY:
+            starts, vectors = _cell_means(points, residuals)
+        self._scale = arrow_scale(vectors, shown.width())
+        self._shafts.setData(*arrow_lines(starts, vectors * self._scale))
+        self._frame.setRect(frame)
+        self.set_range(shown)
+        self._columns = {
+            "x_px": points[:, 0],
+            "y_px": points[:, 1],
+            "residual_x_px": residuals[:, 0],
+            "residual_y_px": residuals[:, 1],
+        }
+
+    def lines(self) -> tuple[FloatArray, FloatArray]:
+        """Return the ends x (6 N,), y (6 N,) of shafts and heads, in pairs."""
+        assert self._shafts is not None
+        x, y = self._shafts.getData()
+        return x, y
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._shafts is not None:
+            colors = colors_of(self.palette())
+            self._shafts.setPen(pg.mkPen(colors.accent, width=1))
+            border = QPen(QColor(colors.edge))
+            border.setCosmetic(True)
+            self._frame.setPen(border)
+
+
+class Histogram(Plot):
+    """How often residuals occur, beside the normal curve of the same spread.
+
+    Parameters
+    ----------
+    name : str
+        Column of the CSV file that holds the middles of the bins.
+    """
+
+    def __init__(self, axes: Axes, name: str, parent: QWidget | None = None) -> None:
+        self._bars: pg.BarGraphItem | None = None
+        super().__init__(axes, parent)
+        self._name = name
+        self._bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
+        self._normal = pg.PlotCurveItem()
+        self._item.addItem(self._bars)
+        self._item.addItem(self._normal)
+        self._restyle()
+
+    def set_data(self, values: FloatArray, n_bins: int = 41) -> None:
+        """Show how values (N,) are distributed."""
+        assert self._bars is not None
+        if not len(values):
+            return
+        reach = float(np.abs(values).max()) or 1.0
+        heights, edges = np.histogram(values, n_bins, (-reach, reach))
+        middles = (edges[1:] + edges[:-1]) / 2
+        step = edges[1] - edges[0]
+        self._bars.setOpts(x=middles, height=heights, width=0.9 * step)
+        fine = np.linspace(-reach, reach, 200)
+        sigma = float(np.sqrt(np.mean(values**2))) or 1.0
+        density = np.exp(-0.5 * (fine / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+        expected = len(values) * step * density
+        self._normal.setData(fine, expected)
+        self._columns = {self._name: middles, "count": heights.astype(np.float64)}
+        self._fit(edges, np.concatenate([heights, expected]), y_zero=True)
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._bars is not None:
+            colors = colors_of(self.palette())
+            self._bars.setOpts(pen=pg.mkPen(None), brush=QColor(colors.partial))
+            self._normal.setPen(pg.mkPen(colors.text, width=1))
+
+
+def _around(points: FloatArray) -> QRectF:
+    """Return what holds points (N, 2), with room for arrows."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = 0.06 * max(float(np.max(high - low)), 1.0)
+    width, height = (high - low + 2 * room).tolist()
+    return QRectF(float(low[0]) - room, float(low[1]) - room, width, height)
+
+
+def _cell_means(
+    points: FloatArray, vectors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the means of points (N, 2) and vectors (N, 2) in cells of the image."""
+    low = points.min(axis=0)
+    side = float(np.max(points.max(axis=0) - low)) / N_CELLS or 1.0
+    columns, rows = ((points - low) / side).astype(np.int64).T
+    _, cells = np.unique(rows * (N_CELLS + 1) + columns, return_inverse=True)
+    counts = np.bincount(cells)
+    means = [
+        np.bincount(cells, weights=values) / counts
+        for values in (*points.T, *vectors.T)
+    ]
+    return np.column_stack(means[:2]), np.column_stack(means[2:])
+
+
+def arrow_lines(
+    points: FloatArray, vectors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the ends of shafts and heads as pairs, for one curve of them all.
+
+    Parameters
+    ----------
+    points, vectors : (N, 2) array
+        Where arrows begin, and where they go from there.
+
+    Returns
+    -------
+    x, y : (6 N,) array
+    """
+    tips = points + vectors
+    ahead = vectors * 0.3
+    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]]) * 0.5
+    strokes = (points, tips, tips, tips - ahead + aside, tips, tips - ahead - aside)
+    lines = np.stack(strokes, axis=1).reshape(-1, 2)
+    return lines[:, 0], lines[:, 1]
+
+
+def arrow_scale(residuals: FloatArray, image_width: float) -> float:
+    """Return by how much to enlarge residuals (N, 2), px, to be seen on an image.
+
+    Arrows then are about a thirtieth of its width; the factor is 1, 2 or 5 times a
+    power of ten.
+    """
+    rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) if len(residuals) else 0
+    if not rms > 0:
+        return 1.0
+    wanted = image_width / 30 / rms
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted))

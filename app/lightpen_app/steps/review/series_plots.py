@@ -1,0 +1,218 @@
+"""Plots of few values: bars side by side, curves with marks, and postures as dots."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QRectF
+from PySide6.QtWidgets import QGraphicsEllipseItem, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen_app.look.theme import colors_of
+from lightpen_app.steps.review.residual_plots import SquarePlot
+from lightpen_app.widgets.plots import (
+    TONES,
+    Axes,
+    Column,
+    Curve,
+    Plot,
+    title_with_names,
+)
+
+GROUP = 0.8  # of the room for a label, that its bars fill
+SYMBOLS = ("o", "s", "t")  # so that curves differ by more than their colour
+FARTHEST = 36.0  # degrees of tilt that are always shown
+
+
+class NamedPlot(Plot):
+    """A plot of one or more series; of more, the names stand beside the title.
+
+    Parameters
+    ----------
+    series : sequence of Curve
+    """
+
+    def __init__(
+        self, axes: Axes, series: Sequence[Curve], parent: QWidget | None = None
+    ) -> None:
+        self._columns_of_series = tuple(each.column for each in series)
+        self._names = tuple(each.name for each in series)
+        super().__init__(axes, parent)
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the series."""
+        return self._names
+
+    def set_names(self, names: Sequence[str]) -> None:
+        """Name the series in another language."""
+        self._names = tuple(names)
+        self._restyle()
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if len(self._names) > 1:
+            colors = colors_of(self.palette())
+            title = title_with_names(self._axes.title, self._names, colors)
+            self._item.titleLabel.setText(title)
+
+    def _named(self, *values: FloatArray) -> dict[str, Column]:
+        """Return the values of each series by its column."""
+        return dict(zip(self._columns_of_series, values, strict=True))
+
+
+class BarPlot(NamedPlot):
+    """A group of bars for each label, one bar a series, in their order.
+
+    Parameters
+    ----------
+    series : sequence of Curve
+    label_column : str
+        Name of the column of labels in the CSV file.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        series: Sequence[Curve],
+        label_column: str,
+        parent: QWidget | None = None,
+    ) -> None:
+        self._bars: list[pg.BarGraphItem] = []
+        super().__init__(axes, series, parent)
+        self._label_column = label_column
+        for _ in series:
+            bars = pg.BarGraphItem(x=[0.0], height=[0.0], width=1.0)
+            self._item.addItem(bars)
+            self._bars.append(bars)
+        self._restyle()
+
+    def set_data(self, labels: Sequence[str], *values: FloatArray) -> None:
+        """Show values (N,) of each series for N labels; NaN leaves a gap."""
+        places = np.arange(len(labels), dtype=np.float64)
+        width = GROUP / len(self._bars)
+        for i, (bars, value) in enumerate(zip(self._bars, values, strict=True)):
+            offset = (i - (len(self._bars) - 1) / 2) * width
+            bars.setOpts(
+                x=places + offset, height=np.nan_to_num(value), width=0.9 * width
+            )
+        self._item.getAxis("bottom").setTicks([list(enumerate(labels))])
+        self._columns = {
+            self._label_column: tuple(labels),
+            **self._named(*values),
+        }
+        edges = np.array([-0.5, len(labels) - 0.5])
+        self._fit(edges, np.concatenate(values), y_zero=True)
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        colors = colors_of(self.palette())
+        for bars, tone in zip(self._bars, TONES, strict=False):
+            bars.setOpts(pen=pg.mkPen(None), brush=pg.mkBrush(colors.tone(tone)))
+
+
+class LinePlot(NamedPlot):
+    """Values with marks, joined by lines, over steps.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        At most three.
+    x_column : str
+        Name of the column of x in the CSV file.
+    """
+
+    def __init__(
+        self,
+        axes: Axes,
+        curves: Sequence[Curve],
+        x_column: str,
+        parent: QWidget | None = None,
+    ) -> None:
+        self._curves: list[pg.PlotDataItem] = []
+        super().__init__(axes, curves, parent)
+        self._x_column = x_column
+        for _, symbol in zip(curves, SYMBOLS, strict=False):
+            curve = pg.PlotDataItem(symbol=symbol, symbolSize=6)
+            self._item.addItem(curve)
+            self._curves.append(curve)
+        self._restyle()
+
+    def set_data(
+        self, x: FloatArray, *values: FloatArray, until: float = np.inf
+    ) -> None:
+        """Show values (N,) of each curve over x (N,), of which it shows up to a limit.
+
+        The CSV file holds them all.
+        """
+        for curve, value in zip(self._curves, values, strict=True):
+            curve.setData(x, value)
+        self._columns = {self._x_column: x, **self._named(*values)}
+        self._fit(x[x <= until], np.concatenate(values))
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        colors = colors_of(self.palette())
+        for curve, tone in zip(self._curves, TONES, strict=False):
+            curve.setPen(pg.mkPen(colors.tone(tone), width=1))
+            curve.setSymbolPen(pg.mkPen(None))
+            curve.setSymbolBrush(pg.mkBrush(colors.tone(tone)))
+
+
+class PosturePlot(SquarePlot):
+    """Where the pen leant in each image, seen from above with the camera below."""
+
+    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+        self._dots: pg.ScatterPlotItem | None = None
+        super().__init__(axes, parent)
+        self._rings = []
+        for tilt in (*np.degrees(TILT_RINGS), FARTHEST):
+            ring = QGraphicsEllipseItem(-tilt, -tilt, 2 * tilt, 2 * tilt)
+            self._item.addItem(ring)
+            self._rings.append(ring)
+        self._spokes = pg.PlotCurveItem(*_spokes(), connect="pairs")
+        self._item.addItem(self._spokes)
+        self._dots = pg.ScatterPlotItem(pxMode=True, size=6)
+        self._item.addItem(self._dots)
+        self._restyle()
+
+    def set_data(self, tilts: FloatArray, directions: FloatArray) -> None:
+        """Show postures by tilt (N,) and direction (N,), rad."""
+        assert self._dots is not None
+        degrees = np.degrees(tilts)
+        right, away = degrees * np.cos(directions), degrees * np.sin(directions)
+        self._dots.setData(right, away)
+        self._columns = {
+            "tilt_deg": degrees,
+            "direction_deg": np.degrees(directions),
+            "right_deg": right,
+            "away_deg": away,
+        }
+        reach = float(np.max(degrees, initial=FARTHEST))
+        self.set_range(QRectF(-reach, -reach, 2 * reach, 2 * reach))
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._dots is None:
+            return
+        colors = colors_of(self.palette())
+        line = pg.mkPen(colors.edge, width=1)
+        line.setCosmetic(True)
+        for ring in self._rings:
+            ring.setPen(line)
+        self._spokes.setPen(line)
+        self._dots.setPen(pg.mkPen(None))
+        self._dots.setBrush(pg.mkBrush(colors.accent))
+
+
+def _spokes() -> tuple[FloatArray, FloatArray]:
+    """Return the borders of the eight directions, as pairs of ends."""
+    sector = 2 * np.pi / N_DIRECTIONS
+    angles = np.repeat((np.arange(N_DIRECTIONS) + 0.5) * sector, 2)
+    radii = np.tile([np.degrees(TILT_RINGS[0]), FARTHEST], N_DIRECTIONS)
+    return radii * np.cos(angles), radii * np.sin(angles)

@@ -1,0 +1,1 @@
+"""The step Start: who calibrates what, and swings that were interrupted."""

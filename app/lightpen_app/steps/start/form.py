@@ -1,0 +1,290 @@
+"""What is typed at the step Start: names, the probe tip, and the limits of a swing."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QGroupBox,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.arrays import FloatArray
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.start.point_field import PointField
+from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.translated import Translated
+
+LARGEST_BALL = 100.0  # mm
+MOST_IMAGES = 2000
+
+
+class NamesForm(Translated, QWidget):
+    """Who calibrates what, where.
+
+    Signals
+    -------
+    value_edited()
+        Something is being typed; it may be unfinished.
+    value_changed()
+        A field other than the station is finished.
+    station_changed(str)
+        The name of the station is finished, or chosen from the list.
+    nominal_tip_changed()
+        The nominal centre of the tip is another one.
+    """
+
+    value_edited = Signal()
+    value_changed = Signal()
+    station_changed = Signal(str)
+    nominal_tip_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets: the order of making them is the order of the Tab key
+        self._place = QGroupBox()
+        self._station = StationField()
+        self._operator = _name_edit()
+        self._probe = QGroupBox()
+        self._pen = _name_edit()
+        self._tip = _name_edit()
+        self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
+        self._ball.setKeyboardTracking(False)
+        self._cone = _name_edit()
+        self._nominal_tip = PointField()
+        self._edits = (self._operator, self._pen, self._tip, self._cone)
+        self._labels: dict[QWidget, QLabel] = {
+            field: _field_label(field)
+            for field in (self._station, *self._edits, self._ball, self._nominal_tip)
+        }
+
+        # Layout
+        place = _panel(self._place)
+        place.addLayout(self._labelled(self._station), 0, 0)
+        place.addLayout(self._labelled(self._operator), 0, 1)
+        probe = _panel(self._probe)
+        probe.addLayout(self._labelled(self._pen), 0, 0)
+        probe.addLayout(self._labelled(self._cone), 0, 1)
+        probe.addLayout(self._labelled(self._tip), 1, 0)
+        probe.addLayout(self._labelled(self._ball), 1, 1)
+        probe.addLayout(self._labelled(self._nominal_tip), 2, 0, 1, 2)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._place)
+        layout.addWidget(self._probe)
+
+        # Connections
+        self._station.value_edited.connect(self.value_edited)
+        self._station.value_changed.connect(self.station_changed)
+        for edit in self._edits:
+            edit.textEdited.connect(self.value_edited)
+            edit.editingFinished.connect(self.value_changed)
+        self._ball.valueChanged.connect(self.value_changed)
+        self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
+
+        self._retranslate()
+
+    def value(self) -> Names:
+        """Return the names as they are typed."""
+        return Names(
+            station=self._station.value(),
+            operator=self._operator.text().strip(),
+            pen=self._pen.text().strip(),
+            tip=self._tip.text().strip(),
+            cone=self._cone.text().strip(),
+            ball_diameter=self._ball.value() or None,
+        )
+
+    def set_value(self, names: Names) -> None:
+        """Show other names."""
+        blocked = self.blockSignals(True)
+        self._station.set_value(names.station)
+        texts = (names.operator, names.pen, names.tip, names.cone)
+        for edit, text in zip(self._edits, texts, strict=True):
+            edit.setText(text)
+            edit.setCursorPosition(0)
+        self._ball.setValue(names.ball_diameter or 0.0)
+        self.blockSignals(blocked)
+
+    def set_stations(self, names: Sequence[str]) -> None:
+        """List the stations that are known."""
+        self._station.set_known(names)
+
+    def nominal_tip(self) -> FloatArray | None:
+        """Return the nominal centre of the tip (3,), mm; None for the LED file's."""
+        return self._nominal_tip.value()
+
+    def set_nominal_tip(self, point: FloatArray | None) -> None:
+        """Show another nominal centre."""
+        self._nominal_tip.set_value(point)
+
+    def set_tip_of_file(self, point: FloatArray | None) -> None:
+        """Show the nominal centre that the LED file has."""
+        self._nominal_tip.set_point_of_file(point)
+
+    def settle(self) -> None:
+        """Take over the numbers that are being typed."""
+        self._ball.interpretText()
+        self._nominal_tip.settle()
+
+    def _labelled(self, field: QWidget) -> QVBoxLayout:
+        return _stacked(self._labels[field], field)
+
+    def _retranslate(self) -> None:
+        self._place.setTitle(self.tr("Where and who"))
+        self._probe.setTitle(self.tr("What is calibrated"))
+        for field, text in (
+            (self._station, self.tr("Station")),
+            (self._operator, self.tr("Operator")),
+            (self._pen, self.tr("Pen, serial number")),
+            (self._cone, self.tr("Cone")),
+            (self._tip, self.tr("Probe tip")),
+            (self._ball, self.tr("Ball diameter")),
+            (self._nominal_tip, self.tr("Nominal centre of the tip")),
+        ):
+            self._labels[field].setText(text)
+            field.setAccessibleName(text)
+        self._station.setToolTip(
+            self.tr(
+                "Choose a station to bring back all that was chosen there, or type the "
+                "name of a new one."
+            )
+        )
+        self._ball.setSpecialValueText(self.tr("not known"))
+
+
+class LimitsForm(Translated, QGroupBox):
+    """What ends a swing.
+
+    Signals
+    -------
+    value_changed()
+        The user chose other limits.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = SwingLimits()
+
+        # Widgets
+        self._uncertainty = NumberField("mm", (0.0001, 1.0), 4)
+        self._uncertainty.setSingleStep(0.001)
+        self._least = NumberField("", (10, MOST_IMAGES), 0)
+        self._most = NumberField("", (10, MOST_IMAGES), 0)
+        self._fields = (self._uncertainty, self._least, self._most)
+        self._labels = tuple(map(_field_label, self._fields))
+
+        # Layout
+        layout = _panel(self)
+        layout.setColumnStretch(2, 1)
+        for column, field in enumerate(self._fields):
+            layout.addLayout(_stacked(self._labels[column], field), 0, column)
+
+        # Connections
+        for field in self._fields:
+            field.setKeyboardTracking(False)
+        self._uncertainty.valueChanged.connect(self.value_changed)
+        self._least.valueChanged.connect(self._on_least_changed)
+        self._most.valueChanged.connect(self._on_most_changed)
+
+        self.set_value(self._value)
+        self._retranslate()
+
+    def value(self) -> SwingLimits:
+        """Return the limits."""
+        return replace(
+            self._value,
+            max_uncertainty=self._uncertainty.value(),
+            min_images=round(self._least.value()),
+            max_images=round(self._most.value()),
+        )
+
+    def set_value(self, limits: SwingLimits) -> None:
+        """Show other limits."""
+        self._value = limits
+        blocked = self.blockSignals(True)
+        self._uncertainty.setValue(limits.max_uncertainty)
+        self._most.setValue(limits.max_images)
+        self._least.setValue(limits.min_images)
+        self.blockSignals(blocked)
+
+    def settle(self) -> None:
+        """Take over the numbers that are being typed."""
+        for field in self._fields:
+            field.interpretText()
+
+    def _on_least_changed(self, least: float) -> None:
+        self._most.setValue(max(least, self._most.value()))
+        self.value_changed.emit()
+
+    def _on_most_changed(self, most: float) -> None:
+        self._least.setValue(min(most, self._least.value()))
+        self.value_changed.emit()
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Limits of the swing"))
+        texts = (
+            self.tr("U (k = 2) at most"),
+            self.tr("Images at least"),
+            self.tr("Images at most"),
+        )
+        tips = (
+            self.tr(
+                "The swing ends when the tip is as certain as this along its weakest "
+                "direction. Usual: {0} mm."
+            ).format(f"{SwingLimits.max_uncertainty:g}"),
+            self.tr("The swing does not end with fewer. Usual: {0}.").format(
+                SwingLimits.min_images
+            ),
+            self.tr("The swing ends with so many in any case. Usual: {0}.").format(
+                SwingLimits.max_images
+            ),
+        )
+        for field, label, text, tip in zip(
+            self._fields, self._labels, texts, tips, strict=True
+        ):
+            label.setText(text)
+            field.setAccessibleName(text)
+            field.setToolTip(tip)
+
+
+def _name_edit() -> QLineEdit:
+    edit = QLineEdit()
+    edit.setMaxLength(LONGEST_NAME)
+    return edit
+
+
+def _field_label(field: QWidget) -> QLabel:
+    label = text_label(TextSize.SMALL, Tone.QUIET)
+    label.setWordWrap(False)
+    label.setBuddy(field)
+    return label
+
+
+def _panel(group: QGroupBox) -> QGridLayout:
+    layout = QGridLayout(group)
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setHorizontalSpacing(2 * GRID)
+    layout.setVerticalSpacing(3 * GRID // 2)
+    layout.setColumnStretch(0, 1)
+    layout.setColumnStretch(1, 1)
+    return layout
+
+
+def _stacked(label: QLabel, field: QWidget) -> QVBoxLayout:
+    layout = QVBoxLayout()
+    layout.setSpacing(GRID // 2)
+    layout.addWidget(label)
+    layout.addWidget(field)
+    return layout

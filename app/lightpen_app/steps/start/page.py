@@ -1,0 +1,390 @@
+"""The step Start: who calibrates what, where, and what there is of it already."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from PySide6.QtCore import QTimer
+from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.errors import LightpenError
+from lightpen.live.preparation import (
+    Preparation,
+)
+from lightpen.record.reading import recorded_names
+from lightpen.record.results import Result, last_result
+from lightpen.record.unfinished import (
+    Unfinished,
+    discard_damaged,
+    discard_swing,
+    find_unfinished,
+)
+from lightpen.swing.resuming import Resumable, read_resumable
+from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import PARTED, shortened
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.steps.start.form import LimitsForm, NamesForm
+from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
+from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.work.job import Job, Report
+
+T = TypeVar("T")
+
+NARROW = 100 * GRID  # px; a page of less width has one column
+TYPING_PAUSE_MS = 400  # after which what was typed is taken over
+
+
+class StartPage(Page):
+    """Names, limits, the last result of the pen and tip, and interrupted swings.
+
+    Parameters
+    ----------
+    services : Services
+    """
+
+    key = "start"
+
+    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        workbench = self._workbench = services.workbench
+        self._shown = workbench.preparation
+        self._looked_up = ("", "")
+        self._lookup: Job | None = None
+        self._search: Job | None = None
+        self._work: Job | None = None
+
+        # Widgets: the order of making them is the order of the Tab key
+        self._names = NamesForm()
+        self._limits = LimitsForm()
+        self._interrupted = InterruptedPanel()
+        self._last = LastResultPanel(services.workbench.around.now)
+        self._sound_test = SoundTest(services.sounds)
+        self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
+        self._searching = QTimer(self, singleShot=True, interval=0)
+
+        # Layout
+        self._left = left = QVBoxLayout()
+        left.setSpacing(2 * GRID)
+        left.addWidget(self._names)
+        left.addWidget(self._limits)
+        left.addStretch(1)
+        self._right = right = QVBoxLayout()
+        right.setSpacing(2 * GRID)
+        right.addWidget(self._interrupted)
+        right.addWidget(self._last)
+        right.addWidget(self._sound_test)
+        right.addStretch(1)
+        content = QWidget()
+        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
+        columns.setContentsMargins(0, 0, 0, 0)
+        columns.setSpacing(3 * GRID)
+        columns.addLayout(left, 5)
+        columns.addLayout(right, 4)
+        scroll = PageScroll()
+        scroll.setWidget(content)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scroll)
+
+        # Connections
+        self._names.value_edited.connect(self._on_edited)
+        self._names.value_changed.connect(self._take_names)
+        self._names.station_changed.connect(self._on_station_changed)
+        self._names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
+        self._limits.value_changed.connect(self._on_limits_changed)
+        self._typing.timeout.connect(self._take_names)
+        self._searching.timeout.connect(self._search_interrupted)
+        self._interrupted.resume_requested.connect(self._on_resume_requested)
+        self._interrupted.discard_requested.connect(self._on_discard_requested)
+        self._interrupted.search_requested.connect(self._search_interrupted)
+        workbench.changed.connect(self._on_bench_changed)
+
+        self._show_changes(None, self._shown)
+        self._retranslate()
+
+    @override
+    def title(self) -> str:
+        return self.tr("Start")
+
+    @override
+    def lead(self) -> str:
+        return self.tr(
+            "Say what is calibrated. All of it is remembered for the station."
+        )
+
+    @override
+    def is_complete(self) -> bool:
+        return not self._typed().start_lacks()
+
+    @override
+    def main_action(self) -> MainAction:
+        lacks = self._typed().start_lacks()
+        why_not = lack_text(lacks[0]) if lacks else ""
+        return MainAction(self.tr("Continue to the camera"), why_not)
+
+    @override
+    def run_main_action(self) -> None:
+        self._settle()
+        super().run_main_action()
+
+    @override
+    def entered(self) -> None:
+        self._names.set_stations(self._workbench.stations())
+        self._tell_subject()
+        self._look_up_last()
+
+    @override
+    def left(self) -> None:
+        self._settle()
+        self._sound_test.stop()
+
+    @override
+    def shut_down(self) -> None:
+        self._searching.stop()
+        for job in (self._lookup, self._search, self._work):
+            if job is not None:
+                job.cancel()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        direction = QBoxLayout.Direction
+        is_narrow = event.size().width() < NARROW
+        self._columns.setDirection(
+            direction.TopToBottom if is_narrow else direction.LeftToRight
+        )
+        # What waits for an answer comes first.
+        column = self._left if is_narrow else self._right
+        if column.indexOf(self._interrupted) < 0:
+            column.insertWidget(0, self._interrupted)
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not event.spontaneous():
+            self._searching.start()  # when the window is on the screen
+
+    @override
+    def _retranslate(self) -> None:
+        self._tell_subject()
+        self.changed.emit()
+
+    # What is typed
+
+    def _typed(self) -> Preparation:
+        """Return what is chosen, with the names as they are being typed."""
+        return replace(self._workbench.preparation, names=self._names.value())
+
+    def _on_edited(self) -> None:
+        self._typing.start()
+        self._tell_subject()
+        self.changed.emit()
+
+    def _take_names(self) -> None:
+        """Take over all names but that of the station, which may be unfinished."""
+        self._typing.stop()
+        now = self._workbench.preparation
+        names = replace(self._names.value(), station=now.names.station)
+        if names != now.names:
+            self._choose(replace(now, names=names))
+
+    def _on_station_changed(self, name: str) -> None:
+        """Bring back a known station; a new one takes over the present choices."""
+        self._take_names()
+        now = self._workbench.preparation
+        if name in self._workbench.stations():
+            self._workbench.choose_station(name)
+        else:
+            self._choose(replace(now, names=replace(now.names, station=name)))
+        self._names.set_stations(self._workbench.stations())
+
+    def _on_nominal_tip_changed(self) -> None:
+        point = self._names.nominal_tip()
+        self._choose(replace(self._workbench.preparation, nominal_tip=point))
+
+    def _on_limits_changed(self) -> None:
+        self._choose(replace(self._workbench.preparation, limits=self._limits.value()))
+
+    def _choose(self, preparation: Preparation) -> None:
+        self._shown = preparation  # the fields show it already
+        self._workbench.set_preparation(preparation)
+
+    def _settle(self) -> None:
+        """Take over what is being typed."""
+        self._names.settle()
+        self._limits.settle()
+        self._take_names()
+        station = self._names.value().station
+        if station != self._workbench.preparation.names.station:
+            self._on_station_changed(station)
+
+    # What is shown
+
+    def _on_bench_changed(self) -> None:
+        before, now = self._shown, self._workbench.preparation
+        self._shown = now
+        self._show_changes(before, now)
+        if (now.names.pen, now.names.tip) != self._looked_up:
+            self._look_up_last()
+        self._tell_subject()
+        self.changed.emit()
+
+    def _show_changes(self, before: Preparation | None, now: Preparation) -> None:
+        """Fill the fields of what is different; others may be being typed in."""
+        if before is None or now.names != before.names:
+            self._typing.stop()
+            self._names.set_value(now.names)
+        if before is None or now.limits != before.limits:
+            self._limits.set_value(now.limits)
+        if before is None or now.nominal_tip is not before.nominal_tip:
+            self._names.set_nominal_tip(now.nominal_tip)
+        if before is None or now.pen_file is not before.pen_file:
+            pen = None if now.pen_file is None else now.pen_file.pen
+            self._names.set_tip_of_file(None if pen is None else pen.nominal_tip)
+
+    def _tell_subject(self) -> None:
+        names = self._names.value()
+        pen = self.tr("Pen {0}").format(shortened(names.pen)) if names.pen else ""
+        cone = self.tr("Cone {0}").format(shortened(names.cone)) if names.cone else ""
+        self.subject_changed.emit(PARTED.join(filter(None, (pen, cone))))
+
+    def _look_up_last(self) -> None:
+        """Look for the result in force, for the pen and tip that are named."""
+        if self._lookup is not None:
+            self._lookup.cancel()
+        names = self._workbench.preparation.names
+        self._looked_up = pen, tip = names.pen, names.tip
+        if not (pen and tip):
+            self._last.set_value(LastResult(is_named=False))
+            return
+        folder = self._workbench.run.results_folder
+        self._lookup = self._started(
+            lambda _: last_result(folder, pen, tip), self._on_looked_up
+        )
+        self._lookup.failed.connect(self._on_lookup_failed)
+        self._lookup.crashed.connect(self._on_lookup_crashed)
+
+    def _on_looked_up(self, result: Result | None) -> None:
+        self._last.set_value(LastResult(result))
+
+    def _on_lookup_failed(self, sentence: str) -> None:
+        self._last.set_value(LastResult(trouble=sentence))
+
+    def _on_lookup_crashed(self) -> None:
+        self._on_lookup_failed(self.tr("The last calibration cannot be shown."))
+
+    # Interrupted swings
+
+    def _search_interrupted(self) -> None:
+        if self._search is not None:
+            self._search.cancel()
+        folder = self._workbench.run.records_folder
+        self._search = self._started(
+            lambda _: find_unfinished(folder), self._on_interrupted_found
+        )
+        self._search.failed.connect(self.notice_raised)
+
+    def _on_interrupted_found(self, swings: Unfinished) -> None:
+        present = self._workbench.run.record_folder
+        others = Unfinished(
+            tuple(r for r in swings.interrupted if r.folder != present),
+            tuple(r for r in swings.under_way if r.folder != present),
+            swings.damaged,
+        )
+        self._interrupted.set_value(others)
+
+    def _on_resume_requested(self, folder: Path) -> None:
+        self._interrupted.set_waiting(self.tr("The swing is being read."))
+        self._work = self._started(
+            lambda _: read_resumable(folder), self._on_swing_read
+        )
+        self._work.failed.connect(self._on_work_failed)
+        self._work.crashed.connect(self._on_work_crashed)
+
+    def _on_swing_read(self, swing: Resumable) -> None:
+        self._interrupted.set_waiting("")
+        self._take_over(swing)
+        live = self._workbench.live
+        if not live.is_open:
+            self._workbench.open_camera()
+        size = self._workbench.preparation.image_size
+        if not live.is_open:
+            self.notice_raised.emit(
+                self.tr(
+                    "No camera is open. Choose the source of the images at the step "
+                    "Camera, then resume the swing here."
+                )
+            )
+        elif size is not None and not swing.fits(size):
+            camera = swing.setup.camera
+            self.notice_raised.emit(
+                self.tr(
+                    "The camera sends {0} x {1}, the swing was captured with {2} x "
+                    "{3}. Choose its camera at the step Camera, then resume the swing "
+                    "here."
+                ).format(*size, camera.width, camera.height)
+            )
+        else:
+            self._go_on(swing)
+
+    def _take_over(self, swing: Resumable) -> None:
+        """Choose what the swing was captured for, and the camera of its station."""
+        workbench, header = self._workbench, swing.record.header
+        station = workbench.preparation.names.station
+        if header.station != station and header.station in workbench.stations():
+            workbench.choose_station(header.station)
+        names = recorded_names(swing.record)
+        names = replace(names, station=names.station or station)
+        workbench.set_preparation(
+            replace(workbench.preparation, names=names, nominal_tip=header.nominal_tip)
+        )
+        self._names.set_stations(workbench.stations())
+
+    def _go_on(self, swing: Resumable) -> None:
+        try:
+            self._workbench.run.go_on(swing)
+        except LightpenError as error:
+            self.notice_raised.emit(str(error))
+            return
+        self.step_requested.emit("swing")
+
+    def _on_discard_requested(self, folder: Path) -> None:
+        self._interrupted.set_waiting(self.tr("The swing is being discarded."))
+        damaged = {swing.folder for swing in self._interrupted.value().damaged}
+        discard = discard_damaged if folder in damaged else discard_swing
+        self._work = self._started(
+            lambda _: discard(folder), lambda _: self._on_discarded(folder)
+        )
+        self._work.failed.connect(self._on_work_failed)
+        self._work.crashed.connect(self._on_work_crashed)
+
+    def _on_discarded(self, folder: Path) -> None:
+        self.status_changed.emit(
+            self.tr("Discarded. The images stay in {0}.").format(folder)
+        )
+        self._search_interrupted()
+
+    def _on_work_failed(self, sentence: str) -> None:
+        self.notice_raised.emit(sentence)
+        self._on_work_crashed()
+
+    def _on_work_crashed(self) -> None:
+        self._interrupted.set_waiting("")
+        self._search_interrupted()
+
+    def _started(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
+    ) -> Job:
+        job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.start()
+        return job

@@ -1,0 +1,210 @@
+"""The tip in force for a pen and probe tip, and its age."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.estimation.verdict import Grade
+from lightpen.record.results import OLD, Result
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import grade_text
+from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
+
+
+@dataclass(frozen=True, eq=False)
+class LastResult:
+    """What is known of the tip in force.
+
+    Attributes
+    ----------
+    result : Result or None
+        None if there is none yet.
+    is_named : bool
+        Whether pen and tip are named at all.
+    trouble : str
+        Why it cannot be told; else empty.
+    """
+
+    result: Result | None = None
+    is_named: bool = True
+    trouble: str = ""
+
+
+class LastResultPanel(Translated, QGroupBox):
+    """Shows the last accepted calibration: age, verdict, tip and uncertainty.
+
+    Parameters
+    ----------
+    now : callable
+        Returns the date and time that ages are told by.
+    """
+
+    def __init__(
+        self, now: Callable[[], datetime], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._now = now
+        self._value = LastResult()
+
+        # Widgets
+        self._age = text_label(TextSize.TITLE)
+        self._age.setWordWrap(False)
+        self._grade = SignLabel(wraps=False)
+        self._when = text_label(TextSize.SMALL, Tone.QUIET)
+        self._table = QWidget()
+        self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
+        self._tip = [_cell() for _ in AXES]
+        self._uncertainty = [_cell(tone=Tone.QUIET) for _ in AXES]
+        self._warning = SignLabel()
+
+        # Layout
+        table = QGridLayout(self._table)
+        table.setContentsMargins(0, GRID // 2, 0, GRID // 2)
+        table.setHorizontalSpacing(4 * GRID)
+        table.setVerticalSpacing(GRID // 2)
+        for column, head in enumerate(self._heads):
+            table.addWidget(head, 0, column)
+        for row, axis in enumerate(AXES, start=1):
+            table.addWidget(QLabel(axis), row, 0)
+            table.addWidget(self._tip[row - 1], row, 1)
+            table.addWidget(self._uncertainty[row - 1], row, 2)
+        table.setColumnStretch(3, 1)
+        first = QHBoxLayout()
+        first.setSpacing(2 * GRID)
+        first.addWidget(self._age)
+        first.addWidget(self._grade, 0, Qt.AlignmentFlag.AlignVCenter)
+        first.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addLayout(first)
+        layout.addWidget(self._when)
+        layout.addWidget(self._table)
+        layout.addWidget(self._warning)
+
+        self._retranslate()
+
+    def value(self) -> LastResult:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(self, value: LastResult) -> None:
+        """Show another result, or that there is none."""
+        self._value = value
+        self._retranslate()
+
+    def words(self) -> tuple[str, ...]:
+        """Return what is said, line by line."""
+        lines = [self._age.text(), self._grade.value().text, self._when.text()]
+        if self._value.result is not None:
+            lines += [
+                f"{axis} {tip.text()} {uncertainty.text()}"
+                for axis, tip, uncertainty in zip(
+                    AXES, self._tip, self._uncertainty, strict=True
+                )
+            ]
+        return tuple(filter(None, [*lines, self._warning.value().text]))
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Last calibration of this pen and tip"))
+        value = self._value
+        if value.result is not None:
+            self._show(value.result)
+        elif value.trouble:
+            self._say(trouble=value.trouble)
+        elif value.is_named:
+            self._say(
+                self.tr("None yet"),
+                self.tr("The tip that you accept will be the first in force."),
+            )
+        else:
+            self._say(hint=self.tr("It is shown when the pen and its tip are named."))
+
+    def _say(self, short: str = "", hint: str = "", trouble: str = "") -> None:
+        """Say why there is no result."""
+        self._age.setText(short)
+        self._age.setVisible(bool(short))
+        self._grade.set_value(Remark())
+        self._when.setText(hint)
+        self._when.setVisible(bool(hint))
+        self._table.hide()
+        self._warning.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+
+    def _show(self, result: Result) -> None:
+        now = self._now()
+        for widget in (self._age, self._when, self._table):
+            widget.show()
+        self._age.setText(self._age_text(result, now))
+        self._grade.set_value(_grade_remark(result.grade))
+        when = moment_text(result.accepted, self.tr("d MMMM yyyy, hh:mm"))
+        by = shortened(result.names.operator)
+        self._when.setText(PARTED.join(filter(None, (when, by))))
+        heads = ("", self.tr("Tip centre / mm"), self.tr("U (k = 2) / mm"))
+        for head, text in zip(self._heads, heads, strict=True):
+            head.setText(text)
+        for axis in range(3):
+            uncertainty = float(result.uncertainty[axis])
+            decimals = decimals_for(uncertainty)
+            tip = number_text(float(result.tip_pen[axis]), decimals)
+            self._tip[axis].setText(tip)
+            self._uncertainty[axis].setText(number_text(uncertainty, decimals))
+        self._warning.set_value(self._warning_of(result, now))
+
+    def _warning_of(self, result: Result, now: datetime) -> Remark:
+        if result.accepted > now:
+            text = self.tr("It is dated later than now. Check the clock here.")
+        elif result.is_old(now):
+            text = self.tr(
+                "It is older than {0} days. Calibrate before you measure."
+            ).format(OLD.days)
+        else:
+            return Remark()
+        return Remark(text, Sign.WARNING, Tone.WARN)
+
+    def _age_text(self, result: Result, now: datetime) -> str:
+        days = (now.date() - result.accepted.astimezone().date()).days
+        if days < 0:
+            return self.tr("In the future")
+        if days == 0:
+            return self.tr("Today")
+        if days == 1:
+            return self.tr("Yesterday")
+        if days < 2 * DAYS_IN_MONTH:
+            return self.tr("{0} days ago").format(days)
+        if days < 2 * DAYS_IN_YEAR:
+            return self.tr("{0} months ago").format(days // DAYS_IN_MONTH)
+        return self.tr("{0} years ago").format(days // DAYS_IN_YEAR)
+
+
+def _grade_remark(grade: str) -> Remark:
+    try:
+        known = Grade(grade)
+    except ValueError:  # of a later version
+        return Remark(grade)
+    return Remark(grade_text(known), *GRADE_MARKS[known])
+
+
+def _cell(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabel:
+    label = text_label(size, tone)
+    label.setWordWrap(False)
+    label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    flags = Qt.TextInteractionFlag.TextSelectableByMouse
+    label.setTextInteractionFlags(flags)
+    return label

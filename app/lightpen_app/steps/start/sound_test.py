@@ -1,0 +1,110 @@
+"""A button that plays all sounds, each with its word."""
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
+
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.sounds import Mute, Sound, Sounds
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+FIXED = QSizePolicy.Policy.Fixed
+STEP_MS = 1000  # from one sound to the next; none is longer
+
+
+class SoundTest(Translated, QWidget):
+    """Plays the sounds one after the other, or says why nothing can be heard.
+
+    Parameters
+    ----------
+    sounds : Sounds
+    step_ms : int, optional
+        From one sound to the next.
+    """
+
+    def __init__(
+        self, sounds: Sounds, step_ms: int = STEP_MS, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._sounds = sounds
+        self._waiting: list[Sound] = []
+
+        # Widgets
+        self._button = PushButton()
+        self._button.setSizePolicy(FIXED, FIXED)
+        self._words = SignLabel()
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(step_ms)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._button)
+        layout.addWidget(self._words, 1)
+        layout.addStretch()
+
+        # Connections
+        self._button.clicked.connect(self._on_clicked)
+        self._timer.timeout.connect(self._play_next)
+
+        self._retranslate()
+
+    def words(self) -> str:
+        """Return what is said beside the button."""
+        return self._words.value().text
+
+    def stop(self) -> None:
+        """Play no more sounds."""
+        self._timer.stop()
+        self._waiting.clear()
+        self._words.set_value(Remark())
+
+    def _on_clicked(self) -> None:
+        self.stop()
+        silence = self._silence()
+        if silence:
+            self._words.set_value(Remark(silence, Sign.WARNING))
+            return
+        self._waiting = list(Sound)
+        self._play_next()
+
+    def _play_next(self) -> None:
+        if not self._waiting:
+            self._words.set_value(Remark())
+            return
+        sound = self._waiting.pop(0)
+        self._words.set_value(Remark(self._word(sound), Sign.PLAY))
+        self._sounds.play(sound)
+        self._timer.start()
+
+    def _silence(self) -> str:
+        """Return why nothing can be heard, a sentence; empty if it can."""
+        reason = self._sounds.why_silent()
+        if reason:
+            return self.tr(
+                "No sound here: {0}. All is shown in words and signs, too."
+            ).format(reason)
+        if isinstance(self._sounds, Mute) and self._sounds.muted:
+            return self.tr("Sounds are off. Press B to switch them on.")
+        return ""
+
+    def _word(self, sound: Sound) -> str:
+        return {
+            Sound.SEATED: self.tr("Tip seated"),
+            Sound.KEPT: self.tr("Image kept"),
+            Sound.FIELD_FULL: self.tr("Field full"),
+            Sound.LOST: self.tr("Tip slipped, or pen lost"),
+            Sound.CAPTURED: self.tr("All captured"),
+            Sound.DONE: self.tr("Done"),
+            Sound.FAILED: self.tr("Failed"),
+        }[sound]
+
+    def _retranslate(self) -> None:
+        self._button.setText(self.tr("Test the sounds"))
+        self._button.setToolTip(
+            self.tr("Plays what you will hear during the swing, one after the other.")
+        )

@@ -1,0 +1,1 @@
+"""The step Swing: the pen swung in the cone, guided."""

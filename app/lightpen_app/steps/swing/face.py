@@ -1,0 +1,191 @@
+"""What is seen of a swing: instruction, dial, count, state, image and plots."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QGridLayout,
+    QHBoxLayout,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.arrays import Image
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.swing.leaning_dial import LeaningDial
+from lightpen_app.steps.swing.plots_panel import SwingPlots
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.widgets.translated import Translated
+
+DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
+PROGRESS_STEPS = 1000
+NARROW, LOW = 100 * GRID, 56 * GRID  # px; less has its plots below the dial
+PLOTS_HEIGHT = 32 * GRID  # px, there
+ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
+
+
+class SwingFace(Translated, QWidget):
+    """Shows a swing at one moment.
+
+    Parameters
+    ----------
+    buttons : sequence of QPushButton
+        Put at the upper right.
+
+    Attributes
+    ----------
+    dial : LeaningDial
+    """
+
+    def __init__(
+        self, buttons: Sequence[QPushButton], parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._value = OperatorValue()
+        self._is_small = False
+
+        # Widgets
+        self._instruction = FittedText(TextSize.HUGE)
+        self._hint = FittedText(TextSize.LEAD)
+        self._verdict = StateBanner(TextSize.DISPLAY)
+        self._verdict.setMinimumHeight(10 * GRID)
+        self.dial = LeaningDial()
+        # As high as its place is; it draws itself as large as it can.
+        self.dial.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
+        self._count = FittedText(TextSize.DISPLAY)
+        self._note = text_label(TextSize.SMALL, Tone.QUIET)
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+        self._banner = StateBanner(TextSize.TITLE)
+        self._image = ImageView()
+        # Its height is that of the numbers beside it; the plots have the rest.
+        self._image.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
+        self._plots = SwingPlots()
+
+        # Layout
+        head = QHBoxLayout()
+        head.setSpacing(GRID)
+        head.addWidget(self._instruction, 1)
+        for button in buttons:
+            head.addWidget(button)
+        self._numbers = numbers = QVBoxLayout()
+        numbers.setSpacing(GRID)
+        numbers.addWidget(self._count)
+        numbers.addWidget(self._progress)
+        numbers.addWidget(self._note)
+        numbers.addStretch(1)
+        self._side = side = QGridLayout()
+        side.setSpacing(2 * GRID)
+        side.addLayout(numbers, 0, 0)
+        side.addWidget(self._image, 0, 1)
+        side.setColumnStretch(0, 1)
+        side.setColumnStretch(1, 1)
+        side.setRowStretch(0, 1)
+        self._content = Squeezed()
+        self._body = QGridLayout(self._content)
+        self._body.setContentsMargins(0, 0, 0, 0)
+        self._body.setHorizontalSpacing(3 * GRID)
+        self._body.setVerticalSpacing(GRID)
+        self._body.addWidget(self.dial, 0, 0)
+        self._body.addLayout(side, 0, 1)
+        self._body.setRowStretch(0, 1)
+        self._body.setColumnStretch(0, DIAL_SHARE)
+        self._body.setColumnStretch(1, SIDE_SHARE)
+        self._scroll = PageScroll()
+        self._scroll.setWidget(self._content)
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setVerticalSpacing(GRID)
+        layout.addWidget(self._hint, 1, 0)
+        layout.addWidget(self._verdict, 2, 0)
+        layout.addWidget(self._scroll, 3, 0)
+        # The last in the order of the Tab key: Enter must press a button of these only
+        # if somebody has chosen it.
+        layout.addLayout(head, 0, 0)
+        layout.setRowStretch(0, 1)
+        layout.setRowStretch(3, 10)
+
+        # Connections
+        self._scroll.height_changed.connect(self._hold_first_row)
+
+        self._verdict.hide()
+        self._use_room(QSize())
+        self._retranslate()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._use_room(event.size())
+
+    def value(self) -> OperatorValue:
+        """Return what is shown."""
+        return self._value
+
+    def set_value(
+        self, value: OperatorValue, note: str = "", *, is_verdict: bool = False
+    ) -> None:
+        """Show something else; a verdict has the whole width."""
+        self._value = value
+        self._instruction.set_text(value.instruction)
+        self._hint.set_text(value.hint, bold=False)
+        self._verdict.set_value(value.state)
+        self._banner.set_value(value.state)
+        self._banner.setVisible(not is_verdict)
+        self._verdict.setVisible(is_verdict)
+        self._count.set_text(value.count)
+        self._note.setText(note)
+        self._progress.setVisible(value.fraction is not None)
+        self._progress.setValue(round(PROGRESS_STEPS * (value.fraction or 0.0)))
+        if value.dial is not None:
+            self.dial.set_value(value.dial)
+
+    def set_image(self, half: Image, size: QSize, markers: Sequence[Marker]) -> None:
+        """Show a live image; see `ImageView.set_half`."""
+        self._image.set_half(half, size, markers)
+
+    def plots(self) -> SwingPlots:
+        """Return the plots."""
+        return self._plots
+
+    def _retranslate(self) -> None:
+        """Set the texts anew."""
+        self._image.set_message(self.tr("No image yet."))
+        self._progress.setAccessibleName(self.tr("Progress"))
+
+    def _use_room(self, size: QSize) -> None:
+        """Put the plots beside the dial, or below it where there is little room."""
+        is_small = size.width() < NARROW or size.height() < LOW
+        if is_small == self._is_small:
+            return
+        self._is_small = is_small
+        if is_small:
+            self._side.addWidget(self._banner, 1, 0, 1, 2)
+            self._body.addWidget(self._plots, 1, 0, 1, 2)
+        else:
+            self._numbers.addWidget(self._banner)
+            self._side.addWidget(self._plots, 1, 0, 1, 2)
+        self._side.setRowStretch(1, 0 if is_small else 2)
+        self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
+        self._hold_first_row(self._scroll.viewport().height())
+        self._plots.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
+        self._plots.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
+        self._content.set_squeezed(not is_small)
+        self._instruction.setMinimumHeight((5 if is_small else 7) * GRID)
+
+    def _hold_first_row(self, height: int) -> None:
+        """Let the dial and what is beside it be seen whole above the plots."""
+        self._body.setRowMinimumHeight(0, height if self._is_small else 0)

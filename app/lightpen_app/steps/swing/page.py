@@ -1,0 +1,347 @@
+"""The step Swing: from the seat to the verdict without a key."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.cameras.worker import Connection
+from lightpen.swing.kept_images import KeptImages
+from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
+from lightpen.swing.state import Happening, Pause, Phase, SwingEvent, SwingState
+from lightpen_app.look.phrases import lack_text, phrase
+from lightpen_app.look.sounds import Sound
+from lightpen_app.look.theme import GRID
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.steps.swing.face import SwingFace
+from lightpen_app.steps.swing.flow import SwingFlow
+from lightpen_app.steps.swing.hand_panel import HandPanel
+from lightpen_app.steps.swing.live_sight import SwingSight
+from lightpen_app.steps.swing.moment import Moment, SwingWords
+from lightpen_app.widgets.live_markers import live_markers
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.work.live_view import Shown
+
+SHOWING_MS = 50  # from a new state to what is shown; the states between make one
+PLOTTING_MS = 40  # from one plot to the next
+
+SOUNDS: dict[Happening, Sound] = {
+    Happening.SEATED: Sound.SEATED,
+    Happening.KEPT: Sound.KEPT,
+    Happening.FIELD_FULL: Sound.FIELD_FULL,
+    Happening.SLIPPED: Sound.LOST,
+    Happening.LOST: Sound.LOST,
+    Happening.CAPTURED: Sound.CAPTURED,
+    Happening.DONE: Sound.DONE,
+    Happening.FAILED: Sound.FAILED,
+}
+
+
+class SwingPage(Page):
+    """Shows a swing and leads it; nothing on it must be pressed.
+
+    Parameters
+    ----------
+    services : Services
+    """
+
+    key = "swing"
+
+    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench, self._sounds = services.workbench, services.sounds
+        self._run, self._live = self._workbench.run, self._workbench.live
+        self._flow = SwingFlow(self._workbench, self)
+        self._sight = SwingSight(self._run, self)
+        self._words = SwingWords(self)
+        self._solved = 0.0  # how far the tip is computed
+        self._measured: tuple[KeptImages, Shortfall] | None = None
+        self._said: tuple[MainAction, bool] | None = None
+        self._was_capturing = False
+        self._was_troubled = False
+        self._press_act: Callable[[], object] = self._flow.toggle_pause
+        self._on_yes: Callable[[], object] = self._run.finish
+
+        # Widgets
+        self._act = PushButton()
+        self._start_over = PushButton()
+        self._face = SwingFace((self._act, self._start_over), self)
+        self._hand = HandPanel(self._live, self)
+        self._question = QuestionBar()
+        self._showing = QTimer(self)
+        self._showing.setSingleShot(True)
+        self._showing.setInterval(SHOWING_MS)
+        self._plotting = QTimer(self)
+        self._plotting.setInterval(PLOTTING_MS)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._question)
+        layout.addWidget(self._face, 1)
+        layout.addWidget(self._hand)
+
+        # Connections
+        self._run.changed.connect(self._show_soon)
+        self._run.happened.connect(self._on_happened)
+        self._run.progressed.connect(self._on_progressed)
+        self._live.image_shown.connect(self._on_image_shown)
+        self._live.connection_changed.connect(self._on_connection_changed)
+        self._flow.changed.connect(self._on_flow_changed)
+        self._flow.troubled.connect(self.notice_raised)
+        self._sight.continued.connect(self._on_continued)
+        self._question.agreed.connect(self._on_question_agreed)
+        self._act.clicked.connect(self._on_act_clicked)
+        self._start_over.clicked.connect(self._on_start_over_clicked)
+        self._face.dial.leaned.connect(self._hand.lean)
+        self._hand.led_by_itself.connect(self._face.dial.forget_wish)
+        self._showing.timeout.connect(self._show)
+        self._plotting.timeout.connect(self._plot)
+
+        self._retranslate()
+
+    @override
+    def title(self) -> str:
+        return self.tr("Swing")
+
+    @override
+    def is_complete(self) -> bool:
+        return self._run.solution is not None
+
+    @override
+    def why_closed(self) -> str:
+        lacks = self._workbench.preparation.lacks()
+        return lack_text(lacks[0]) if lacks and self._run.state is None else ""
+
+    @override
+    def main_action(self) -> MainAction:
+        state = self._run.state
+        if state is None or (self._run.is_capturing and not state.n_kept):
+            why_not = self.tr("No image is kept yet.")
+            return MainAction(self.tr("Finish early"), why_not)
+        if self._run.is_capturing:
+            return MainAction(self.tr("Finish early"))
+        return MainAction(self.tr("Review"), self._why_no_review(state))
+
+    @override
+    def run_main_action(self) -> None:
+        if not self._run.is_capturing:
+            self.advance_requested.emit()
+            return
+        lacks = self._missing()
+        if lacks:
+            self._ask(
+                *(lacks, self.tr("Finish now"), self.tr("Go on swinging")),
+                self._run.finish,
+            )
+        else:
+            self._run.finish()
+
+    @override
+    def is_hands_free(self) -> bool:
+        return True
+
+    @override
+    def toggle_pause(self) -> None:
+        self._flow.toggle_pause()
+
+    @override
+    def entered(self) -> None:
+        if self._flow.has_other_choices:
+            self._ask(
+                self.tr(
+                    "Something else was chosen meanwhile. This swing goes on with the "
+                    "files, names and limits that it began with."
+                ),
+                self.tr("Start over with the new ones"),
+                self.tr("Go on with this swing"),
+                self._flow.start_over,
+            )
+            self._flow.keep_choices()
+        self._flow.enter()
+        self._show()
+        self._plotting.start()
+
+    @override
+    def left(self) -> None:
+        self._plotting.stop()
+        self._question.hide()
+        self._flow.leave()
+
+    @override
+    def unsaved(self) -> str:
+        state = self._run.state
+        if state is None or state.phase is Phase.VERDICT or not state.n_kept:
+            return ""
+        return self.tr(
+            "The swing is not finished. The images kept so far ({0}) are safe; it is "
+            "offered again at the next start."
+        ).format(state.n_kept)
+
+    @override
+    def shut_down(self) -> None:
+        self._plotting.stop()
+        self._showing.stop()
+
+    @override
+    def _retranslate(self) -> None:
+        self._question.hide()
+        self._start_over.setText(self.tr("Start over"))
+        self._start_over.setToolTip(
+            self.tr("Set this swing aside and begin anew. Its images are kept.")
+        )
+        self._show()
+
+    def _why_no_review(self, state: SwingState) -> str:
+        if self._run.is_solving:
+            return self.tr("The tip is being computed.")
+        if self._run.is_reading:
+            return self.tr("The swing goes on.")
+        if self._run.solution is not None:
+            return ""
+        if state.phase is Phase.VERDICT:
+            return self.tr("There is no tip to review: capture more, or start over.")
+        return self.tr("The tip is not computed yet.")
+
+    def _missing(self) -> str:
+        """Return what the swing lacks, in sentences."""
+        state, setup = self._run.state, self._run.setup
+        if state is None or setup is None:
+            return ""
+        lacks = missing(setup, state)
+        return " ".join(phrase(each, state.heading).hint for each in lacks)
+
+    def _moment(self) -> Moment | None:
+        state, setup = self._run.state, self._run.setup
+        if state is None or setup is None:
+            return None
+        if self._measured is None or self._measured[0] is not state.kept:
+            self._measured = state.kept, measure_shortfall(setup, state)
+        return Moment(
+            setup=setup,
+            state=state,
+            short=self._measured[1],
+            connection=self._live.connection,
+            seen=self._sight.words(),
+            is_troubled=self._flow.is_troubled,
+            solving=self._solved if self._run.is_solving else None,
+            verdict=self._run.verdict,
+            is_accepted=self._run.result is not None,
+            stillness=self._sight.stillness(),
+            is_simulated=self._live.operator is not None,
+        )
+
+    def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
+        self._on_yes = on_yes
+        self._question.set_words(text, yes, no)
+        self._question.ask()
+
+    def _show_soon(self) -> None:
+        if not self._showing.isActive():
+            self._showing.start()
+
+    def _show(self) -> None:
+        """Show what is the case now, here and in the operator view."""
+        moment = self._moment()
+        if moment is None:
+            value = self._words.waiting_value(self._flow.refusal)
+            self._face.set_value(value)
+        else:
+            value = self._words.operator_value(moment)
+            is_verdict = moment.state.phase is Phase.VERDICT
+            self._face.set_value(value, self._words.note(moment), is_verdict=is_verdict)
+            value = replace(value, dial=None) if is_verdict else value
+        self.operator_value_changed.emit(value)
+        self._face.dial.set_interactive(self._live.operator is not None)
+        text, self._press_act = self._offered()
+        self._act.setText(text)
+        if self._run.is_capturing is not self._was_capturing:
+            self._was_capturing = self._run.is_capturing
+            self._question.hide()
+        said = self.main_action(), self.is_complete()
+        if said != self._said:
+            self._said = said
+            self.changed.emit()
+
+    def _offered(self) -> tuple[str, Callable[[], object]]:
+        """Return what the button beside Start over does now."""
+        state = self._run.state
+        if state is None or self._run.is_capturing:
+            if self._live.connection is Connection.CLOSED:
+                return self.tr("Open the camera"), self._flow.try_again
+            if state is None:
+                return self.tr("Try again"), self._flow.try_again
+            if state.pause is Pause.BY_USER:
+                return self.tr("Go on (Space)"), self._flow.toggle_pause
+            return self.tr("Pause (Space)"), self._flow.toggle_pause
+        if self._run.is_solving:
+            return self.tr("Stop computing"), self._run.cancel
+        if state.phase is Phase.SOLVING:
+            return self.tr("Compute again"), self._run.solve
+        return self.tr("Capture more"), self._run.capture_more
+
+    def _plot(self) -> None:
+        state, setup = self._run.state, self._run.setup
+        if state is not None and setup is not None:
+            self._face.plots().show_next(state, setup.limits.max_uncertainty)
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        self._sight.take(shown)
+        if self.isVisible():
+            rings = (replace(ring, label="") for ring in live_markers(shown.seen))
+            self._face.set_image(shown.half, shown.size, tuple(rings))
+        self._show_soon()
+
+    def _on_happened(self, event: SwingEvent) -> None:
+        moment = self._moment()
+        progress = 0.0
+        if moment is not None:
+            n_kept = moment.state.n_kept
+            progress = n_kept / max(n_kept + moment.short.n_more, 1)
+        self._sounds.play(SOUNDS[event.what], progress)
+
+    def _on_connection_changed(self, connection: Connection) -> None:
+        if connection is Connection.LOST and self._run.is_capturing:
+            self._sounds.play(Sound.LOST)
+        self._show_soon()
+
+    def _on_flow_changed(self) -> None:
+        if self._flow.is_troubled and not self._was_troubled:
+            self._sounds.play(Sound.LOST)
+        self._was_troubled = self._flow.is_troubled
+        self._show_soon()
+
+    def _on_progressed(self, fraction: float) -> None:
+        self._solved = fraction
+        self._show_soon()
+
+    def _on_continued(self) -> None:
+        if self.isVisible() and not self.main_action().why_not:
+            self.advance_requested.emit()
+
+    def _on_question_agreed(self) -> None:
+        self._on_yes()
+
+    def _on_act_clicked(self) -> None:
+        self._press_act()
+
+    def _on_start_over_clicked(self) -> None:
+        state = self._run.state
+        if state is None or self._run.result is not None:
+            self._flow.start_over()
+            return
+        text = self.tr(
+            "Begin anew? The images of this swing ({0}) are set aside; they stay on "
+            "the disk."
+        )
+        self._ask(
+            text.format(state.n_kept),
+            self.tr("Begin anew"),
+            self.tr("Go on with this swing"),
+            self._flow.start_over,
+        )

@@ -1,0 +1,131 @@
+"""The plots that grow while the pen is swung."""
+
+from collections import deque
+
+import numpy as np
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from lightpen.arrays import FloatArray
+from lightpen.swing.kept_images import KeptImages
+from lightpen.swing.seat import tip_offsets
+from lightpen.swing.state import SwingState
+from lightpen_app.look.quantities import MICROMETRES
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+from lightpen_app.widgets.translated import Translated
+
+TAIL = 0.75  # of the estimates; the first ones are far off
+LEAST_HEIGHT = 10 * GRID
+
+
+class SwingPlots(Translated, QWidget):
+    """Misfit and tip of each image, the estimate of the tip, and its uncertainty."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._shown: dict[TracePlot, SwingState] = {}
+        self._limit: float | None = None  # of U, µm
+
+        # Widgets
+        self._misfit = TracePlot(Axes(""), [Curve("misfit_px")], y_zero=True)
+        self._scatter = TracePlot(
+            Axes(""), [Curve("u_um", "u"), Curve("v_um", "v"), Curve("w_um", "w")]
+        )
+        self._estimate = TracePlot(
+            Axes(""),
+            [Curve("x_um", "x"), Curve("y_um", "y"), Curve("z_um", "z")],
+            tail=TAIL,
+        )
+        self._uncertainty = TracePlot(
+            Axes(""), [Curve("expanded_uncertainty_um")], y_log=True
+        )
+
+        # Layout
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._misfit, 0, 0)
+        layout.addWidget(self._scatter, 0, 1)
+        layout.addWidget(self._estimate, 1, 0)
+        layout.addWidget(self._uncertainty, 1, 1)
+        for plot in self.plots():
+            plot.setMinimumHeight(LEAST_HEIGHT)
+
+        self._turns = deque(
+            zip(
+                self.plots(),
+                (
+                    self._show_misfit,
+                    self._show_scatter,
+                    self._show_estimate,
+                    self._show_uncertainty,
+                ),
+                strict=True,
+            )
+        )
+        self._retranslate()
+
+    def plots(self) -> tuple[TracePlot, ...]:
+        """Return the plots: misfit, scatter, estimate and uncertainty."""
+        return self._misfit, self._scatter, self._estimate, self._uncertainty
+
+    def show_next(self, state: SwingState, max_uncertainty: float) -> None:
+        """Show how a swing went so far in the plot whose turn it is.
+
+        One at a time, so that the window is never held up by all of them.
+
+        Parameters
+        ----------
+        state : SwingState
+        max_uncertainty : float
+            The limit of U, mm.
+        """
+        plot, show = self._turns[0]
+        self._turns.rotate(-1)
+        if self._shown.get(plot) is not state:
+            self._shown[plot] = state
+            show(state, max_uncertainty)
+
+    def _show_misfit(self, state: SwingState, _max_uncertainty: float) -> None:
+        self._misfit.set_data(_numbers(state.kept), state.kept.misfits)
+
+    def _show_scatter(self, state: SwingState, _max_uncertainty: float) -> None:
+        kept = state.kept
+        offsets: FloatArray = np.zeros((len(kept), 3))
+        if kept.seat is not None:
+            offsets = tip_offsets(kept.seat, kept.rotations, kept.translations)
+        self._scatter.set_data(_numbers(kept), *(MICROMETRES * offsets.T))
+
+    def _show_estimate(self, state: SwingState, _max_uncertainty: float) -> None:
+        trace = state.trace
+        changes = trace.tips - trace.tips[-1:]
+        self._estimate.set_data(
+            trace.n_images.astype(np.float64), *(MICROMETRES * changes.T)
+        )
+
+    def _show_uncertainty(self, state: SwingState, max_uncertainty: float) -> None:
+        trace = state.trace
+        self._limit = MICROMETRES * max_uncertainty
+        self._show_limit()
+        finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
+        self._uncertainty.set_data(
+            trace.n_images.astype(np.float64), MICROMETRES * finite
+        )
+
+    def _show_limit(self) -> None:
+        if self._limit is not None:
+            words = self.tr("limit {0}").format(f"{self._limit:g}")
+            self._uncertainty.set_limit(self._limit, words)
+
+    def _retranslate(self) -> None:
+        """Set the titles anew."""
+        self._misfit.set_axes(Axes(self.tr("Misfit of each image / px")))
+        self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
+        self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
+        self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
+        self._show_limit()
+
+
+def _numbers(kept: KeptImages) -> FloatArray:
+    """Return the numbers (N,) of kept images."""
+    return kept.numbers.astype(np.float64)

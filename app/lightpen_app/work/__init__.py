@@ -1,0 +1,1 @@
+"""What runs behind the window, as objects of Qt; no rules of its own."""

@@ -1,0 +1,331 @@
+"""What the pages share: what was chosen, the live images, and the swing."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+from PySide6.QtCore import QObject, QThreadPool, Signal
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.errors import FileError, LightpenError
+from lightpen.live.preparation import (
+    CameraFile,
+    PenFile,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.live.sources import Surroundings, camera_of
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
+from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.swing_run import SwingRun
+
+SAMPLES = "simulated"  # folder of the files that go with the simulated camera
+
+
+class Workbench(QObject):
+    """The preparation as it is now; each choice is remembered for its station.
+
+    Parameters
+    ----------
+    settings : Settings
+    folder : Path
+        For records, results and sample files.
+    around : Surroundings, optional
+
+    Attributes
+    ----------
+    live : LiveView
+    run : SwingRun
+
+    Signals
+    -------
+    changed()
+        `preparation` is different.
+    troubled(str)
+        A sentence to be read.
+    """
+
+    changed = Signal()
+    troubled = Signal(str)
+
+    def __init__(
+        self,
+        settings: Settings,
+        folder: Path,
+        around: Surroundings | None = None,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._settings = settings
+        self._folder = folder
+        self._around = around or Surroundings()
+        self._preparation = Preparation()
+        self._camera_settings = CameraSettings()
+        self._is_started = False
+        self.live = LiveView(self)
+        self.run = SwingRun(self.live, folder, self)
+
+        # Connections
+        self.live.image_shown.connect(self._on_image_shown)
+        self.live.settings_applied.connect(self._on_settings_applied)
+        self.live.troubled.connect(self.troubled)
+        self.live.failed.connect(self.troubled)
+        self.run.troubled.connect(self.troubled)
+
+    @property
+    def preparation(self) -> Preparation:
+        """What was chosen so far."""
+        return self._preparation
+
+    @property
+    def around(self) -> Surroundings:
+        """What simulated and recorded sources go by."""
+        return self._around
+
+    def start(self) -> None:
+        """Take over what was chosen last, and open the camera."""
+        self.choose_station(self._settings.last_station())
+        now = self._preparation
+        simulated = now.source.kind is SourceKind.SIMULATED
+        if simulated and now.camera_file is None and now.pen_file is None:
+            try:
+                self.use_sample_files()
+            except FileError as error:
+                self.troubled.emit(str(error))
+        self.open_camera()
+
+    def stations(self) -> tuple[str, ...]:
+        """Return the names of the stations that are known."""
+        return self._settings.stations()
+
+    def choose_station(self, name: str) -> None:
+        """Take over what was chosen last at a station."""
+        station = self._settings.station(name) if name else Station()
+        before = self._preparation
+        camera_file, pen_file = self._files(station)
+        self._preparation = replace(
+            before,
+            names=Names(
+                name,
+                *(station.operator, station.pen, station.tip, station.cone),
+                station.ball_diameter or None,
+            ),
+            nominal_tip=_parse_point(station.nominal_tip),
+            source=_source(station),
+            camera_file=camera_file,
+            pen_file=pen_file,
+            mask=_parse_circles(station.mask),
+            limits=_limits(station),
+        )
+        self._camera_settings = CameraSettings(
+            exposure_us=_given(station.exposure_us), gain_db=_given(station.gain_db)
+        )
+        self._remember_station()
+        self._follow(before)
+        if self._preparation.source == before.source:
+            self._set_camera()
+
+    def set_preparation(self, preparation: Preparation) -> None:
+        """Take over other choices, and remember them for the station."""
+        before, self._preparation = self._preparation, preparation
+        self._remember_station()
+        self._remember()
+        self._follow(before)
+
+    def open_camera(self) -> None:
+        """Open the source, or open it again after it failed; then follow its choice.
+
+        A swing that is captured goes on with it.
+        """
+        self._is_started = True
+        if self._preparation.source.kind is SourceKind.RECORDED and not (
+            self._preparation.source.place
+        ):
+            self.live.close()
+            return
+        camera = camera_of(self._preparation.source, self._around)
+        self.live.open(camera, self._camera_settings, self._around.clock)
+
+    def use_sample_files(self) -> None:
+        """Choose the files that go with the simulated camera.
+
+        Raises
+        ------
+        FileError
+            They cannot be written.
+        """
+        files = write_sample_files(self._around.scene, self._folder / SAMPLES)
+        self.set_preparation(
+            replace(
+                self._preparation,
+                camera_file=CameraFile.read(files.camera),
+                pen_file=PenFile.read(files.pen),
+            )
+        )
+
+    def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
+        """Close the camera, cancel what is under way, and wait until all has ended.
+
+        Returns
+        -------
+        bool
+            Whether it has, the jobs of all pages included. What goes on may be left
+            behind: all that was acknowledged is on the disk.
+        """
+        deadline = monotonic() + timeout_s
+        self.run.shut_down()
+        self.live.close()
+        jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
+        return self.live.await_closed(max(0.0, deadline - monotonic())) and jobs_ended
+
+    def _files(self, station: Station) -> tuple[CameraFile | None, PenFile | None]:
+        """Read the files of a station; what cannot be read must be chosen again."""
+        camera_file, pen_file = None, None
+        if station.camera_file:
+            try:
+                camera_file = CameraFile.read(Path(station.camera_file))
+            except LightpenError as error:
+                self.troubled.emit(str(error))
+        if station.pen_file:
+            try:
+                units = station.pen_units or None
+                pen_file = PenFile.read(Path(station.pen_file), units)
+            except LightpenError as error:
+                self.troubled.emit(str(error))
+        return camera_file, pen_file
+
+    def _follow(self, before: Preparation) -> None:
+        """Let the camera and its images follow the choices."""
+        now = self._preparation
+        if now.source != before.source:
+            self._preparation = now = replace(now, image_size=None)
+            if self.run.is_capturing:  # other images are not of this swing
+                self.run.abandon()
+            if self._is_started:
+                self.open_camera()
+        self.live.set_aim(now.aim)
+        self.changed.emit()
+
+    def _set_camera(self) -> None:
+        """Let a camera that stays open have the exposure and gain of the station."""
+        caps, wanted = self.live.caps, self._camera_settings
+        if caps is None:
+            return
+        if caps.exposure_us is not None and wanted.exposure_us is not None:
+            self.live.set_exposure(wanted.exposure_us)
+        if caps.gain_db is not None and wanted.gain_db is not None:
+            self.live.set_gain(wanted.gain_db)
+
+    def _remember_station(self) -> None:
+        station = self._preparation.names.station
+        if not station:
+            return
+        try:
+            self._settings.set_last_station(station)
+        except LightpenError as error:
+            self.troubled.emit(str(error))
+
+    def _remember(self) -> None:
+        now = self._preparation
+        names = now.names
+        if not names.station:
+            return
+        camera_file = now.camera_file
+        pen_file = now.pen_file
+        nan = math.nan
+        exposure_us, gain_db = (
+            self._camera_settings.exposure_us,
+            self._camera_settings.gain_db,
+        )
+        station = Station(
+            operator=names.operator,
+            pen=names.pen,
+            tip=names.tip,
+            cone=names.cone,
+            ball_diameter=names.ball_diameter or 0.0,
+            nominal_tip=_point_text(now.nominal_tip),
+            source=now.source.kind,
+            source_place=now.source.place,
+            camera_file="" if camera_file is None else str(camera_file.path),
+            pen_file="" if pen_file is None else str(pen_file.path),
+            pen_units="" if pen_file is None else pen_file.units or "",
+            mask=_circles_text(now.mask),
+            exposure_us=nan if exposure_us is None else exposure_us,
+            gain_db=nan if gain_db is None else gain_db,
+            max_uncertainty=now.limits.max_uncertainty,
+            min_images=now.limits.min_images,
+            max_images=now.limits.max_images,
+        )
+        try:
+            self._settings.set_station(names.station, station)
+        except LightpenError as error:
+            self.troubled.emit(str(error))
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        size = shown.size.width(), shown.size.height()
+        if size != self._preparation.image_size:
+            self._preparation = replace(self._preparation, image_size=size)
+            self.changed.emit()
+
+    def _on_settings_applied(self, settings: CameraSettings) -> None:
+        before = self._camera_settings  # stays for what a recording has not
+        exposure_us, gain_db = settings.exposure_us, settings.gain_db
+        self._camera_settings = CameraSettings(
+            exposure_us=before.exposure_us if exposure_us is None else exposure_us,
+            gain_db=before.gain_db if gain_db is None else gain_db,
+        )
+        self._remember()
+
+
+def _limits(station: Station) -> SwingLimits:
+    """Return the limits of a station, the usual ones if its own make no sense."""
+    try:
+        return SwingLimits(
+            station.max_uncertainty, station.min_images, station.max_images
+        )
+    except ValueError:
+        return SwingLimits()
+
+
+def _source(station: Station) -> SourceChoice:
+    try:
+        return SourceChoice(SourceKind(station.source), station.source_place)
+    except ValueError:  # of a later version
+        return SourceChoice()
+
+
+def _given(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _point_text(point: FloatArray | None) -> str:
+    return "" if point is None else " ".join(map(repr, point.tolist()))
+
+
+def _parse_point(text: str) -> FloatArray | None:
+    point = _parse_numbers(text)
+    return point if point.shape == (3,) else None
+
+
+def _circles_text(mask: FloatArray) -> str:
+    return "; ".join(" ".join(map(repr, circle)) for circle in mask.tolist())
+
+
+def _parse_circles(text: str) -> FloatArray:
+    circles = [_parse_numbers(part) for part in text.split(";")]
+    return np.array([c for c in circles if c.shape == (3,)]).reshape(-1, 3)
+
+
+def _parse_numbers(text: str) -> FloatArray:
+    try:
+        numbers = np.array([float(word) for word in text.split()])
+    except ValueError:
+        return np.zeros(0)
+    return numbers if np.isfinite(numbers).all() else np.zeros(0)

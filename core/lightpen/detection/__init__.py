@@ -1,0 +1,1 @@
+"""What one image shows: spots, which LED each is, the pose of the pen."""

@@ -1,0 +1,193 @@
+"""What a live image says of the set-up: exposure, focus and stray light."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.labelling.labels import Labels
+from lightpen.detection.spots import SATURATED_LEVEL, Flaw, Spots
+
+DARK_PEAK = 0.25  # of the full range; noise then costs more than it need
+SHARP_EDGE = 3.5  # px from dark to bright; a sharp lens and 20 ms of stillness give 2
+STRAY_MARGIN = 1.5  # times the radius of a stray spot that is masked
+SEARCHED_IMAGES = 10
+STRAY_SHARE = 0.5  # of the images; mains light flickers, noise is seen in one only
+SAME_SPOT = 2.0  # px between the centres of a spot in two images, at least
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """How bright the LEDs of an image are.
+
+    Attributes
+    ----------
+    peaks : tuple of float
+        Of each LED, as a fraction of the full scale; 1 where it is clipped.
+    are_leds : bool
+        False where no LED could be told, and these are of all that is bright.
+    """
+
+    peaks: tuple[float, ...] = ()
+    are_leds: bool = True
+
+    @property
+    def n_dark(self) -> int:
+        """LEDs below `DARK_PEAK`."""
+        return sum(peak < DARK_PEAK for peak in self.peaks)
+
+    @property
+    def n_saturated(self) -> int:
+        """LEDs that reach the full scale."""
+        return sum(peak >= SATURATED_LEVEL for peak in self.peaks)
+
+    @property
+    def n_good(self) -> int:
+        """LEDs between the two."""
+        return len(self.peaks) - self.n_dark - self.n_saturated
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """Exposure and focus of one image.
+
+    Attributes
+    ----------
+    exposure : Exposure
+        Of the LEDs; of all spots where no LED is labelled.
+    edge_width : float
+        Median width of their rims from dark to bright, px; NaN without any.
+    """
+
+    exposure: Exposure
+    edge_width: float
+
+    @property
+    def is_sharp(self) -> bool:
+        """Whether the rims are as sharp as good centres need."""
+        return is_sharp(self.edge_width)
+
+
+def is_sharp(edge_width: float) -> bool:
+    """Return whether rims of this width, px, are as sharp as good centres need."""
+    return edge_width <= SHARP_EDGE
+
+
+def inspect(spots: Spots, labels: Labels | None = None) -> Inspection:
+    """Inspect the LEDs of an image, or all its spots where none are labelled.
+
+    Parameters
+    ----------
+    spots : Spots
+    labels : Labels, optional
+    """
+    are_leds = labels is not None and bool((labels.spot >= 0).any())
+    chosen: IntArray = np.arange(len(spots))
+    if labels is not None and are_leds:
+        chosen = labels.spot[labels.spot >= 0]
+    clipped = (spots.flaws[chosen] & Flaw.SATURATED) > 0
+    peaks = np.where(clipped, 1.0, spots.contrasts[chosen])
+    widths = spots.edge_widths[chosen]
+    return Inspection(
+        exposure=Exposure(tuple(peaks.tolist()), are_leds),
+        edge_width=float(np.median(widths)) if len(widths) else float("nan"),
+    )
+
+
+def stray_light(spots: Spots) -> FloatArray:
+    """Return circles that cover the spots of an image of the covered pen.
+
+    Parameters
+    ----------
+    spots : Spots
+        All that is bright while no LED can be seen.
+
+    Returns
+    -------
+    (M, 3) array
+        Centre x, y and radius, px; the ``mask`` of
+        `lightpen.detection.spots.detect_spots`.
+    """
+    radii = 2 * np.sqrt(np.linalg.eigvalsh(spots.shapes)[:, -1])
+    return np.column_stack([spots.centers, STRAY_MARGIN * radii + spots.edge_widths])
+
+
+def lasting_light(images: Sequence[Spots]) -> FloatArray:
+    """Return circles that cover what is bright in half of some images or more.
+
+    Parameters
+    ----------
+    images : sequence of Spots
+        All that is bright in each while no LED can be seen.
+
+    Returns
+    -------
+    (M, 3) array
+        As `stray_light`; each circle covers its spot in all of the images.
+    """
+    circles = np.concatenate([np.zeros((0, 3)), *map(stray_light, images)])
+    of_image = np.repeat(np.arange(len(images)), [len(spots) for spots in images])
+    left = np.ones(len(circles), dtype=bool)
+    found = []
+    for i, (x, y, radius) in enumerate(circles):
+        if not left[i]:
+            continue
+        distances = np.hypot(circles[:, 0] - x, circles[:, 1] - y)
+        same = left & (distances <= max(radius / STRAY_MARGIN, SAME_SPOT))
+        left &= ~same
+        if len(np.unique(of_image[same])) >= max(STRAY_SHARE * len(images), 1):
+            found.append(_hull(circles[same]))
+    return np.array(found).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class StraySearch:
+    """A search for stray light, image by image, while the pen is covered.
+
+    Attributes
+    ----------
+    images : tuple of Spots
+        What was bright in the images so far.
+    n_with_pen : int
+        Images of them that show the pen all the same.
+    """
+
+    images: tuple[Spots, ...] = ()
+    n_with_pen: int = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether enough images were searched."""
+        return len(self.images) >= SEARCHED_IMAGES
+
+    @property
+    def shows_pen(self) -> bool:
+        """Whether the pen is not covered, so that its LEDs are among the spots."""
+        return self.n_with_pen >= max(STRAY_SHARE * len(self.images), 1)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether nothing at all was bright, nor moved, in most images."""
+        n_lit = sum(len(spots) > 0 for spots in self.images)
+        return n_lit < max(STRAY_SHARE * len(self.images), 1)
+
+    def fed(self, spots: Spots, *, shows_pen: bool) -> Self:
+        """Return the search after another image."""
+        return replace(
+            self,
+            images=(*self.images, spots),
+            n_with_pen=self.n_with_pen + shows_pen,
+        )
+
+    def circles(self) -> FloatArray:
+        """Return what to mask, (M, 3): see `lasting_light`; nothing beside the pen."""
+        return np.zeros((0, 3)) if self.shows_pen else lasting_light(self.images)
+
+
+def _hull(circles: FloatArray) -> FloatArray:
+    """Return a circle about the mean centre that holds all of these."""
+    center = circles[:, :2].mean(axis=0)
+    offsets = np.linalg.norm(circles[:, :2] - center, axis=1)
+    return np.append(center, (offsets + circles[:, 2]).max())

@@ -1,0 +1,138 @@
+"""A pen as a pattern of LEDs: its triangles and its near-symmetries."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations, permutations
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import fit_rigid
+
+MIN_LEDS = 6  # 6 spots leave 6 equations over to check the 6 unknowns of a pose
+MIN_HEIGHT = 0.05  # of a triangle over its longest side; flatter ones fix no pose
+LOOKALIKE = 0.025  # of the pen's size, within which an LED stands in for another
+MAX_TRIANGLES = 120  # whose copies are sought in the pen
+ALIKE_NORMALS = 0.9  # cosine
+
+
+@dataclass(frozen=True, eq=False)
+class Constellation:
+    """What the search for a pen needs to know about it, worked out once per pen.
+
+    Attributes
+    ----------
+    leds, normals : (L, 3) array
+        Centres, mm, and unit normals of the discs in the pen frame.
+    radius : float
+        Radius of the discs, mm.
+    min_leds : int
+        LEDs to be explained before a labelling is believed.
+    triples : (Q, 3) array
+        All ordered triples of LEDs that form a triangle.
+    sides : (Q, 3) array
+        Sides 01, 02, 12 of the triangles, mm.
+    self_rotations, self_translations : (M, 3, 3) array, (M, 3) array
+        Motions of the pen frame that put at least ``min_leds`` LEDs nearly where other
+        LEDs were, discs facing alike. Empty for a pen without near-symmetry.
+    """
+
+    leds: FloatArray
+    normals: FloatArray
+    radius: float
+    min_leds: int
+    triples: IntArray
+    sides: FloatArray
+    self_rotations: FloatArray
+    self_translations: FloatArray
+
+    @property
+    def size(self) -> float:
+        """Longest distance between two LEDs, mm."""
+        return float(self.sides.max())
+
+
+@lru_cache(maxsize=16)
+def constellation_of(pen: Pen) -> Constellation:
+    """Return the constellation of a pen.
+
+    Parameters
+    ----------
+    pen : Pen
+        With at least four LEDs, not all on one line.
+
+    Returns
+    -------
+    Constellation
+    """
+    if pen.n_leds < 4:
+        raise ValueError(f"`pen` must have at least 4 LEDs, got {pen.n_leds}.")
+    triples = np.array(list(permutations(range(pen.n_leds), 3)))
+    sides = _sides(pen.leds[triples])
+    triangles = _heights(pen.leds[triples]) > MIN_HEIGHT * sides.max(axis=1)
+    if not triangles.any():
+        raise ValueError("`pen` must not have all its LEDs on one line.")
+    triples, sides = triples[triangles], sides[triangles]
+    min_leds = min(MIN_LEDS, pen.n_leds)
+    rotations, translations = _self_motions(pen, triples, sides, min_leds)
+    return Constellation(
+        leds=pen.leds,
+        normals=pen.normals,
+        radius=pen.diameter / 2,
+        min_leds=min_leds,
+        triples=triples,
+        sides=sides,
+        self_rotations=rotations,
+        self_translations=translations,
+    )
+
+
+def _sides(corners: FloatArray) -> FloatArray:
+    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
+    sides: FloatArray = np.linalg.norm(np.stack([a - b, a - c, b - c], -2), axis=-1)
+    return sides
+
+
+def _heights(corners: FloatArray) -> FloatArray:
+    """Return the height of triangles over their longest side."""
+    along = corners[:, 1] - corners[:, 0]
+    doubled_area = np.linalg.norm(
+        np.cross(along, corners[:, 2] - corners[:, 0]), axis=1
+    )
+    heights: FloatArray = doubled_area / np.maximum(_sides(corners).max(axis=1), 1e-300)
+    return heights
+
+
+def _self_motions(
+    pen: Pen, triples: IntArray, sides: FloatArray, min_leds: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the motions, other than none, that lay LEDs of the pen onto LEDs."""
+    known = {tuple(triple) for triple in triples.tolist()}
+    bases = np.array([t for t in combinations(range(pen.n_leds), 3) if t in known])
+    heights = _heights(pen.leds[bases])
+    # A triangle that fixes the motion well; all of them where the pen has few.
+    bases = bases[np.argsort(-heights, kind="stable")][:MAX_TRIANGLES]
+    reach = LOOKALIKE * sides.max()
+    difference = np.abs(_sides(pen.leds[bases])[:, None] - sides[None])
+    base, copy = np.nonzero((difference < 2 * reach).all(axis=-1))
+    moved = (bases[base] != triples[copy]).any(axis=1)
+    base, copy = base[moved], copy[moved]
+    seen: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
+    R, t = fit_rigid(pen.leds[bases[base]], pen.leds[triples[copy]])
+    there = pen.leds @ np.swapaxes(R, 1, 2) + t[:, None]
+    gaps = np.linalg.norm(there[:, :, None] - pen.leds, axis=-1)
+    partner = np.where(gaps.min(axis=2) < reach, gaps.argmin(axis=2), -1)
+    normals = pen.normals @ np.swapaxes(R, 1, 2)
+    alike = np.einsum("mli,mli->ml", normals, pen.normals[partner]) > ALIKE_NORMALS
+    partner = np.where(alike, partner, -1)
+    moving = (partner >= 0) & (partner != np.arange(pen.n_leds))
+    kept = ((partner >= 0).sum(axis=1) >= min_leds) & moving.any(axis=1)
+    for which in np.flatnonzero(kept):
+        seen.setdefault(tuple(partner[which].tolist()), (R[which], t[which]))
+    if not seen:
+        return np.empty((0, 3, 3)), np.empty((0, 3))
+    return (
+        np.stack([motion[0] for motion in seen.values()]),
+        np.stack([motion[1] for motion in seen.values()]),
+    )

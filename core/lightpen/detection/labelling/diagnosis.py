@@ -1,0 +1,162 @@
+"""Why LEDs are not found where the pen file has them: the likely cause, in words."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.detection.labelling.constellation import constellation_of
+from lightpen.detection.labelling.labels import MODERATE, label_images
+from lightpen.detection.spots import Spots
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+
+N_DIAGNOSED = 4  # images
+MOSTLY = 0.8  # of the spots that may be LEDs
+UNIT_FACTORS = (1000.0, 0.001, 25.4, 1 / 25.4, 10.0, 0.1, 100.0, 0.01)
+DISC_FACTORS = (0.6, 1.6, 0.4, 2.5)
+FOCAL_FACTORS = (0.9, 1.1, 0.8, 1.25, 0.7, 1.4, 0.5, 2.0)
+
+
+def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> str:
+    """Name the likely cause why LEDs are not found where the pen file has them.
+
+    Pens and cameras with one thing changed are tried on a few images; the first that
+    explains clearly more spots tells.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    camera : Camera
+    pen : Pen
+
+    Returns
+    -------
+    str
+        Some sentences for the user, what was found and what to do; empty if most
+        spots are LEDs of the pen.
+    """
+    needed = constellation_of(pen).min_leds
+    counts = np.array([len(s) for s in spots])
+    if 2 * np.sum(counts >= needed) < len(spots):
+        return (
+            f"Most images show fewer than {needed} spots (median "
+            f"{np.median(counts):.0f}); of the {pen.n_leds} LEDs of the pen {needed} "
+            "must be seen. Check that the LEDs are lit and in the image, and the "
+            "exposure."
+        )
+    sample = _Sample.of(spots, camera, pen)
+    if sample.is_explained:
+        return ""
+    for wrong in (_mirror, _unit, _disc, _focal_length):
+        sentence = wrong(camera, pen, sample.fits)
+        if sentence:
+            return sentence
+    return (
+        f"Most images show {needed} or more spots, but these do not fit the pen file "
+        f"with its {pen.n_leds} LEDs. Check that it is the file of this pen and that "
+        "the camera file belongs to these images."
+    )
+
+
+def diagnose_mirror(spots: Sequence[Spots], camera: Camera, pen: Pen) -> str:
+    """Say so if the mirror image of the pen explains clearly more of the spots.
+
+    A pen that is symmetric but for a few LEDs lets most LEDs of its mirror image be
+    labelled, so this is worth a look where some LEDs are missing in all images.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    camera : Camera
+    pen : Pen
+
+    Returns
+    -------
+    str
+        Sentences for the user, or empty.
+    """
+    sample = _Sample.of(spots, camera, pen)
+    return "" if sample.is_explained else _mirror(camera, pen, sample.fits)
+
+
+_Fits = Callable[[Camera, Pen], bool]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sample:
+    """A few images, and how many of their spots the pen explains."""
+
+    spots: list[Spots]
+    n_possible: int
+    n_explained: int
+
+    @classmethod
+    def of(cls, spots: Sequence[Spots], camera: Camera, pen: Pen) -> "_Sample":
+        needed = constellation_of(pen).min_leds
+        # The images with the fewest spots have the least clutter.
+        some = sorted((s for s in spots if len(s) >= needed), key=len)[:N_DIAGNOSED]
+        return cls(
+            some,
+            sum(min(len(s), pen.n_leds) for s in some),
+            _n_explained(some, camera, pen),
+        )
+
+    @property
+    def is_explained(self) -> bool:
+        return self.n_explained > MOSTLY * self.n_possible
+
+    def fits(self, camera: Camera, pen: Pen) -> bool:
+        """Return whether this camera and pen explain the spots, and clearly better."""
+        n = _n_explained(self.spots, camera, pen)
+        return n > MOSTLY * self.n_possible and n >= self.n_explained + len(self.spots)
+
+
+def _n_explained(spots: Sequence[Spots], camera: Camera, pen: Pen) -> int:
+    labels = label_images(spots, camera, pen, MODERATE)
+    return sum(int((label.spot >= 0).sum()) for label in labels)
+
+
+def _mirror(camera: Camera, pen: Pen, fits: _Fits) -> str:
+    for sign, name in (([-1.0, 1.0, 1.0], "x"), ([1.0, 1.0, -1.0], "z")):
+        if fits(camera, replace(pen, leds=pen.leds * np.array(sign))):
+            return (
+                "The images fit the mirror image of the pen: with the opposite sign of "
+                f"{name} its LEDs match. Change the sign of {name} in the pen file."
+            )
+    return ""
+
+
+def _unit(camera: Camera, pen: Pen, fits: _Fits) -> str:
+    for factor in UNIT_FACTORS:
+        if fits(camera, replace(pen, leds=pen.leds * factor)):
+            return (
+                f"The images fit LED coordinates {factor:g} times those of the pen "
+                "file. Check its unit: millimetres are needed."
+            )
+    return ""
+
+
+def _disc(camera: Camera, pen: Pen, fits: _Fits) -> str:
+    for factor in DISC_FACTORS:
+        if fits(camera, replace(pen, diameter=pen.diameter * factor)):
+            return (
+                f"The LEDs look about {factor:g} times as large as the pen file says "
+                f"({pen.diameter:g} mm). Check the disc diameter and the unit of the "
+                "coordinates."
+            )
+    return ""
+
+
+def _focal_length(camera: Camera, pen: Pen, fits: _Fits) -> str:
+    for factor in FOCAL_FACTORS:
+        changed = replace(camera, fx=camera.fx * factor, fy=camera.fy * factor)
+        if fits(changed, pen):
+            return (
+                f"The images fit the pen with about {factor:g} times the focal length "
+                "of the camera file. Choose the file of this camera and lens, or "
+                "calibrate the camera again."
+            )
+    return ""

@@ -1,0 +1,301 @@
+"""Poses that a pen may have, guessed from a few of its spots.
+
+A triple of spots is supposed to be a triple of LEDs, which fixes up to four poses.
+There are hundreds of triples of LEDs; the size of a spot tells its distance, and with
+it the sides of the triangle, so the likeliest can be tried first.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.labelling.constellation import Constellation
+from lightpen.detection.labelling.matching import (
+    AREA_RANGE,
+    MIN_FACING,
+    Candidates,
+    fit,
+    join,
+    match,
+)
+from lightpen.detection.labelling.p3p import solve_p3p
+from lightpen.detection.labelling.spot_arrays import SpotArrays
+from lightpen.model.ellipse import disc_images
+
+MAX_SPOTS = 14  # of which triples are made
+MAX_GAP = 1.15  # between two LEDs, over the size of the pen
+MIN_AREA = 0.1  # of a triangle of spots over that of the pen's largest, seen face on
+RANGE_SIGMA = 0.02  # of the distance told by one spot, relative
+SCALE_SIGMA = 0.1  # of all distances alike: blur, threshold, disc diameter
+COARSE_SHAPE_TOLERANCE = 0.25  # difference of shapes over their trace
+TINY = 1e-12  # px^2, keeps the shape of a point from dividing by zero
+TRIPLE_TOLERANCE = 8.0  # px, of a pose from three spots
+
+LOOKALIKE_REACH = 25.0  # px, of the pairing
+MAX_LOOKALIKE_RMS = 3.0  # px, beyond which a pose is no lookalike
+
+MAX_SHIFT = 45.0  # px, of an LED from its prediction
+SHIFT_TOLERANCE = 20.0  # px, once the shift common to all is taken off
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to search an image.
+
+    Attributes
+    ----------
+    n_triples : int
+        Triples of spots tried.
+    n_hypotheses : int
+        LED triples tried for each.
+    n_poses : int
+        Poses laid over the spots.
+    n_settled : int
+        Labellings refined.
+    sized : bool
+        Believe that the size of a spot tells its distance.
+    """
+
+    n_triples: int
+    n_hypotheses: int
+    n_poses: int
+    n_settled: int
+    sized: bool = True
+
+
+def poses_from_triples(
+    sight: SpotArrays, pen: Constellation, effort: Effort
+) -> Candidates:
+    """Return the most promising poses of each image, each with another labelling.
+
+    Parameters
+    ----------
+    sight : SpotArrays
+    pen : Constellation
+    effort : Effort
+    """
+    image, triple = _spot_triples(sight, pen, effort)
+    of, leds = _led_triples(sight, pen, effort, image, triple)
+    image, triple = image[of], triple[of]
+    solved = solve_p3p(sight.rays[image[:, None], triple], pen.leds[leds])
+    of, R, t = solved
+    image, triple, leds = image[of], triple[of], leds[of]
+    misfit = _triple_misfit(sight, pen, image, triple, leds, R, t)
+    good = first_of_each(image, misfit, effort.n_poses)
+    good = good[misfit[good] < COARSE_SHAPE_TOLERANCE]
+    matched = match(sight, pen, image[good], R[good], t[good], TRIPLE_TOLERANCE)
+    matched = matched.of(matched.n_explained > 3)
+    return _most_explaining(matched, TRIPLE_TOLERANCE, effort.n_settled)
+
+
+def lookalike_poses(
+    sight: SpotArrays, pen: Constellation, best: Candidates
+) -> Candidates:
+    """Return the poses that might look alike: flipped, or by a symmetry of the pen.
+
+    A flat pen looks nearly the same when its tilt is reversed, a mirroring at the view
+    direction and at its own plane.
+
+    Parameters
+    ----------
+    sight : SpotArrays
+    pen : Constellation
+    best : Candidates
+        The settled poses whose lookalikes are sought.
+    """
+    paired = (best.spot >= 0)[..., None]
+    n = np.maximum(paired.sum(axis=1), 1)
+    middle = (pen.leds * paired).sum(axis=1) / n
+    arms = (pen.leds - middle[:, None]) * paired
+    flat = np.linalg.eigh(np.swapaxes(arms, 1, 2) @ arms).eigenvectors[:, :, 0]
+    middle_cam = np.einsum("cij,cj->ci", best.R, middle) + best.t
+    view = middle_cam / np.linalg.norm(middle_cam, axis=1, keepdims=True)
+    R = _mirror(view) @ best.R @ _mirror(flat)
+    t = middle_cam - np.einsum("cij,cj->ci", R, middle)
+    alike = [replace(best, R=R, t=t)]
+    for motion, shift in zip(pen.self_rotations, pen.self_translations, strict=True):
+        R, t = best.R @ motion, best.R @ shift + best.t
+        turned = match(sight, pen, best.image, R, t, LOOKALIKE_REACH)
+        # One that explains fewer spots is no rival.
+        alike.append(turned.of(turned.n_explained >= best.n_explained - 1))
+    fitted = fit(sight, pen, join(alike), n_steps=4)
+    return fitted.of(fitted.rms < MAX_LOOKALIKE_RMS)
+
+
+def shifted_poses(
+    sight: SpotArrays, pen: Constellation, R: FloatArray, t: FloatArray
+) -> Candidates:
+    """Return poses beside a predicted one, shifted so that LEDs fall on spots.
+
+    Parameters
+    ----------
+    sight : SpotArrays
+        Of one image.
+    pen : Constellation
+    R : (3, 3) array
+    t : (3,) array
+        Predicted cam_from_pen.
+    """
+    leds = pen.leds @ R.T + t
+    here = sight.pinhole.project(leds)
+    shifts = (sight.points[0] - here[:, None]).reshape(-1, 2)
+    depths = np.repeat(leds[:, 2], sight.points.shape[1])
+    near = np.einsum("si,si->s", shifts, shifts) < MAX_SHIFT**2
+    shifts, depths = shifts[near], depths[near]
+    translations = np.tile(t, (len(shifts), 1))
+    translations[:, :2] += shifts * (depths / sight.pinhole.fx)[:, None]
+    image = np.zeros(len(shifts), dtype=np.int64)
+    rotations = np.tile(R, (len(shifts), 1, 1))
+    matched = match(sight, pen, image, rotations, translations, SHIFT_TOLERANCE)
+    return _most_explaining(matched, SHIFT_TOLERANCE, 2)
+
+
+def _spot_triples(
+    sight: SpotArrays, pen: Constellation, effort: Effort
+) -> tuple[IntArray, IntArray]:
+    """Return images (G,) and triples (G, 3) of spots that may be triples of LEDs."""
+    there = sight.rays * np.where(sight.usable, sight.ranges, 0.0)[..., None]
+    gaps = np.linalg.norm(there[:, :, None] - there[:, None], axis=-1)
+    near = sight.usable[:, :, None] & sight.usable[:, None]
+    if effort.sized:
+        near = near & (gaps < MAX_GAP * pen.size)
+    # Spots with many others at the distances of the pen; brighter ones first.
+    order = np.argsort(-near.sum(axis=2), axis=1, kind="stable")[:, :MAX_SPOTS]
+    combos = _triples_of(order.shape[1])
+    triples = order[:, combos]
+    rows = np.arange(len(order))[:, None]
+    a, b, c = triples[..., 0], triples[..., 1], triples[..., 2]
+    plausible = near[rows, a, b] & near[rows, a, c] & near[rows, b, c]
+    p, q = (sight.points[rows, x] - sight.points[rows, a] for x in (b, c))
+    scale = (there[rows, a, 2] / sight.pinhole.fx) ** 2
+    area = np.abs(p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]) * scale
+    if effort.n_triples == 1:
+        score = -area
+    else:
+        # Many large triangles share the same, perhaps foreign, spot: draw lots.
+        score = _lots(len(combos)) + (area < MIN_AREA * _largest_area(pen))
+    score = np.where(plausible, score, np.inf)
+    first = np.argsort(score, axis=1)[:, : effort.n_triples]
+    image, which = np.nonzero(np.isfinite(np.take_along_axis(score, first, axis=1)))
+    return image, triples[image, first[image, which]]
+
+
+@lru_cache(maxsize=MAX_SPOTS)
+def _triples_of(n: int) -> IntArray:
+    return np.array(list(combinations(range(n), 3)), dtype=np.int64).reshape(-1, 3)
+
+
+@lru_cache(maxsize=MAX_SPOTS)
+def _lots(n: int) -> FloatArray:
+    return np.random.default_rng(0).random(n)
+
+
+@lru_cache(maxsize=16)
+def _largest_area(pen: Constellation) -> float:
+    """Return twice the area of the largest triangle of LEDs, mm^2 (Heron's formula)."""
+    a, b, c = pen.sides.T
+    s = (a + b + c) / 2
+    return float(2 * np.sqrt(np.max(s * (s - a) * (s - b) * (s - c))))
+
+
+def _led_triples(
+    sight: SpotArrays,
+    pen: Constellation,
+    effort: Effort,
+    image: IntArray,
+    triple: IntArray,
+) -> tuple[IntArray, IntArray]:
+    """Return which spot triple (H,) is supposed to be which LED triple (H, 3).
+
+    The sides of the triangle that the ranges suggest are compared with those of the pen
+    by their Mahalanobis distance; the best go on.
+    """
+    if not effort.sized:
+        some = pen.triples[:: 1 + len(pen.triples) // (2 * effort.n_hypotheses)]
+        of = np.repeat(np.arange(len(image)), len(some))
+        return of, np.tile(some, (len(image), 1))
+    ranges = sight.ranges[image[:, None], triple]
+    corners = sight.rays[image[:, None], triple] * ranges[..., None]
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    edges = np.stack([a - b, a - c, b - c], axis=1)
+    sides = np.linalg.norm(edges, axis=-1)
+    # d side / d log range, for each of the corners
+    first, second = [0, 0, 1], [1, 2, 2]
+    J = np.zeros((len(image), 3, 3))
+    side = np.arange(3)
+    J[:, side, first] = np.einsum("gsi,gsi->gs", edges, corners[:, first]) / sides
+    J[:, side, second] = -np.einsum("gsi,gsi->gs", edges, corners[:, second]) / sides
+    one, all_alike = RANGE_SIGMA, SCALE_SIGMA
+    covariance = J @ (one**2 * np.eye(3) + all_alike**2) @ np.swapaxes(J, 1, 2)
+    bend = (one * ranges.mean(axis=1)[:, None]) ** 2 / sides  # second order in range
+    covariance[:, side, side] += bend**2 + 1.0
+    whiten = np.linalg.inv(np.linalg.cholesky(covariance))
+    distances = pen.sides @ np.swapaxes(whiten, 1, 2)
+    distances -= np.einsum("gij,gj->gi", whiten, sides)[:, None]
+    misfit = np.einsum("gqi,gqi->gq", distances, distances)
+    n = min(effort.n_hypotheses, misfit.shape[1])
+    best = np.argpartition(misfit, n - 1, axis=1)[:, :n]
+    return np.repeat(np.arange(len(image)), n), pen.triples[best].reshape(-1, 3)
+
+
+def _triple_misfit(
+    sight: SpotArrays,
+    pen: Constellation,
+    image: IntArray,
+    triple: IntArray,
+    leds: IntArray,
+    R: FloatArray,
+    t: FloatArray,
+) -> FloatArray:
+    """Return how unlike the three spots are to the discs supposed, relative to size."""
+    R_t = np.swapaxes(R, 1, 2)
+    centers = pen.leds[leds] @ R_t + t[:, None]
+    normals = pen.normals[leds] @ R_t
+    predicted = disc_images(sight.pinhole, centers, normals, pen.radius).shapes
+    measured = sight.shapes[image[:, None], triple]
+    size = np.maximum(np.einsum("hkii->hk", predicted), TINY)
+    scale = (np.einsum("hkii->hk", measured) / size).mean(axis=1)
+    difference = measured / scale[:, None, None, None] - predicted
+    squares = np.einsum("hkij,hkij->hk", difference, difference) / size**2
+    towards = -np.einsum("hki,hki->hk", normals, centers)
+    facing = (towards > MIN_FACING * np.linalg.norm(centers, axis=-1)).all(axis=1)
+    low, high = AREA_RANGE
+    right = facing & (scale > 0.8 * low) & (scale < 1.2 * high)
+    return np.where(right, np.sqrt(squares.mean(axis=1)), np.inf)
+
+
+def first_of_each(group: IntArray, score: FloatArray, n: int) -> IntArray:
+    """Return the indices of the n lowest scores in each group.
+
+    Parameters
+    ----------
+    group : (C,) array
+    score : (C,) array
+    n : int
+    """
+    order = np.lexsort((score, group))
+    ordered = group[order]
+    start = np.searchsorted(ordered, ordered)
+    return order[np.arange(len(order)) - start < n]
+
+
+def _most_explaining(candidates: Candidates, reach: float, n: int) -> Candidates:
+    """Return n candidates of each image that explain most, with distinct labellings."""
+    score = candidates.sum_squares - reach**2 * candidates.n_explained
+    base = 2 * candidates.spot.max(initial=0) + 3  # odd: wrapping round loses nothing
+    key = (candidates.spot + 1) @ base ** np.arange(candidates.spot.shape[1])
+    order = np.lexsort((score, key, candidates.image))
+    image, key = candidates.image[order], key[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (image[1:] != image[:-1]) | (key[1:] != key[:-1])
+    distinct = order[new]
+    best = first_of_each(candidates.image[distinct], score[distinct], n)
+    return candidates.of(distinct[best])
+
+
+def _mirror(normals: FloatArray) -> FloatArray:
+    mirrors: FloatArray = np.eye(3) - 2 * normals[:, :, None] * normals[:, None]
+    return mirrors

@@ -1,0 +1,370 @@
+"""Supposed poses of a pen laid over the spots of images: matched, refined, weighed.
+
+Everything is batched over candidates, each a pose supposed for one image, and done in
+the pinhole pixels of `lightpen.detection.labelling.spot_arrays`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from math import lgamma
+
+import numpy as np
+import numpy.typing as npt
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.labelling.constellation import Constellation
+from lightpen.detection.labelling.spot_arrays import SpotArrays
+from lightpen.model.ellipse import disc_images, ellipse_centers
+from lightpen.model.rigid import rotation_from_vector
+
+MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the camera
+
+# Scale of the Cauchy weights of each refinement step, then reach of the pairing, px.
+SETTLING = ((3.0, 5.0), (0.5, 5.0))
+MAX_TURN = 0.5  # rad, of one step
+MIN_GATE = 0.3  # px, of a residual
+MAX_GATE = 1.0  # px
+GATE_SIGMAS = 5.0
+UNSUSPICIOUS_RMS = 0.1  # px, at which no stray spot is looked for
+FLOOR_RMS = 0.03  # px, below which better fits count for nothing
+MAX_CHANCE = 1e-3  # that a pair dropped as stray was none
+
+SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted one
+MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion
+AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
+
+# Of 0, 1/2, 1, ... 511; a table, as importing scipy takes longer than labelling.
+LOG_FACTORIALS = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Poses supposed for images, with the spots they explain.
+
+    Attributes
+    ----------
+    image : (C,) array
+        Index into the `SpotArrays`.
+    R : (C, 3, 3) array
+    t : (C, 3) array
+        Of cam_from_pen.
+    spot : (C, L) array
+        Spot of each LED, -1 if none.
+    residuals : (C, L) array
+        Distance to the spot, px; 0 where there is none.
+    area_ratio : (C,) array
+        Median of measured over predicted area of the discs; nan until settled.
+    """
+
+    image: IntArray
+    R: FloatArray
+    t: FloatArray
+    spot: IntArray
+    residuals: FloatArray
+    area_ratio: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+    @property
+    def n_explained(self) -> IntArray:
+        """LEDs that have a spot, (C,)."""
+        return np.asarray((self.spot >= 0).sum(axis=1))
+
+    @property
+    def sum_squares(self) -> FloatArray:
+        """Sum of the squared residuals, px^2, (C,)."""
+        return np.asarray(np.einsum("cl,cl->c", self.residuals, self.residuals))
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root mean square over the image coordinates, px, (C,)."""
+        n_coordinates = np.maximum(2 * self.n_explained, 1)
+        return np.asarray(np.sqrt(self.sum_squares / n_coordinates))
+
+    def of(self, which: IntArray | BoolArray) -> "Candidates":
+        """Return some of the candidates."""
+        return Candidates(*(getattr(self, f.name)[which] for f in fields(self)))
+
+
+def join(parts: Sequence[Candidates]) -> Candidates:
+    """Return the candidates of several lots as one lot."""
+    columns = [[getattr(part, f.name) for part in parts] for f in fields(Candidates)]
+    return Candidates(*(np.concatenate(column) for column in columns))
+
+
+def match(
+    sight: SpotArrays,
+    pen: Constellation,
+    image: IntArray,
+    R: FloatArray,
+    t: FloatArray,
+    tolerance: float | FloatArray,
+) -> Candidates:
+    """Pair predicted LED centres with the spots that are nearest both ways.
+
+    Parameters
+    ----------
+    sight : SpotArrays
+    pen : Constellation
+    image : (C,) array
+    R : (C, 3, 3) array
+    t : (C, 3) array
+    tolerance : float or (C, 1) array
+        Largest distance of a pair, px.
+    """
+    leds = pen.leds @ np.swapaxes(R, 1, 2) + t[:, None]
+    normals = pen.normals @ np.swapaxes(R, 1, 2)
+    seen = _facing(leds, normals)
+    inverse_depth = sight.pinhole.fx / np.maximum(leds[..., 2], 1e-3)
+    there = leds[..., :2] * inverse_depth[..., None]
+    spots = sight.points[image]
+    squares = (there[:, :, None, 0] - spots[:, None, :, 0]) ** 2
+    squares += (there[:, :, None, 1] - spots[:, None, :, 1]) ** 2
+    spot = squares.argmin(axis=2)
+    led = squares.argmin(axis=1)
+    square = np.take_along_axis(squares, spot[..., None], axis=2)[..., 0]
+    mutual = np.take_along_axis(led, spot, axis=1) == np.arange(len(pen.leds))
+    paired = mutual & seen & (square < tolerance**2)
+    return Candidates(
+        image=image,
+        R=R,
+        t=t,
+        spot=np.where(paired, spot, -1),
+        residuals=np.sqrt(np.where(paired, square, 0.0)),
+        area_ratio=np.full(len(image), np.nan),
+    )
+
+
+def settle(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> Candidates:
+    """Refine poses and pairs in turn until only pairs at the noise level are left.
+
+    Robust Gauss-Newton steps on the pose; in the end an LED keeps its spot if it lies
+    within some standard deviations of where the others put it, and if it looks as a
+    disc of the pen looks there.
+    """
+    for scale, tolerance in SETTLING:
+        weights = 1 / (1 + (candidates.residuals / scale) ** 2)
+        offsets = _offsets(sight, pen, candidates)
+        there = _step(sight, pen, candidates, offsets, weights)
+        candidates = match(sight, pen, there.image, there.R, there.t, tolerance)
+    settled = _drop_misshapen(sight, pen, candidates)
+    settled = fit(sight, pen, _drop(settled, _out_of_gate(settled)))
+    stray = _out_of_gate(settled)
+    if stray.any():
+        settled = fit(sight, pen, _drop(settled, stray))
+    return _drop_worst(sight, pen, settled)
+
+
+def fit(
+    sight: SpotArrays, pen: Constellation, candidates: Candidates, n_steps: int = 1
+) -> Candidates:
+    """Refine poses on their pairs by least squares, ellipse centres modelled."""
+    R_t = np.swapaxes(candidates.R, 1, 2)
+    leds = pen.leds @ R_t + candidates.t[:, None]
+    # How far ellipse centres lie from LED centres hardly depends on the pose.
+    eccentric = ellipse_centers(sight.pinhole, leds, pen.normals @ R_t, pen.radius)
+    eccentric -= _project(sight, leds)
+    even = np.ones_like(candidates.residuals)
+    offsets = _offsets(sight, pen, candidates, eccentric)
+    for _ in range(n_steps):
+        candidates = _step(sight, pen, candidates, offsets, even)
+        offsets = _offsets(sight, pen, candidates, eccentric)
+    return replace(candidates, residuals=np.linalg.norm(offsets, axis=-1))
+
+
+def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
+    """Return log10 of how many labellings this good chance would offer, (C,).
+
+    An a-contrario count in the manner of [1]_: the number of ways to give n of L LEDs
+    to n of N spots, times the probability that n spots strewn over the area that these
+    ones cover fit a pose as well in their 2 n - 6 surplus coordinates.
+
+    References
+    ----------
+    .. [1] L. Moisan, B. Stival, "A probabilistic criterion to detect rigid point
+       matches between two images and estimate the fundamental matrix", International
+       Journal of Computer Vision 57 (2004) 201-218.
+    """
+    n = candidates.n_explained
+    n_leds = candidates.spot.shape[1]
+    n_spots = sight.usable.sum(axis=1)[candidates.image]
+    choices = _log_factorial(n_leds) - _log_factorial(n) - _log_factorial(n_leds - n)
+    choices += _log_factorial(n_spots) - _log_factorial(n_spots - n)
+    surplus = np.maximum(2 * n - 6, 0)
+    radius = np.sqrt(np.maximum(candidates.sum_squares, 1e-12))
+    ball = 0.5 * surplus * np.log(np.pi) - _log_factorial(0.5 * surplus)
+    ball += surplus * (np.log(radius) - 0.5 * np.log(_covered_area(sight, candidates)))
+    logs: FloatArray = (choices + np.minimum(ball, 0)) / np.log(10)
+    return logs
+
+
+def _log_factorial(x: npt.ArrayLike) -> FloatArray:
+    """Return log x! of whole and half numbers."""
+    return np.asarray(LOG_FACTORIALS[np.asarray(2 * np.asarray(x), dtype=np.int64)])
+
+
+def _covered_area(sight: SpotArrays, candidates: Candidates) -> FloatArray:
+    paired = (candidates.spot >= 0)[..., None]
+    points = _paired_points(sight, candidates)
+    low = np.where(paired, points, np.inf).min(axis=1)
+    high = np.where(paired, points, -np.inf).max(axis=1)
+    area: FloatArray = np.prod(np.maximum(high - low, 1.0), axis=1)
+    return area
+
+
+def _facing(leds: FloatArray, normals: FloatArray) -> BoolArray:
+    towards = -np.einsum("...i,...i->...", normals, leds)
+    distance = np.sqrt(np.einsum("...i,...i->...", leds, leds))
+    facing: BoolArray = (towards > MIN_FACING * distance) & (leds[..., 2] > 0)
+    return facing
+
+
+def _paired_points(sight: SpotArrays, candidates: Candidates) -> FloatArray:
+    points: FloatArray = sight.points[candidates.image[:, None], candidates.spot]
+    return points
+
+
+def _paired_shapes(sight: SpotArrays, candidates: Candidates) -> FloatArray:
+    shapes: FloatArray = sight.shapes[candidates.image[:, None], candidates.spot]
+    return shapes
+
+
+def _project(sight: SpotArrays, leds: FloatArray) -> FloatArray:
+    there: FloatArray = leds[..., :2] * (sight.pinhole.fx / leds[..., 2:])
+    return there
+
+
+def _offsets(
+    sight: SpotArrays,
+    pen: Constellation,
+    candidates: Candidates,
+    eccentric: FloatArray | float = 0.0,
+) -> FloatArray:
+    """Return spots minus predicted ellipse centres, (C, L, 2), px; 0 without a spot."""
+    leds = pen.leds @ np.swapaxes(candidates.R, 1, 2) + candidates.t[:, None]
+    offsets = _paired_points(sight, candidates) - _project(sight, leds) - eccentric
+    offsets[candidates.spot < 0] = 0
+    return offsets
+
+
+def _step(
+    sight: SpotArrays,
+    pen: Constellation,
+    candidates: Candidates,
+    offsets: FloatArray,
+    weights: FloatArray,
+) -> Candidates:
+    """Make one weighted Gauss-Newton step on poses, rotating in the camera frame."""
+    arms = pen.leds @ np.swapaxes(candidates.R, 1, 2)
+    depths = arms[..., 2] + candidates.t[:, 2:]
+    leds = arms[..., :2] + candidates.t[:, None, :2]
+    scale = sight.pinhole.fx / depths
+    J = np.zeros((*depths.shape, 2, 6))
+    J[..., 0, 3] = J[..., 1, 4] = scale
+    J[..., 5] = -leds * (scale / depths)[..., None]
+    # The first three columns are arm x the last three.
+    J[..., 0] = arms[..., 1:2] * J[..., 5] - arms[..., 2:] * J[..., 4]
+    J[..., 1] = arms[..., 2:] * J[..., 3] - arms[..., :1] * J[..., 5]
+    J[..., 2] = arms[..., :1] * J[..., 4] - arms[..., 1:2] * J[..., 3]
+    weights = np.where(candidates.spot >= 0, weights, 0.0)[..., None]
+    n_equations = 2 * depths.shape[1]
+    weighted = (J * weights[..., None]).reshape(-1, n_equations, 6).swapaxes(1, 2)
+    normal = weighted @ J.reshape(-1, n_equations, 6)
+    gradient = weighted @ offsets.reshape(-1, n_equations, 1)
+    # Too few pairs leave the matrix singular; a trace of damping then keeps the pose.
+    diagonal = np.einsum("cii->ci", normal)
+    diagonal += 1e-9 * diagonal + 1e-9
+    step = np.asarray(np.linalg.solve(normal, gradient)[..., 0], dtype=np.float64)
+    turn = np.sqrt(np.einsum("ci,ci->c", step[:, :3], step[:, :3]))
+    step *= np.minimum(1, MAX_TURN / np.maximum(turn, MAX_TURN))[:, None]
+    R = rotation_from_vector(step[:, :3]) @ candidates.R
+    return replace(candidates, R=R, t=candidates.t + step[:, 3:])
+
+
+def _drop_misshapen(
+    sight: SpotArrays, pen: Constellation, candidates: Candidates
+) -> Candidates:
+    """Drop the pairs that do not look as discs of the pen look there.
+
+    Blur broadens all spots alike, a wrong disc diameter or threshold scales them all:
+    so the spots of an image are compared after the change common to all is taken off.
+    """
+    paired = candidates.spot >= 0
+    measured = _paired_shapes(sight, candidates)
+    R_t = np.swapaxes(candidates.R, 1, 2)
+    leds = pen.leds @ R_t + candidates.t[:, None]
+    discs = disc_images(sight.pinhole, leds, pen.normals @ R_t, pen.radius)
+    predicted = discs.shapes
+    size = np.einsum("clii->cl", predicted)
+    difference = (measured - predicted) / size[..., None, None]
+    flat = difference[..., [0, 0, 1], [0, 1, 1]]
+    common = _median(flat, paired)
+    limited = np.clip(common, -MAX_COMMON_BROADENING, MAX_COMMON_BROADENING)
+    flat = flat - limited[:, None]
+    squares = np.einsum("clk,clk,k->cl", flat, flat, [1.0, 2.0, 1.0])
+    growth = 1 + np.maximum(common[:, 0] + common[:, 2], -0.5)
+    bad = squares > (SHAPE_TOLERANCE * growth[:, None]) ** 2
+    dropped = _drop(candidates, bad)
+    return replace(dropped, area_ratio=1 + common[:, 0] + common[:, 2])
+
+
+def _out_of_gate(candidates: Candidates) -> BoolArray:
+    """Return which pairs lie farther apart than the noise of the image allows, (C, L).
+
+    The noise is the median residual of the image. The gate is close because a stray
+    spot may lie near the place of a hidden LED by chance.
+    """
+    n = candidates.n_explained
+    freedom = np.maximum(2 * n - 6, 1) / np.maximum(2 * n, 1)
+    median = _median(candidates.residuals, candidates.spot >= 0)
+    sigma = median / 1.177 / np.sqrt(freedom)  # the median of a Rayleigh distribution
+    gate = np.clip(GATE_SIGMAS * sigma, MIN_GATE, MAX_GATE)
+    return np.asarray(candidates.residuals > gate[:, None])
+
+
+def _drop_worst(
+    sight: SpotArrays, pen: Constellation, candidates: Candidates
+) -> Candidates:
+    """Drop from each candidate the pair without which the others fit far better.
+
+    With the pairs of n - 1 LEDs at the noise level, the ratio of the sums of squares
+    falls below x with the probability x^(n - 4): the F-test with 2 and 2 n - 8 degrees
+    of freedom.
+    """
+    n = candidates.n_explained
+    suspect = (n >= pen.min_leds) & (candidates.rms > UNSUSPICIOUS_RMS)
+    suspect &= candidates.rms < MAX_GATE
+    row, led = np.nonzero(suspect[:, None] & (candidates.spot >= 0))
+    if not len(row):
+        return candidates
+    without = candidates.of(row)
+    without.spot[np.arange(len(row)), led] = -1
+    without = fit(sight, pen, without, n_steps=2)
+    floor = 2 * n[row] * FLOOR_RMS**2
+    ratio = (without.sum_squares + floor) / (candidates.sum_squares[row] + floor)
+    chance = ratio ** (n[row] - 4)
+    order = np.lexsort((ratio, row))
+    best = order[np.unique(row[order], return_index=True)[1]]
+    best = best[chance[best] < MAX_CHANCE]
+    spared = np.ones(len(candidates), dtype=bool)
+    spared[row[best]] = False
+    return join([candidates.of(spared), without.of(best)])
+
+
+def _drop(candidates: Candidates, bad: BoolArray) -> Candidates:
+    return replace(
+        candidates,
+        spot=np.where(bad, -1, candidates.spot),
+        residuals=np.where(bad, 0.0, candidates.residuals),
+    )
+
+
+def _median(values: FloatArray, known: BoolArray) -> FloatArray:
+    """Return the median over axis 1 of the known values, 0 where there are none."""
+    n = known.sum(axis=1)
+    extra = (1,) * (values.ndim - 2)
+    ordered = np.sort(np.where(known.reshape(known.shape + extra), values, 1e9), axis=1)
+    rows, last = np.arange(len(values)), np.maximum(n - 1, 0)
+    median = 0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2])
+    return np.where(n.reshape(n.shape + extra) > 0, median, 0.0)

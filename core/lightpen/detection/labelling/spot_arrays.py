@@ -1,0 +1,115 @@
+"""The spots of many images as arrays, freed of distortion.
+
+Pinhole pixels are the undistorted normalised plane times the focal length.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.spots import Flaw, Spots
+from lightpen.model.camera import Camera
+
+FAR = 1e7  # px, where no spot is
+UNWHOLE = int(Flaw.MERGED | Flaw.CUT)
+
+
+@dataclass(frozen=True, eq=False)
+class SpotArrays:
+    """The spots of B images in pinhole pixels, padded to N spots each.
+
+    Attributes
+    ----------
+    pinhole : Camera
+        The camera without its distortion, principal point at (0, 0).
+    points : (B, N, 2) array
+        Centres, `FAR` where there is no usable spot.
+    unwhole_points : (B, N, 2) array
+        Centres of the merged and cut spots, `FAR` elsewhere.
+    shapes : (B, N, 2, 2) array
+        Covariances of the areas.
+    usable : (B, N) array
+    radius : float
+        Radius of the discs of the pen, mm.
+    """
+
+    pinhole: Camera
+    points: FloatArray
+    unwhole_points: FloatArray
+    shapes: FloatArray
+    usable: BoolArray
+    radius: float
+
+    @cached_property
+    def rays(self) -> FloatArray:
+        """Unit vectors to the usable spots, (B, N, 3)."""
+        rays = np.ones((*self.usable.shape, 3))
+        rays[..., :2] = self.points / self.pinhole.fx
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        return rays
+
+    @cached_property
+    def ranges(self) -> FloatArray:
+        """Distances of the usable spots, if they are discs of the pen, (B, N), mm."""
+        ranges = np.full(self.usable.shape, np.inf)
+        points = self.points[self.usable] / self.pinhole.fx
+        shapes = self.shapes[self.usable] / self.pinhole.fx**2
+        ranges[self.usable] = _ranges(points, shapes, self.radius)
+        return ranges
+
+
+def spot_arrays(
+    spots: Sequence[Spots], camera: Camera, radius: float, use_unwhole: bool = False
+) -> SpotArrays:
+    """Return the spots of images, undistorted.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    camera : Camera
+    radius : float
+        Radius of the discs, mm.
+    use_unwhole : bool
+        Take merged and cut spots for whole ones.
+    """
+    n_spots = np.array([len(s) for s in spots])
+    there = np.arange(max(int(n_spots.max()), 1)) < n_spots[:, None]
+    flaws = np.zeros(there.shape, dtype=np.int64)
+    flaws[there] = np.concatenate([s.flaws for s in spots])
+    focal = float(np.sqrt(camera.fx * camera.fy))
+    plane = camera.unproject_with_jacobian(np.concatenate([s.centers for s in spots]))
+    J = focal * plane.jacobian
+    points = np.full((*there.shape, 2), FAR)
+    points[there] = focal * plane.points
+    shapes = np.tile(np.eye(2), (*there.shape, 1, 1))
+    shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ np.swapaxes(J, 1, 2)
+    unwhole = flaws & UNWHOLE != 0
+    usable = there & (use_unwhole | ~unwhole)
+    return SpotArrays(
+        pinhole=Camera(camera.width, camera.height, focal, focal, 0.0, 0.0),
+        points=np.where(usable[..., None], points, FAR),
+        unwhole_points=np.where(unwhole[..., None], points, FAR),
+        shapes=shapes,
+        usable=usable,
+        radius=radius,
+    )
+
+
+def _ranges(x: FloatArray, shapes: FloatArray, radius: float) -> FloatArray:
+    """Return distances of discs from their shapes in the normalised plane.
+
+    Seen along its ray, a disc's longer semi-axis is radius / distance whatever its
+    tilt; the plane is first turned square to the ray.
+    """
+    stretch = np.sqrt(1 + np.einsum("ni,ni->n", x, x))
+    turn = np.eye(2) - x[:, :, None] * (x / (stretch * (stretch + 1))[:, None])[:, None]
+    square = turn @ shapes @ np.swapaxes(turn, 1, 2) / (stretch**2)[:, None, None]
+    half_trace = 0.5 * (square[:, 0, 0] + square[:, 1, 1])
+    difference = 0.5 * (square[:, 0, 0] - square[:, 1, 1])
+    largest = half_trace + np.hypot(difference, square[:, 0, 1])
+    ranges: FloatArray = radius / (2 * np.sqrt(largest))
+    return ranges

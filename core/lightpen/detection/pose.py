@@ -1,0 +1,455 @@
+"""The pose of the pen in each image, from the centres of its LEDs.
+
+Two estimators, both vectorised over images:
+
+* `fit_paper_poses`: equations (5) to (8) of [1]_, a linear start for a1 .. a11 and
+  Gauss-Newton on the pose, with projected LED centres and all LEDs alike.
+* `fit_poses`: maximum likelihood on ellipse centres, with a robust loss for single
+  LEDs and the covariance of each pose.
+
+A pose is perturbed on the left, ``X = exp([theta]x) R x + t + dt``; covariances are in
+the order (theta, dt), rad and mm.
+
+References
+----------
+.. [1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system probe
+   tip center calibration", Measurement Science Review 13 (2013) 194-199.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import nearest_rotation, rotation_from_vector
+
+MIN_LEDS = 4  # three leave up to four poses
+MAX_STEPS = 30
+STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
+ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
+MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
+CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
+WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
+MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
+RIDGE = 1e-12
+NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses ``cam_from_pen`` of N images.
+
+    Attributes
+    ----------
+    rotations : (N, 3, 3) array
+    translations : (N, 3) array
+        mm.
+    covariances : (N, 6, 6) array
+        Of (theta, dt) in rad and mm, for the noise ``sigma``, or for the image's own
+        where that is clearly larger.
+    residuals : (N, L, 2) array
+        Observed minus modelled centres, px; NaN where an LED was not seen.
+    weights : (N, L) array
+        Weight of each LED under the robust loss, 0 to 1; 0 where not seen.
+    sigma : float
+        Standard deviation of one image coordinate, px, estimated over all images.
+    """
+
+    rotations: FloatArray
+    translations: FloatArray
+    covariances: FloatArray
+    residuals: FloatArray
+    weights: FloatArray
+    sigma: float
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root mean square length of the residuals of each image, px, (N,)."""
+        squares = np.nansum(self.residuals**2, axis=(1, 2))
+        n_seen = np.isfinite(self.residuals[..., 0]).sum(axis=1)
+        rms: FloatArray = np.sqrt(squares / np.maximum(n_seen, 1))
+        return rms
+
+    def of(self, chosen: IntArray) -> "Poses":
+        """Return the poses of some images."""
+        return Poses(
+            self.rotations[chosen],
+            self.translations[chosen],
+            self.covariances[chosen],
+            self.residuals[chosen],
+            self.weights[chosen],
+            self.sigma,
+        )
+
+
+def fit_poses(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> Poses:
+    """Fit poses by maximum likelihood on ellipse centres.
+
+    Minimises the Cauchy loss of the reprojection errors in units of the noise that all
+    images share, by Gauss-Newton from a start near the solution.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen. Every image
+        needs four LEDs.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Start, cam_from_pen, mm.
+
+    Returns
+    -------
+    Poses
+    """
+    _require_seen(pixels)
+    problem = _Reprojection(camera, pen.leds, pen.normals, pen.diameter / 2, pixels)
+    R, t = _descend(
+        problem, rotations, translations, robust=False, max_steps=3, tolerance=ROUGHLY
+    )
+    R, t = _descend(problem, R, t, robust=True)
+    return _poses_at(problem, R, t, robust=True)
+
+
+def fit_paper_poses(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> Poses:
+    """Fit poses as the paper does: equations (5) to (8), then Gauss-Newton.
+
+    Works on undistorted image points and projected LED centres; no LED is weighted
+    down. Where the linear equations cannot be solved (fewer than six LEDs seen, or all
+    in one plane), the given poses start the iteration instead.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N, L, 2) array
+        Image points of the LEDs, px; NaN where an LED was not seen.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Start for images without a linear solution, cam_from_pen, mm.
+
+    Returns
+    -------
+    Poses
+    """
+    _require_seen(pixels)
+    normalised = np.full_like(pixels, np.nan)
+    seen = np.isfinite(pixels[..., 0])
+    normalised[seen] = camera.unproject(pixels[seen])
+    R, t, solved = _linear_poses(pen.leds, normalised)
+    R = np.where(solved[:, None, None], R, rotations)
+    t = np.where(solved[:, None], t, translations)
+    ideal = replace(camera, distortion=np.zeros(5))
+    undistorted = ideal.pixels(normalised)
+    problem = _Reprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
+    R, t = _descend(problem, R, t, robust=False)
+    return _poses_at(problem, R, t, robust=False)
+
+
+def start_poses(
+    camera: Camera, pen: Pen, pixels: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rough poses of labelled LEDs, to start an iteration from.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N, L, 2) array
+        Image points of the LEDs, px; NaN where an LED was not seen. Every image
+        needs four LEDs.
+
+    Returns
+    -------
+    rotations : (N, 3, 3) array
+    translations : (N, 3) array
+        cam_from_pen, mm; NaN where no pose puts the LEDs before the camera.
+
+    References
+    ----------
+    .. [1] G. Terzakis, M. Lourakis, "A consistently fast and globally optimal solution
+       to the perspective-n-point problem", ECCV 2020 (OpenCV's SQPNP).
+    """
+    _require_seen(pixels)
+    rotations = np.full((len(pixels), 3, 3), np.nan)
+    translations = np.full((len(pixels), 3), np.nan)
+    for i, points in enumerate(pixels):
+        seen = np.isfinite(points[:, 0])
+        normalised = camera.unproject(points[seen])
+        try:
+            solved, vector, translation = cv2.solvePnP(
+                pen.leds[seen], normalised, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
+            )
+        except cv2.error:  # points that coincide
+            continue
+        if solved and translation[2, 0] > 0:
+            rotations[i] = rotation_from_vector(
+                np.asarray(vector, dtype=np.float64)[:, 0]
+            )
+            translations[i] = translation[:, 0]
+    return rotations, translations
+
+
+@dataclass(frozen=True, eq=False)
+class _Reprojection:
+    """Reprojection errors of discs at given poses; radius 0 means projected centres."""
+
+    camera: Camera
+    leds: FloatArray
+    normals: FloatArray
+    radius: float
+    pixels: FloatArray
+
+    def residuals_with_jacobian(
+        self, R: FloatArray, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return residuals (N, L, 2), and d pixel / d (theta, dt), (N, L, 2, 6)."""
+        lever = self.leds @ np.swapaxes(R, -1, -2)
+        return disc_residuals(
+            self.camera,
+            lever,
+            lever + t[:, None],
+            self.normals @ np.swapaxes(R, -1, -2),
+            self.radius,
+            self.pixels,
+        )
+
+
+def disc_residuals(
+    camera: Camera,
+    lever: FloatArray,
+    centers_cam: FloatArray,
+    normals_cam: FloatArray,
+    radius: float,
+    pixels: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return reprojection errors of discs and the derivative of their images.
+
+    The derivative is that of the projected centre: the ellipse's centre lies within
+    some 0.1 px of it and moves with it to a part in a thousand.
+
+    Parameters
+    ----------
+    camera : Camera
+    lever : (N, L, 3) array
+        From the centre of rotation to the LEDs, camera frame, mm.
+    centers_cam, normals_cam : (N, L, 3) array
+        Centres, mm, and normals of the discs in the camera frame.
+    radius : float
+        Radius of the discs, mm; 0 takes the projected centres.
+    pixels : (N, L, 2) array
+        Observed centres, px.
+
+    Returns
+    -------
+    residuals : (N, L, 2) array
+        Observed minus modelled, px.
+    jacobian : (N, L, 2, 6) array
+        Of the modelled centres, by a rotation vector about the centre of rotation,
+        rad, and a translation, mm.
+    """
+    projected = camera.project_with_jacobian(centers_cam)
+    modelled = (
+        ellipse_centers(camera, centers_cam, normals_cam, radius)
+        if radius > 0
+        else projected.points
+    )
+    A = projected.jacobian
+    J = np.empty((*A.shape[:-1], 6))
+    x, y, z = (lever[..., None, k] for k in range(3))
+    J[..., 0] = y * A[..., 2] - z * A[..., 1]
+    J[..., 1] = z * A[..., 0] - x * A[..., 2]
+    J[..., 2] = x * A[..., 1] - y * A[..., 0]
+    J[..., 3:] = A
+    return pixels - modelled, J
+
+
+def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:
+    """Return the standard deviation of one image coordinate from median residuals.
+
+    Parameters
+    ----------
+    residuals : (N, L, 2) array
+        px; NaN where an LED was not seen.
+    n_unknowns_per_image : float
+        Fitted unknowns, which make residuals smaller than errors.
+
+    Returns
+    -------
+    float
+        px.
+    """
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    seen = np.isfinite(lengths)
+    n_equations = 2 * seen.sum()
+    n_free = max(n_equations - n_unknowns_per_image * len(residuals), 1)
+    median = float(np.median(lengths[seen])) / MEDIAN_LENGTH
+    return max(median * float(np.sqrt(n_equations / n_free)), NOISE_FLOOR)
+
+
+def cauchy_weights(residuals: FloatArray, sigma: float | FloatArray) -> FloatArray:
+    """Return the Cauchy weights of residuals.
+
+    Parameters
+    ----------
+    residuals : (N, L, 2) array
+        px; NaN where an LED was not seen.
+    sigma : float or (N,) array
+        Standard deviation of one image coordinate, of all images or of each, px.
+
+    Returns
+    -------
+    (N, L) array
+        0 to 1; 0 where not seen.
+    """
+    squares = np.einsum("...i,...i->...", residuals, residuals)
+    width = CAUCHY_WIDTH * np.reshape(sigma, (-1, 1))
+    weights = 1 / (1 + squares / width**2)
+    return np.asarray(np.nan_to_num(weights, nan=0.0))
+
+
+def _image_weights(residuals: FloatArray) -> FloatArray:
+    """Return Cauchy weights in units of the common noise, or the image's own scatter.
+
+    The larger of the two lets an image whose start is spoilt by one wrong LED come in.
+    """
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    n_seen = np.isfinite(lengths).sum(axis=1)
+    middle = np.sort(lengths, axis=1)[np.arange(len(lengths)), n_seen // 2]
+    own = middle / MEDIAN_LENGTH
+    return cauchy_weights(residuals, np.maximum(own, robust_sigma(residuals, 6)))
+
+
+def _own_sigma(residuals: FloatArray, weights: FloatArray, sigma: float) -> FloatArray:
+    """Return the noise of images that are clearly worse than the others, else 0, px."""
+    squares = np.nansum(weights[..., None] * residuals**2, axis=(1, 2))
+    own = np.sqrt(squares / np.maximum(2 * weights.sum(axis=1) - 6, 1))
+    return np.where(own > WORSE * sigma, own, 0.0)
+
+
+def _require_seen(pixels: FloatArray) -> None:
+    n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
+    if np.any(n_seen < MIN_LEDS):
+        raise ValueError(f"Every image needs {MIN_LEDS} LEDs, one has {n_seen.min()}.")
+
+
+def _descend(
+    problem: _Reprojection,
+    R: FloatArray,
+    t: FloatArray,
+    *,
+    robust: bool,
+    max_steps: int = MAX_STEPS,
+    tolerance: float = STEP_TOLERANCE,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the poses after Gauss-Newton steps, until these are small."""
+    seen = np.isfinite(problem.pixels[..., 0])
+    for _ in range(max_steps):
+        residuals, J = problem.residuals_with_jacobian(R, t)
+        weights = _image_weights(residuals) if robust else seen.astype(float)
+        H, g = normal_equations(J, residuals, weights)
+        step = np.einsum("nij,nj->ni", _inverse(H), g)
+        size = np.maximum(
+            np.linalg.norm(step[:, :3], axis=1),
+            np.linalg.norm(step[:, 3:], axis=1) / np.linalg.norm(t, axis=1),
+        )
+        step *= np.minimum(1, MAX_STEP / np.maximum(size, NOISE_FLOOR))[:, None]
+        R = rotation_from_vector(step[:, :3]) @ R
+        t = t + step[:, 3:]
+        if size.max() < tolerance:
+            break
+    return R, t
+
+
+def _poses_at(
+    problem: _Reprojection, R: FloatArray, t: FloatArray, *, robust: bool
+) -> Poses:
+    seen = np.isfinite(problem.pixels[..., 0])
+    residuals, J = problem.residuals_with_jacobian(R, t)
+    sigma = robust_sigma(residuals, 6)
+    weights = cauchy_weights(residuals, sigma) if robust else seen.astype(float)
+    H, _ = normal_equations(J, residuals, weights)
+    variances = np.maximum(sigma, _own_sigma(residuals, weights, sigma)) ** 2
+    covariances: FloatArray = variances[:, None, None] * _inverse(H)
+    return Poses(R, t, covariances, residuals, weights, sigma)
+
+
+def _inverse(H: FloatArray) -> FloatArray:
+    """Return the inverses of normal matrices (N, 6, 6), scaled to a unit diagonal.
+
+    A trace of ridge keeps an image of wrong LEDs, which may fix no pose at all, from
+    stopping the others.
+    """
+    scale = np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), RIDGE))
+    scales = scale[:, :, None] * scale[:, None, :]
+    inverse: FloatArray = np.linalg.inv(H / scales + RIDGE * np.eye(6)) / scales
+    return inverse
+
+
+def normal_equations(
+    J: FloatArray, residuals: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return J^T W J, (N, k, k), and J^T W r, (N, k), of each image.
+
+    Parameters
+    ----------
+    J : (N, L, 2, k) array
+    residuals : (N, L, 2) array
+        NaN where an LED was not seen.
+    weights : (N, L) array
+        0 where an LED was not seen.
+    """
+    n_images, n_leds, _, n_unknowns = J.shape
+    rows = np.nan_to_num(J).reshape(n_images, 2 * n_leds, n_unknowns)
+    weighted = rows * np.repeat(weights, 2, axis=1)[..., None]
+    transposed = np.swapaxes(weighted, 1, 2)
+    errors = np.nan_to_num(residuals).reshape(n_images, 2 * n_leds, 1)
+    return transposed @ rows, (transposed @ errors)[..., 0]
+
+
+def _linear_poses(
+    leds: FloatArray, normalised: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Solve equation (6) of the paper for a1 .. a11, and (8) for R and T.
+
+    Coordinates are centred and scaled for the solution: with s the scale and c the
+    centroid of the LEDs, A x = A' (x - c) / s.
+    """
+    n_images, n_leds = normalised.shape[:2]
+    seen = np.isfinite(normalised[..., 0])
+    center = leds.mean(axis=0)
+    scale = float(np.sqrt(np.mean((leds - center) ** 2)))
+    x = np.column_stack([(leds - center) / scale, np.ones(n_leds)])
+    blocks = np.zeros((n_images, n_leds, 2, 11))
+    blocks[:, :, 0, 0:4] = blocks[:, :, 1, 4:8] = x
+    blocks[..., 8:] = -normalised[..., None] * x[:, None, :3]
+    rows = np.where(seen[..., None, None], blocks, 0).reshape(n_images, -1, 11)
+    right = np.nan_to_num(normalised).reshape(n_images, -1, 1)
+    U, values, Vt = np.linalg.svd(rows, full_matrices=False)
+    solved = (seen.sum(axis=1) >= 6) & (values[:, -1] > 1e-4 * values[:, 0])
+    inverse = np.where(solved[:, None], 1 / np.maximum(values, 1e-300), 0)
+    a = np.swapaxes(Vt, 1, 2) @ (inverse[..., None] * (np.swapaxes(U, 1, 2) @ right))
+    a = np.concatenate([a[..., 0], np.ones((n_images, 1))], axis=1)
+    A = a.reshape(n_images, 3, 4)
+    length = np.linalg.norm(A[:, 2, :3], axis=1)
+    t_z = scale / np.where(solved, length, 1)  # eq. (8): (r7, r8, r9) has unit length
+    R = nearest_rotation(
+        np.where(solved[:, None, None], A[:, :, :3], np.eye(3)) * t_z[:, None, None]
+    )
+    t: FloatArray = A[:, :, 3] * t_z[:, None] - np.einsum("nij,j->ni", R, center)
+    return R, t, solved

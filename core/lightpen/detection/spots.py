@@ -1,0 +1,414 @@
+"""Bright spots in an image: centres, shapes and what is wrong with each.
+
+Every fourth pixel of every fourth row tells where something is bright; only windows
+around that are read in full. A region that is no whole disc is looked at again at
+higher levels, which parts discs that touch and finds LEDs in front of something bright.
+What never becomes a disc is dropped, or kept and flagged if it resembles one.
+"""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntFlag
+from math import ceil
+from statistics import median
+
+import cv2
+import numpy as np
+from cv2.typing import MatLike
+
+from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.detection.discs import MIN_SIZE, Box, Disc, bounding_box, measure_disc
+
+MAX_SPOTS = 64
+MAX_BOXES = 128  # the smallest of more are clutter
+MAX_REGIONS = 256  # looked at in one image
+MAX_CONTOURS = 4000
+
+MIN_SPOTS = 4  # fewer give no pose, so a closer look is worth its time
+NOISE_SAMPLES = 48  # per side of the image
+NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
+NOISE_OF_DIFFERENCE = 1.99  # that quantile for normal noise, in standard deviations
+BACKGROUND_QUANTILE = 0.2  # a bright window may fill most of the image
+MIN_NOISE = 0.5  # rounding, digital numbers
+LEVEL_SIGMAS = 8.0
+LEVEL_OF_PEAK = 0.03  # far below an LED at a tenth of the brightest lamp
+LEVEL_STEP = 0.2  # from level to level, fraction of the height above the background
+LEVEL_STEP_OF_PEAK = 0.06  # at most
+MAX_LEVELS_AT_ONCE = 3  # while a region hardly shrinks
+CROWDED = 0.03  # fraction of bright samples above which single ones are ignored
+TEXTURED = 0.08  # changes from sample to sample; there is no use in listing regions
+SPECK = np.ones((2, 2), np.uint8)  # regions that do not hold it are ignored
+FINE_SIZE = 256  # px; smaller regions are parted at full resolution
+MAX_DIAMETER = 0.5  # of the shorter side of the image
+
+MIN_ROUNDNESS = 0.85  # half a disc has 0.95, a square 0.955, two touching discs 0.89
+MAX_AXIS_RATIO = 4.0
+MIN_RELATIVE_CONTRAST = 0.15  # less is the texture of something bright
+
+SMEARED_FRACTIONS = (2e-4, 0.2)  # of the image: more than hot pixels, less than a wall
+
+MERGED_LEVEL = 0.5  # parted only above half its height, a disc holds foreign light
+SATURATED_LEVEL = 0.99  # of the full scale
+BLURRED_EDGE = 5.0  # px; a sharp image has 2 to 3
+DIM_SIGMAS = 16.0
+
+
+class Flaw(IntFlag):
+    """What makes a spot less than a clean, whole LED disc."""
+
+    NONE = 0
+    MERGED = 1  # touches another bright thing
+    CUT = 2  # partly hidden, or leaves the image
+    SATURATED = 4  # clipped at the top of the range
+    BLURRED = 8  # smeared by defocus or motion
+    DIM = 16  # hardly above the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """The spots of one image that may be LEDs, brightest first.
+
+    Attributes
+    ----------
+    centers : (N, 2) array
+        Centres, px.
+    shapes : (N, 2, 2) array
+        Covariance of the area of each spot, px^2; a full ellipse with semi-axes
+        a and b has the eigenvalues a^2 / 4 and b^2 / 4.
+    areas : (N,) array
+        Area at half level, px^2.
+    contrasts : (N,) array
+        Peak above the local background, fraction of the full range.
+    edge_widths : (N,) array
+        Width of the rim from dark to bright, px; blur widens it.
+    flaws : (N,) array
+        `Flaw` of each spot.
+    """
+
+    centers: FloatArray
+    shapes: FloatArray
+    areas: FloatArray
+    contrasts: FloatArray
+    edge_widths: FloatArray
+    flaws: IntArray
+
+    def __len__(self) -> int:
+        return len(self.centers)
+
+
+def detect_spots(
+    image: Image, mask: FloatArray | None = None, *, full_scale: int | None = None
+) -> Spots:
+    """Find the bright discs of an image.
+
+    The centre is the centroid of the soft-thresholded disc, for LEDs of 6 px and more.
+    It estimates the centroid of the imaged disc, which differs from the centre of its
+    rim by the curvature of the distortion only (0.001 px for a disc of 43 px).
+    Foreign lamps that look like LEDs are kept.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    mask : (M, 3) array, optional
+        Circles of stray light to leave out: centre x, y and radius, px.
+    full_scale : int, optional
+        Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given, by
+        the type of the image and its brightest pixel.
+
+    Returns
+    -------
+    Spots
+        At most `MAX_SPOTS`, brightest first.
+
+    Raises
+    ------
+    ValueError
+        If the image is not grey, or neither 8 nor 16 bit.
+    """
+    if image.ndim != 2 or image.dtype not in (np.uint8, np.uint16):
+        raise ValueError(
+            "`image` must be a 2-D array of uint8 or uint16, "
+            f"got shape {image.shape} of {image.dtype}."
+        )
+    if min(image.shape) < MIN_SIZE:
+        return _as_spots([], 1.0, MIN_NOISE)
+    stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
+    budget = iter(range(MAX_REGIONS))
+    scene = _survey(image, mask, stride)
+    discs = _find_discs(scene, budget)
+    if len(discs) < MIN_SPOTS and stride > 1:
+        scene = _survey(image, mask, stride // 2)
+        discs = _find_discs(scene, budget)
+    if len(discs) < MIN_SPOTS or next(budget, None) is None:
+        flat = _survey(_flattened(image), mask, stride)
+        flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
+        if len(flat_discs) > len(discs):
+            scene, discs = flat, flat_discs
+    if full_scale is None:
+        full_scale = 255 if image.dtype == np.uint8 else 4095
+        full_scale = full_scale if scene.peak <= full_scale else 65535
+    return _as_spots(discs, full_scale, scene.noise)
+
+
+def shows_smears(image: Image) -> bool:
+    """Return whether an image in which no spot was found shows light all the same.
+
+    Discs moved by many times their size during the exposure leave streaks that are no
+    spots; a dark image leaves nothing.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    """
+    if min(image.shape) < MIN_SIZE:
+        return False
+    scene = _survey(image, None, 4)
+    level = scene.background + LEVEL_SIGMAS * scene.noise
+    lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
+    low, high = SMEARED_FRACTIONS
+    return low < lit / scene.thinned.size < high
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """An image, every `stride`-th pixel of it, and what is usual in it."""
+
+    image: Image
+    thinned: MatLike
+    stride: int
+    background: float
+    noise: float
+    peak: float
+
+    def higher(self, level: float) -> float:
+        """Return the next level to look at."""
+        step = LEVEL_STEP * (level - self.background)
+        longest = LEVEL_STEP_OF_PEAK * (self.peak - self.background)
+        return level + max(min(step, longest), 1.0)
+
+
+def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
+    thinned = _thinned(image, stride)
+    step = max(min(thinned.shape) // NOISE_SAMPLES, 1)
+    few: MatLike = np.ascontiguousarray(thinned[::step, ::step])
+    values = np.sort(few, axis=None)
+    background = int(values[int(BACKGROUND_QUANTILE * values.size)])
+
+    beside: MatLike = np.ascontiguousarray(image[:: step * stride, 1 :: step * stride])
+    differences = np.sort(cv2.absdiff(few[:, : beside.shape[1]], beside), axis=None)
+    difference = int(differences[int(NOISE_QUANTILE * differences.size)])
+    noise = max(difference / NOISE_OF_DIFFERENCE, MIN_NOISE)
+
+    if mask is not None and len(mask):
+        thinned = thinned.copy()
+        for x, y, radius in np.asarray(mask) / stride:
+            center = (round(x), round(y))
+            cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
+    return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
+
+
+def _flattened(image: Image) -> Image:
+    """Return the image without its uneven background.
+
+    That is the median of the neighbourhood in a coarse grid, in which a disc is a few
+    points at the most. What reads full scale stays, to be told as saturated.
+    """
+    step = max(min(image.shape) // NOISE_SAMPLES, 1)
+    coarse = cv2.medianBlur(np.ascontiguousarray(image[::step, ::step]), 5)
+    size = (image.shape[1], image.shape[0])
+    background = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
+    uneven = np.asarray(background) - coarse.min()
+    flat: Image = np.asarray(cv2.subtract(image, uneven)).view(image.dtype)
+    np.copyto(flat, image, where=image == np.iinfo(image.dtype).max)
+    return flat
+
+
+def _thinned(image: Image, stride: int) -> MatLike:
+    """Return every `stride`-th pixel of every `stride`-th row; stride 1, 2 or 4."""
+    pixels: MatLike
+    width = image.shape[1] // stride * stride
+    rows = image[::stride, :width]
+    if image.strides[1] != image.itemsize or sys.byteorder != "little":
+        pixels = np.ascontiguousarray(rows[:, ::stride])
+        return pixels
+    # The low bytes of `stride` pixels read as one number are the first pixel. Narrowing
+    # numbers is three times as fast as gathering pixels.
+    pixels = rows.view(f"u{image.itemsize * stride}").astype(image.dtype)
+    return pixels
+
+
+def _find_discs(scene: _Scene, budget: Iterator[int]) -> list[Disc]:
+    """Return whatever may be an LED, each once."""
+    rise = scene.peak - scene.background
+    level = scene.background + max(LEVEL_SIGMAS * scene.noise, LEVEL_OF_PEAK * rise)
+    height, width = scene.image.shape
+    boxes = _regions(scene, Box(0, 0, width, height), level)
+    if len(boxes) > MAX_BOXES:
+        boxes = sorted(boxes, key=lambda box: box.size, reverse=True)[:MAX_BOXES]
+
+    discs: list[Disc] = []
+    unclear: list[tuple[Box, Disc | None]] = []
+    for box in boxes:
+        if _is_too_large(scene, box):
+            unclear.append((box, None))
+            continue
+        for disc in _measured(scene, box, level, 0.0, budget):
+            if disc.is_whole:
+                discs.append(disc)
+            else:
+                unclear.append((disc.box, disc))
+    for box, region in unclear:
+        discs += _parted(scene, box, level, region, budget)
+    return _unique(discs) if unclear or len(discs) != len(boxes) else discs
+
+
+def _parted(
+    scene: _Scene, box: Box, level: float, disc: Disc | None, budget: Iterator[int]
+) -> list[Disc]:
+    """Return the discs that a region parts into at higher levels, or itself."""
+    if disc is not None:
+        level = max(level, disc.cut_level)
+    parts: list[Box] = []
+    for _ in range(MAX_LEVELS_AT_ONCE):
+        if next(budget, None) is None:
+            break
+        level = scene.higher(level)
+        parts = _regions(scene, box, level)
+        if len(parts) != 1 or not parts[0].is_close_to(box):
+            break
+    pieces: list[Disc] = []
+    for part in parts:
+        if _is_too_large(scene, part):
+            pieces += _parted(scene, part, level, None, budget)
+            continue
+        for piece in _measured(scene, part, level, level, budget):
+            if piece.is_whole:
+                pieces.append(piece)
+            else:
+                pieces += _parted(scene, piece.box, level, piece, budget)
+    is_parted = len(pieces) > 1 or any(piece.is_whole for piece in pieces)
+    if disc is None or is_parted or not _resembles_disc(disc):
+        return pieces
+    return [disc]
+
+
+def _unique(discs: list[Disc]) -> list[Disc]:
+    """Drop what was found twice or lies inside a larger disc."""
+    kept: list[Disc] = []
+    for disc in sorted(discs, key=lambda disc: disc.moments.area, reverse=True):
+        if not any(larger.box.holds_center_of(disc.box) for larger in kept):
+            kept.append(disc)
+    return kept
+
+
+def _regions(scene: _Scene, box: Box, level: float) -> list[Box]:
+    """Return the boxes of what exceeds a level and lies inside a box."""
+    if level >= np.iinfo(scene.image.dtype).max:
+        return []
+    step = 1 if box.size <= FINE_SIZE else scene.stride
+    plane = scene.thinned if step == scene.stride else scene.image
+    frame = box.grown(step, scene.image.shape)
+    left, top = frame.left // step, frame.top // step
+    window = plane[top : -(-frame.bottom // step), left : -(-frame.right // step)]
+    bright: MatLike = (window > int(level)).view(np.uint8)
+    if step == 1 or cv2.countNonZero(bright) > CROWDED * bright.size:
+        # cv2.morphologyEx would shift the regions: it anchors both steps alike.
+        bright = cv2.dilate(cv2.erode(bright, SPECK), SPECK, anchor=(0, 0))
+        if box.size > FINE_SIZE and _is_textured(bright):
+            return [box]
+    # Every component, also one in the hole of another, is at the top of this hierarchy.
+    contours, hierarchy = cv2.findContours(
+        bright, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE, offset=(left, top)
+    )
+    if not contours:
+        return []
+    parents = hierarchy[0, :MAX_CONTOURS, 3].tolist()
+    found = [
+        bounding_box(contour, step)
+        for contour, parent in zip(contours, parents, strict=False)
+        if parent < 0
+    ]
+    if frame == box:
+        return found
+    # What reaches out of the box belongs to a neighbour.
+    return [part for part in found if part.overlap(box) == part.area]
+
+
+def _is_textured(bright: MatLike) -> bool:
+    changes = np.count_nonzero(bright[:, 1:] != bright[:, :-1])
+    return bool(changes > TEXTURED * bright.size)
+
+
+def _is_too_large(scene: _Scene, box: Box) -> bool:
+    shorter_side: int = min(scene.image.shape)
+    return box.size > max(MAX_DIAMETER * shorter_side, FINE_SIZE)
+
+
+def _measured(
+    scene: _Scene, box: Box, level: float, floor: float, budget: Iterator[int]
+) -> Iterator[Disc]:
+    """Measure the region in a box, and others that coarse sampling took for one."""
+    boxes = [box]
+    while boxes and next(budget, None) is not None:
+        disc = measure_disc(scene.image, boxes.pop(), level, scene.noise, floor)
+        if disc is None:
+            continue
+        boxes += (other for other in disc.others if other.size < box.size)
+        height = disc.levels.plateau - scene.background
+        if disc.levels.contrast > MIN_RELATIVE_CONTRAST * height:
+            yield disc
+
+
+def _resembles_disc(disc: Disc) -> bool:
+    """Tell whether a region may be an LED that is cut or merged with something."""
+    major, minor = disc.moments.axes
+    return disc.moments.roundness > MIN_ROUNDNESS and major < MAX_AXIS_RATIO * minor
+
+
+def _as_spots(discs: list[Disc], full_scale: float, noise: float) -> Spots:
+    discs = sorted(discs, key=lambda disc: disc.levels.contrast, reverse=True)
+    discs = discs[:MAX_SPOTS]
+    whole = [disc.moments.area for disc in discs if disc.is_whole]
+    usual_area = median(whole) if whole else None
+    moments = [disc.moments for disc in discs]
+    return Spots(
+        np.array([(m.x, m.y) for m in moments]).reshape(-1, 2),
+        np.array([(m.var_x, m.cov_xy, m.cov_xy, m.var_y) for m in moments]).reshape(
+            -1, 2, 2
+        ),
+        np.array([m.area for m in moments]),
+        np.array([disc.levels.contrast / full_scale for disc in discs]),
+        np.array([m.edge_width for m in moments]),
+        np.array(
+            [_flaws(disc, usual_area, full_scale, noise) for disc in discs], np.int64
+        ),
+    )
+
+
+def _flaws(
+    disc: Disc, usual_area: float | None, full_scale: float, noise: float
+) -> Flaw:
+    flaws = Flaw.NONE
+    if disc.cut_height > MERGED_LEVEL:
+        flaws |= Flaw.MERGED
+    if disc.leaves_image:
+        flaws |= Flaw.CUT
+    elif not disc.is_whole:
+        flaws |= _flaw_of_size(disc.moments.area, usual_area)
+    if disc.levels.top >= SATURATED_LEVEL * full_scale:
+        flaws |= Flaw.SATURATED
+    if disc.moments.edge_width > BLURRED_EDGE:
+        flaws |= Flaw.BLURRED
+    if disc.levels.contrast < DIM_SIGMAS * noise:
+        flaws |= Flaw.DIM
+    return flaws
+
+
+def _flaw_of_size(area: float, usual_area: float | None) -> Flaw:
+    """Tell merged from cut by size, if there is a whole disc to compare with."""
+    if usual_area is None:
+        return Flaw.MERGED | Flaw.CUT
+    return Flaw.MERGED if area > usual_area else Flaw.CUT

@@ -1,0 +1,1 @@
+"""The tip from what all images show, its uncertainty, and what it is worth."""

@@ -1,0 +1,313 @@
+"""The joint estimator: tip and cone from the LED images of all postures at once.
+
+Unknowns are the tip x0 in the pen frame, the cone point u0 in the camera frame and one
+rotation an image. LED j of image i lies at
+
+    X_ij = R_i (x_j - x0) + u0
+
+so the contact of tip and cone is built in and an image costs three unknowns, not six.
+The reprojection errors of the ellipse centres are minimised by Gauss-Newton. The
+rotations are eliminated image by image (Schur complement [1]_), which leaves a system
+of six equations and, from each image, what it says of tip and cone.
+
+LEDs are weighed by a Cauchy loss until the iteration settles; it ends as least squares
+on the LEDs within the gate, which loses nothing on normal noise.
+
+References
+----------
+.. [1] B. Triggs et al., "Bundle adjustment - a modern synthesis", LNCS 1883 (2000)
+   298-372, section 6.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import (
+    NOISE_FLOOR,
+    cauchy_weights,
+    disc_residuals,
+    normal_equations,
+    robust_sigma,
+)
+from lightpen.errors import CalibrationError
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import rotation_from_vector
+
+LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
+MIN_LEDS = 3  # in an image; fewer leave its rotation free
+SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
+CONVERGED = 1e-7  # mm
+MAX_STEPS = 50
+MAX_GATINGS = 5
+TURN_RIDGE = 1e-6  # px^2/rad^2 beside some 1e6; an image may lose all its LEDs
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """Tip and cone from all images together.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        Tip in the pen frame, mm.
+    cone_cam : (3,) array
+        Cone point in the camera frame, mm.
+    rotations : (N, 3, 3) array
+        Of cam_from_pen.
+    residuals : (N, L, 2) array
+        Observed minus modelled ellipse centres, px; NaN where an LED was not seen.
+    used : (N, L) array of bool
+        LEDs within the gate; none of an image that has fewer than three.
+    sigma : float
+        Standard deviation of one image coordinate, px.
+    information : (N, 6, 6) array
+        What each image says of (tip, cone), rotation eliminated, 1/mm^2.
+    gradients : (N, 6) array
+        ``information`` times the step that the image alone would take, 1/mm.
+    """
+
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    rotations: FloatArray
+    residuals: FloatArray
+    used: BoolArray
+    sigma: float
+    information: FloatArray
+    gradients: FloatArray
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of (tip_pen, cone_cam) from image noise alone, (6, 6), mm^2."""
+        return symmetric_inverse(self.information.sum(axis=0))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square length of the residuals of used LEDs, px."""
+        squares = np.sum(self.residuals**2, axis=2)
+        return float(np.sqrt(np.mean(squares[self.used])))
+
+    @property
+    def image_rms(self) -> FloatArray:
+        """The same of each image, px, (N,); NaN where no LED is used."""
+        squares = np.sum(self.residuals**2, axis=2, where=self.used[..., None])
+        n_used = self.used.sum(axis=1)
+        means = squares.sum(axis=1) / np.maximum(n_used, 1)
+        return np.where(n_used > 0, np.sqrt(means), np.nan)
+
+    @property
+    def translations(self) -> FloatArray:
+        """Translations of cam_from_pen that put the tip into the cone, (N, 3), mm."""
+        return self.cone_cam - self.rotations @ self.tip_pen
+
+
+def fit_joint(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    tip_pen: FloatArray,
+    cone_cam: FloatArray,
+) -> JointFit:
+    """Fit tip and cone to the LED centres of all images.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    rotations : (N, 3, 3) array
+        Start, of cam_from_pen.
+    tip_pen, cone_cam : (3,) array
+        Start, mm.
+
+    Returns
+    -------
+    JointFit
+
+    Raises
+    ------
+    CalibrationError
+        The iteration does not settle.
+    """
+    model = ContactModel(camera, pen, pixels)
+    state = model.at(rotations, tip_pen, cone_cam)
+    state = _descend(model, state, None, SETTLED)
+    for _ in range(MAX_GATINGS):
+        used = _gate(state.residuals)
+        state = _descend(model, state, used, CONVERGED)
+        if np.array_equal(_gate(state.residuals), used):
+            break
+    return _fit_from(state, used)
+
+
+def extend_joint(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    joint: JointFit,
+    rotations: FloatArray,
+) -> JointFit:
+    """Add images to a joint fit, starting from what it has found.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N + K, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen. The N images of
+        ``joint`` come first.
+    joint : JointFit
+    rotations : (K, 3, 3) array
+        Of cam_from_pen, rough, of the new images.
+
+    Returns
+    -------
+    JointFit
+    """
+    start = np.concatenate([joint.rotations, rotations])
+    return fit_joint(camera, pen, pixels, start, joint.tip_pen, joint.cone_cam)
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """The model around one state.
+
+    Attributes
+    ----------
+    rotations, tip_pen, cone_cam : (N, 3, 3), (3,), (3,) array
+        The state.
+    residuals : (N, L, 2) array
+        Observed minus modelled, px.
+    jacobian : (N, L, 2, 9) array
+        d pixel by the image's rotation vector (left), tip and cone; rad, mm.
+    """
+
+    rotations: FloatArray
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    residuals: FloatArray
+    jacobian: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactModel:
+    """Images of the LEDs of a pen whose tip rests in the cone.
+
+    Attributes
+    ----------
+    camera : Camera
+    pen : Pen
+    pixels : (N, L, 2) array
+        Observed ellipse centres, px; NaN where an LED was not seen.
+    """
+
+    camera: Camera
+    pen: Pen
+    pixels: FloatArray
+
+    def at(
+        self, R: FloatArray, tip_pen: FloatArray, cone_cam: FloatArray
+    ) -> Linearised:
+        """Return the model around rotations (N, 3, 3), tip (3,) and cone (3,)."""
+        lever = (self.pen.leds - tip_pen) @ np.swapaxes(R, 1, 2)
+        residuals, J = disc_residuals(
+            self.camera,
+            lever,
+            lever + cone_cam,
+            self.pen.normals @ np.swapaxes(R, 1, 2),
+            self.pen.diameter / 2,
+            self.pixels,
+        )
+        by_tip = -J[..., 3:] @ R[:, None]
+        jacobian = np.concatenate([J[..., :3], by_tip, J[..., 3:]], axis=3)
+        return Linearised(R, tip_pen, cone_cam, residuals, jacobian)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """Normal equations with the rotations eliminated: S and b of each image."""
+
+    S: FloatArray
+    b: FloatArray
+    turn: FloatArray  # (N, 3), rotation step at a standing tip and cone
+    turn_by_step: FloatArray  # (N, 3, 6)
+
+    def step(self) -> FloatArray:
+        return np.asarray(np.linalg.solve(self.S.sum(axis=0), self.b.sum(axis=0)))
+
+
+def reduce(state: Linearised, weights: FloatArray) -> _Reduced:
+    """Eliminate the rotations of a linearised model, LED weights (N, L)."""
+    H, g = normal_equations(state.jacobian, state.residuals, weights)
+    H_turn = H[:, :3, :3] + TURN_RIDGE * np.eye(3)
+    solved = np.linalg.solve(
+        H_turn, np.concatenate([H[:, :3, 3:], g[:, :3, None]], axis=2)
+    )
+    coupling, turn = solved[..., :6], solved[..., 6]
+    back = H[:, 3:, :3]
+    return _Reduced(
+        S=H[:, 3:, 3:] - back @ coupling,
+        b=g[:, 3:] - np.einsum("nij,nj->ni", back, turn),
+        turn=turn,
+        turn_by_step=-coupling,
+    )
+
+
+def symmetric_inverse(matrix: FloatArray) -> FloatArray:
+    """Return the inverse of a symmetric matrix, symmetric to the last digit."""
+    inverse = np.linalg.inv(matrix)
+    return np.asarray(0.5 * (inverse + inverse.T))
+
+
+def _descend(
+    model: ContactModel, state: Linearised, used: BoolArray | None, tolerance: float
+) -> Linearised:
+    """Iterate until tip and cone move less than ``tolerance``; Cauchy without used."""
+    for _ in range(MAX_STEPS):
+        weights = (
+            cauchy_weights(state.residuals, robust_sigma(state.residuals, 3))
+            if used is None
+            else used.astype(float)
+        )
+        reduced = reduce(state, weights)
+        step = reduced.step()
+        turns = reduced.turn + reduced.turn_by_step @ step
+        state = model.at(
+            rotation_from_vector(turns) @ state.rotations,
+            state.tip_pen + step[:3],
+            state.cone_cam + step[3:],
+        )
+        if np.abs(step).max() < tolerance:
+            return state
+    raise CalibrationError(
+        f"The joint fit did not settle in {MAX_STEPS} steps. The images may not be of "
+        "this pen and camera: check both files."
+    )
+
+
+def _gate(residuals: FloatArray) -> BoolArray:
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    within = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * robust_sigma(residuals, 3)
+    enough = within.sum(axis=1, keepdims=True) >= MIN_LEDS
+    return np.asarray(within & enough)
+
+
+def _fit_from(state: Linearised, used: BoolArray) -> JointFit:
+    squares = np.einsum("nli,nli->nl", state.residuals, state.residuals)
+    n_free = 2 * int(used.sum()) - 3 * int(used.any(axis=1).sum()) - 6
+    sigma = max(float(np.sqrt(squares[used].sum() / max(n_free, 1))), NOISE_FLOOR)
+    reduced = reduce(state, used.astype(float))
+    return JointFit(
+        tip_pen=state.tip_pen,
+        cone_cam=state.cone_cam,
+        rotations=state.rotations,
+        residuals=state.residuals,
+        used=used,
+        sigma=sigma,
+        information=reduced.S / sigma**2,
+        gradients=reduced.b / sigma**2,
+    )

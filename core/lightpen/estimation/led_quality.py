@@ -1,0 +1,111 @@
+"""How each LED fits: its residuals, and how far it sits off its place in the file."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.estimation.geometry import GeometryFit
+from lightpen.estimation.joint import ContactModel
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+
+DISPLACED = 0.03  # mm; smaller errors are taken up by the fit
+STANDS_OUT = 5.0  # times the median displacement of all LEDs
+SIGNIFICANT = 5.0  # standard deviations
+MIN_SEEN = 6  # images, to speak of a displacement
+
+
+@dataclass(frozen=True, eq=False)
+class LedQuality:
+    """How each LED fits.
+
+    Attributes
+    ----------
+    n_seen, n_used : (L,) array of int
+        Images in which the LED was seen, and was used.
+    rms : (L,) array
+        Root mean square residual of the images that use the LED, px; NaN if none.
+    mean : (L, 2) array
+        Mean residual of these, px; NaN if none.
+    displacement : (L, 3) array
+        How far the LED sits off its place in the file, pen frame, mm.
+    displaced : tuple of int
+        Numbers of the LEDs, from 1, that stand out by their displacement.
+    """
+
+    n_seen: IntArray
+    n_used: IntArray
+    rms: FloatArray
+    mean: FloatArray
+    displacement: FloatArray
+    displaced: tuple[int, ...]
+
+
+def measure_leds(
+    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
+) -> LedQuality:
+    """Measure how each LED fits.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+        As the file gives it.
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    geometry : GeometryFit
+
+    Returns
+    -------
+    LedQuality
+    """
+    joint = geometry.joint
+    seen = np.isfinite(pixels[..., 0])
+    n_used = joint.used.sum(axis=0)
+    counted = np.where(joint.used, 1.0, 0.0) / np.maximum(n_used, 1)
+    residuals = np.nan_to_num(joint.residuals)
+    squares = np.einsum("nli,nli->nl", residuals, residuals)
+    mean = np.einsum("nl,nli->li", counted, residuals)
+    rms = np.sqrt(np.sum(counted * squares, axis=0))
+    none = n_used == 0
+    displacement, sigma = _displacements(camera, pen, pixels, geometry)
+    length = np.linalg.norm(displacement, axis=1)
+    limit = np.maximum(STANDS_OUT * np.nanmedian(length), DISPLACED)
+    displaced = np.flatnonzero((length > limit) & (length > SIGNIFICANT * sigma)) + 1
+    return LedQuality(
+        n_seen=seen.sum(axis=0),
+        n_used=n_used,
+        rms=np.where(none, np.nan, rms),
+        mean=np.where(none[:, None], np.nan, mean),
+        displacement=displacement,
+        displaced=tuple(displaced.tolist()),
+    )
+
+
+def _displacements(
+    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
+) -> tuple[FloatArray, FloatArray]:
+    """Return where each LED sits by the poses of all, and its standard deviation, mm.
+
+    An LED that was mostly left out is judged by all its images; its scatter then says
+    whether it is displaced or only badly seen.
+    """
+    joint = geometry.joint
+    model = ContactModel(camera, pen, pixels)
+    state = model.at(joint.rotations, joint.tip_pen, joint.cone_cam)
+    by_led = state.jacobian[..., 6:9] @ joint.rotations[:, None]
+    seen = np.isfinite(pixels[..., 0])
+    displacement = np.full((pen.n_leds, 3), np.nan)
+    sigma = np.full(pen.n_leds, np.nan)
+    for j in range(pen.n_leds):
+        trusted = joint.used[:, j]
+        chosen = trusted if 2 * trusted.sum() >= seen[:, j].sum() else seen[:, j]
+        if chosen.sum() < MIN_SEEN:
+            continue
+        A = by_led[chosen, j].reshape(-1, 3)
+        b = state.residuals[chosen, j].ravel()
+        displacement[j] = np.linalg.lstsq(A, b)[0]
+        scatter = float(np.std(b - A @ displacement[j]))
+        sigma[j] = scatter * np.sqrt(np.trace(np.linalg.inv(A.T @ A)))
+    return displacement, sigma

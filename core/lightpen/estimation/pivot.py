@@ -1,0 +1,274 @@
+"""Pivot calibration: the tip of a pen from poses that swing about it.
+
+While the tip rests at one place every pose i gives three equations
+
+    R_i tip_pen + t_i = pivot_cam
+
+linear in the six unknowns. `fit_pivot` solves all of them together, weighted by the
+covariance of each pose where it is known, and finds the poses that do not belong.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import default_rng
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.model.coverage import require_spread
+from lightpen.model.rigid import skew
+
+MIN_POSES = 6  # the paper starts from six images
+N_SAMPLES = 300  # of four poses: 40 % outliers leave 1e-18 of drawing no clean one
+SAMPLE_SIZE = 4
+FEW = 12  # poses, of which four fix the others too poorly to judge them
+SHARE_OF_FEW = 0.75  # of so few poses that make a sample
+GATE = 5.1  # square root of chi-square, 3 degrees of freedom, at 1e-5
+LOOSE_GATE = 8.0  # where covariances are not given: real trackers have heavy tails
+MEDIAN_CHI = 1.538  # square root of the median of that chi-square
+MAX_PASSES = 20
+MAX_EXCESS = 5.0  # scatter of the tip over what the covariances of the poses explain
+MAX_SCATTER = 0.2  # mm rms; less is passed whatever the covariances say
+TINY = 1e-12  # mm; exact poses have no scatter
+
+
+@dataclass(frozen=True, eq=False)
+class PivotFit:
+    """Tip of a pen, and the point that it pivots about.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        Tip in the pen frame, mm.
+    pivot_cam : (3,) array
+        Point the tip rested on, in the camera frame, mm.
+    covariance : (6, 6) array
+        Of (tip_pen, pivot_cam), mm^2.
+    residuals : (N, 3) array
+        Where each pose puts the tip, minus ``pivot_cam``, camera frame, mm.
+    distances : (N,) array
+        Length of the residuals in standard deviations, 1.73 on average.
+    used : (N,) array of bool
+        Poses that agree with the pivot; the others were left out.
+    """
+
+    tip_pen: FloatArray
+    pivot_cam: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    distances: FloatArray
+    used: BoolArray
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the components of the residuals of used poses, mm."""
+        return float(np.sqrt(np.mean(self.residuals[self.used] ** 2)))
+
+
+def fit_pivot(
+    rotations: FloatArray,
+    translations: FloatArray,
+    covariances: FloatArray | None = None,
+    *,
+    robust: bool = True,
+) -> PivotFit:
+    """Fit tip and pivot to poses by linear least squares.
+
+    Without covariances all equations weigh the same: the algebraic one-step method
+    [1]_. A robust fit starts from the best of many small samples [2]_, then keeps the
+    poses within the gate until their set no longer changes.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+    covariances : (N, 6, 6) array, optional
+        Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
+    robust : bool
+        Leave out poses that do not agree with the pivot of the others.
+
+    Returns
+    -------
+    PivotFit
+
+    Raises
+    ------
+    CalibrationError
+        There are too few poses, they turn too little to fix the tip, or the tip moved
+        by far more than the covariances allow.
+
+    References
+    ----------
+    .. [1] Z. Yaniv, "Which pivot calibration?", Proc. SPIE 9415 (2015) 941527.
+    .. [2] P. J. Rousseeuw, "Least median of squares regression", J. American
+       Statistical Association 79 (1984) 871-880.
+    """
+    _require_number(len(rotations))
+    require_spread(rotations)
+    equations = _Equations(rotations, translations, covariances)
+    everything = np.ones(len(rotations), dtype=bool)
+    if not robust:
+        return equations.fit(everything, everything)
+    used = equations.gate(_best_sample(equations), everything)
+    for _ in range(MAX_PASSES):
+        _require_number(int(used.sum()))
+        require_spread(rotations[used])
+        gated = equations.gate(equations.solve_weighted(used), used)
+        if np.array_equal(gated, used):
+            break
+        used = gated
+    fit = equations.fit(used, gated)
+    if covariances is not None:
+        _require_steadiness(fit)
+    return fit
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    rotations: FloatArray
+    translations: FloatArray
+    covariances: FloatArray | None
+
+    def fit(self, used: BoolArray, gated: BoolArray) -> PivotFit:
+        """Solve over the used poses."""
+        solution = self.solve_weighted(used)
+        residuals = self.residuals(solution)
+        distances = self.distances(solution)
+        n_free = 3 * int(used.sum()) - 6
+        variance = float(np.sum(distances[used] ** 2)) / n_free
+        if self.covariances is None:
+            distances = distances / max(np.sqrt(variance), TINY)
+        else:
+            variance = max(variance, 1.0)
+        H, _ = self.normal_equations(used[None], solution[:3])
+        return PivotFit(
+            tip_pen=solution[:3],
+            pivot_cam=solution[3:],
+            covariance=variance * np.linalg.inv(H[0]),
+            residuals=residuals,
+            distances=distances,
+            used=gated,
+        )
+
+    def solve_weighted(self, used: BoolArray) -> FloatArray:
+        """Return the solution (6,) over the used poses."""
+        solution = self.solve(used[None])[0]
+        if self.covariances is not None:
+            for _ in range(2):  # the weights depend on the tip, and hardly at that
+                solution = self.solve(used[None], solution[:3])[0]
+        return np.asarray(solution)
+
+    def gate(self, solution: FloatArray, used: BoolArray) -> BoolArray:
+        """Return which poses are within the gate.
+
+        The median distance of the used poses sets the unit, so that a model that fits
+        worse than the covariances say (geometry errors, a worn cone) does not cost good
+        poses.
+        """
+        distances = self.distances(solution)
+        unit = float(np.median(distances[used])) / MEDIAN_CHI
+        if self.covariances is None:
+            return np.asarray(distances <= LOOSE_GATE * max(unit, TINY))
+        return np.asarray(distances <= GATE * max(unit, 1.0))
+
+    def solve(self, used: BoolArray, tip_pen: FloatArray | None = None) -> FloatArray:
+        """Return the solutions (S, 6) over S sets of poses, ``used`` (S, N)."""
+        H, g = self.normal_equations(used, tip_pen)
+        # A sample of too similar poses is singular: any finite answer will do.
+        H = H + 1e-12 * np.trace(H, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+        solutions: FloatArray = np.linalg.solve(H, g[..., None])[..., 0]
+        return solutions
+
+    def normal_equations(
+        self, used: BoolArray, tip_pen: FloatArray | None
+    ) -> tuple[FloatArray, FloatArray]:
+        A = contact_matrix(self.rotations)
+        # Shifted by the mean translation, which keeps the numbers small.
+        center = self.translations.mean(axis=0)
+        b = center - self.translations
+        WA = A
+        if self.covariances is not None and tip_pen is not None:
+            covariances = tip_covariances(self.rotations, self.covariances, tip_pen)
+            WA = np.linalg.inv(covariances) @ A
+        H_each = np.swapaxes(WA, 1, 2) @ A
+        g_each = np.einsum("nki,nk->ni", WA, b)
+        H = np.einsum("sn,nij->sij", used.astype(float), H_each)
+        g = np.einsum("sn,ni->si", used.astype(float), g_each)
+        shift = np.concatenate([np.zeros(3), center])
+        return H, g + H @ shift
+
+    def residuals(self, solution: FloatArray) -> FloatArray:
+        """Return where each pose puts the tip minus the pivot, (N, 3), mm."""
+        return self.rotations @ solution[:3] + self.translations - solution[3:]
+
+    def distances(self, solution: FloatArray) -> FloatArray:
+        """Return the lengths of the residuals, in standard deviations if known."""
+        residuals = self.residuals(solution)
+        if self.covariances is None:
+            return np.asarray(np.linalg.norm(residuals, axis=1))
+        covariances = tip_covariances(self.rotations, self.covariances, solution[:3])
+        whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
+        squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
+        return np.sqrt(squares)
+
+
+def contact_matrix(rotations: FloatArray) -> FloatArray:
+    """Return [R_i, -I], (N, 3, 6): the equations of tip and pivot are A x = -t_i."""
+    minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
+    return np.concatenate([rotations, minus_identity], axis=2)
+
+
+def tip_covariances(
+    rotations: FloatArray, covariances: FloatArray, tip_pen: FloatArray
+) -> FloatArray:
+    """Return the covariances (N, 3, 3) of where poses put the tip, camera frame, mm^2.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of cam_from_pen.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt), rad and mm.
+    tip_pen : (3,) array
+        mm.
+    """
+    J = np.concatenate(
+        [-skew(rotations @ tip_pen), np.broadcast_to(np.eye(3), rotations.shape)],
+        axis=2,
+    )
+    result: FloatArray = J @ covariances @ np.swapaxes(J, 1, 2)
+    return result
+
+
+def _best_sample(equations: _Equations) -> FloatArray:
+    """Return the solution of the sample whose median distance is least."""
+    n_poses = len(equations.rotations)
+    rng = default_rng(0)  # the same poses give the same tip
+    size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
+    order = np.argsort(rng.random((N_SAMPLES, n_poses)), axis=1)
+    members = np.zeros((N_SAMPLES, n_poses), dtype=bool)
+    np.put_along_axis(members, order[:, :size], True, axis=1)
+    solutions = equations.solve(members)
+    tips = np.einsum("nij,sj->sni", equations.rotations, solutions[:, :3])
+    residuals = tips + equations.translations - solutions[:, None, 3:]
+    medians = np.median(np.linalg.norm(residuals, axis=2), axis=1)
+    return np.asarray(solutions[np.argmin(medians)])
+
+
+def _require_number(n_poses: int) -> None:
+    if n_poses < MIN_POSES:
+        raise CalibrationError(
+            f"{n_poses} poses are usable; the tip needs at least {MIN_POSES}. "
+            "Capture more images."
+        )
+
+
+def _require_steadiness(fit: PivotFit) -> None:
+    scatter = float(np.sqrt(np.mean(np.sum(fit.residuals[fit.used] ** 2, axis=1))))
+    excess = float(np.median(fit.distances[fit.used])) / MEDIAN_CHI
+    if excess > MAX_EXCESS and scatter > MAX_SCATTER:
+        raise CalibrationError(
+            f"The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), "
+            f"{excess:.0f} times what the images alone explain. Press the tip into the "
+            "cone and repeat; check that cone and camera are clamped."
+        )

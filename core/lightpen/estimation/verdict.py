@@ -1,0 +1,172 @@
+"""The verdict on a calibration: good, to be looked at, or to be repeated, and why."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
+from lightpen.estimation.led_quality import DISPLACED
+from lightpen.estimation.uncertainty import Halves
+from lightpen.messages import Code, Message
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
+
+FAR_OFF = 3.0  # times the limit of U: no result to work with
+MANY_DROPPED = 0.2  # of the images
+HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
+FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
+USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
+
+
+class Grade(StrEnum):
+    """What to do with a calibration."""
+
+    PASS = "pass"
+    CHECK = "check"
+    REPEAT = "repeat"
+
+
+class NextStep(StrEnum):
+    """What to do after a verdict."""
+
+    ACCEPT = "accept"
+    CAPTURE_MORE = "capture more"
+    REPEAT = "repeat"
+    CHECK_FILES = "check files"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A grade, and the reason that counts most.
+
+    Attributes
+    ----------
+    grade : Grade
+    reason : Message
+    """
+
+    grade: Grade
+    reason: Message
+
+    @property
+    def can_be_accepted(self) -> bool:
+        """Whether its tip may be put in force."""
+        return self.grade is not Grade.REPEAT
+
+    @property
+    def next_step(self) -> NextStep:
+        """The one thing to do that answers the reason."""
+        return _NEXT_STEPS[self.reason.code]
+
+
+_NEXT_STEPS = {
+    Code.GOOD: NextStep.ACCEPT,
+    Code.UNCERTAIN: NextStep.CAPTURE_MORE,
+    Code.TOO_FEW_IMAGES: NextStep.CAPTURE_MORE,
+    Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
+    Code.HALVES_DIFFER: NextStep.REPEAT,
+    Code.MANY_DROPPED: NextStep.REPEAT,
+    Code.LEDS_OFF: NextStep.CHECK_FILES,
+    Code.LED_DISPLACED: NextStep.CHECK_FILES,
+    Code.LEDS_MISFIT: NextStep.CHECK_FILES,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """How far a tip lies from an earlier one.
+
+    Attributes
+    ----------
+    difference : (3,) array
+        Now minus then, pen frame, mm.
+    expanded_uncertainty : (3,) array
+        U (k = 2) of the difference, of two independent calibrations, mm.
+    """
+
+    difference: FloatArray
+    expanded_uncertainty: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """How far apart the tips lie, mm."""
+        return float(np.linalg.norm(self.difference))
+
+    @property
+    def is_unusual(self) -> bool:
+        """Whether it is more than both uncertainties and usual wear explain."""
+        beyond = np.abs(self.difference) > self.expanded_uncertainty
+        return self.distance > USUAL_CHANGE and bool(beyond.any())
+
+
+def change_since(
+    tip_pen: FloatArray,
+    uncertainty: FloatArray,
+    tip_then: FloatArray,
+    uncertainty_then: FloatArray,
+) -> Change:
+    """Compare a tip with an earlier one: both (3,), pen frame, with U (k = 2), mm."""
+    return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
+
+
+def distance_from_nominal(
+    tip_pen: FloatArray, nominal_tip: FloatArray | None
+) -> float | None:
+    """Return how far a tip lies from its place by design, mm, if that is too far."""
+    if nominal_tip is None:
+        return None
+    distance = float(np.linalg.norm(tip_pen - nominal_tip))
+    return distance if distance > FAR_FROM_NOMINAL else None
+
+
+def halves_agree(halves: Halves) -> bool:
+    """Return whether the odd and the even images differ no more than by chance."""
+    within = np.abs(halves.difference) <= HALVES_GATE * halves.expanded_uncertainty
+    return bool(within.all())
+
+
+def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
+    """Judge a calibration by what its tip is worth, not by its residuals alone."""
+    uncertainty = calibration.budget.weakest_uncertainty
+    limit = limits.max_uncertainty
+    uncertain = Message(Code.UNCERTAIN, (uncertainty, limit))
+    by_leds = calibration.budget.led_uncertainty
+    led_sigma = calibration.geometry.led_sigma
+    if by_leds > limit and led_sigma > DISPLACED:  # more images hardly change it
+        uncertain = Message(Code.LEDS_OFF, (led_sigma, by_leds))
+    if uncertainty > FAR_OFF * limit:
+        return Verdict(Grade.REPEAT, uncertain)
+    differences = np.abs(calibration.halves.difference)
+    by_chance = HALVES_GATE * calibration.halves.expanded_uncertainty
+    # A difference that is certain but smaller than what is allowed does not matter.
+    apart = (differences > by_chance) & (differences > limit)
+    if apart.any():
+        worst = int(np.argmax(np.where(apart, differences, 0)))
+        usual = calibration.halves.expanded_uncertainty[worst]
+        figures = (float(differences[worst]), float(usual))
+        return Verdict(Grade.CHECK, Message(Code.HALVES_DIFFER, figures))
+    if calibration.joint.sigma > USUAL_SIGMA:
+        figures = (calibration.joint.sigma, USUAL_SIGMA)
+        return Verdict(Grade.CHECK, Message(Code.LEDS_MISFIT, figures))
+    if calibration.leds.displaced:
+        lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
+        led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
+        displaced = Message(Code.LED_DISPLACED, (led, float(lengths[led - 1])))
+        return Verdict(Grade.CHECK, displaced)
+    n_images, n_used = len(calibration.used), int(calibration.used.sum())
+    if n_images - n_used > MANY_DROPPED * n_images:
+        dropped = Message(Code.MANY_DROPPED, (n_images - n_used, n_images))
+        return Verdict(Grade.CHECK, dropped)
+    if uncertainty > limit:
+        return Verdict(Grade.CHECK, uncertain)
+    if n_images < limits.min_images:
+        few = Message(Code.TOO_FEW_IMAGES, (n_images, limits.min_images))
+        return Verdict(Grade.CHECK, few)
+    bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
+    if len(bare):
+        n_images = limits.min_per_field * len(bare)
+        little = Message(Code.TOO_LITTLE_TILT, (n_images, *map(int, bare)))
+        return Verdict(Grade.CHECK, little)
+    return Verdict(Grade.PASS, Message(Code.GOOD, (uncertainty,)))

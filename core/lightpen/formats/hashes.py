@@ -1,0 +1,47 @@
+"""The files that a calibration was made from, with their hashes."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from lightpen.arrays import FloatArray
+from lightpen.formats.files import sha256
+
+
+@dataclass(frozen=True)
+class InputFile:
+    """A file that went into a calibration."""
+
+    path: Path
+    sha256: str
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What a calibration was made from.
+
+    Attributes
+    ----------
+    camera, pen : InputFile
+    observations : tuple of InputFile
+        The images, the video or the file of LED centres.
+    nominal_tip : (3,) array or None
+        Where the design puts the tip, pen frame, mm.
+    """
+
+    camera: InputFile
+    pen: InputFile
+    observations: tuple[InputFile, ...]
+    nominal_tip: FloatArray | None
+
+
+def hashed(path: Path) -> InputFile:
+    """Return a file with its hash."""
+    return InputFile(path, sha256(path))
+
+
+def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:
+    """Return files with their hashes, read in threads."""
+    with ThreadPoolExecutor() as executor:
+        return tuple(executor.map(hashed, paths))

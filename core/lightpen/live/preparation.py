@@ -1,0 +1,240 @@
+"""What a calibration needs before the pen is swung, and what of it is missing."""
+
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from enum import StrEnum
+from importlib.metadata import version
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
+from lightpen.live.aim import Aim
+from lightpen.model.camera import Camera
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.record.names import Names
+from lightpen.record.reading import FileCopy, Header, Plain
+from lightpen.swing.state import (
+    SwingSetup,
+)
+
+
+class SourceKind(StrEnum):
+    """Where images come from."""
+
+    SIMULATED = "simulated"
+    RECORDED = "recorded"
+
+
+@dataclass(frozen=True)
+class SourceChoice:
+    """The source of images.
+
+    Attributes
+    ----------
+    kind : SourceKind
+    place : str
+        Folder, pattern or video of a recording; else empty.
+    """
+
+    kind: SourceKind = SourceKind.SIMULATED
+    place: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class CameraFile:
+    """An intrinsics file that was read."""
+
+    path: Path
+    camera: Camera
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read it; `FileError` if it cannot be."""
+        return cls(path, read_camera(path))
+
+
+@dataclass(frozen=True, eq=False)
+class PenFile:
+    """An LED geometry file that was read.
+
+    Attributes
+    ----------
+    path : Path
+    pen : Pen
+    units : str or None
+        That were given for a file that does not say.
+    """
+
+    path: Path
+    pen: Pen
+    units: str | None = None
+
+    @classmethod
+    def read(cls, path: Path, units: str | None = None) -> Self:
+        """Read it; `FileError` if it cannot be."""
+        return cls(path, read_pen(path, units), units)
+
+
+class Lack(StrEnum):
+    """What keeps a step from being complete, in the order of the steps."""
+
+    STATION = "station"
+    OPERATOR = "operator"
+    PEN = "pen"
+    TIP = "tip"
+    CONE = "cone"
+    SOURCE_PLACE = "source place"
+    IMAGES = "images"
+    CAMERA_FILE = "camera file"
+    IMAGE_SIZE = "image size"
+    PEN_FILE = "pen file"
+    SAVED_LEDS = "saved leds"
+
+
+@dataclass(frozen=True, eq=False)
+class Preparation:
+    """All that was chosen for a calibration.
+
+    Attributes
+    ----------
+    names : Names
+    nominal_tip : (3,) array or None
+        Its centre by design, pen frame, mm; None leaves that of the LED file in force.
+    source : SourceChoice
+    image_size : pair of int or None
+        Width and height of the live images, px; None while there are none.
+    camera_file : CameraFile or None
+    pen_file : PenFile or None
+    mask : (M, 3) array
+        Circles of stray light: centre x, y and radius, px.
+    limits : SwingLimits
+    has_unsaved_leds : bool
+        Whether LEDs were edited or opened that are not those of the file in use.
+    """
+
+    names: Names = field(default_factory=Names)
+    nominal_tip: FloatArray | None = None
+    source: SourceChoice = field(default_factory=SourceChoice)
+    image_size: tuple[int, int] | None = None
+    camera_file: CameraFile | None = None
+    pen_file: PenFile | None = None
+    mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    has_unsaved_leds: bool = False
+
+    @property
+    def camera(self) -> Camera | None:
+        """The intrinsics."""
+        return None if self.camera_file is None else self.camera_file.camera
+
+    @property
+    def pen(self) -> Pen | None:
+        """The pen, with the nominal tip that is in force."""
+        if self.pen_file is None:
+            return None
+        if self.nominal_tip is None:
+            return self.pen_file.pen
+        return replace(self.pen_file.pen, nominal_tip=self.nominal_tip)
+
+    @property
+    def aim(self) -> Aim:
+        """What to look for in the images."""
+        return Aim(self.camera, self.pen, self.mask)
+
+    def start_lacks(self) -> tuple[Lack, ...]:
+        """Return what the step Start lacks."""
+        names = self.names
+        given = {
+            Lack.STATION: names.station,
+            Lack.OPERATOR: names.operator,
+            Lack.PEN: names.pen,
+            Lack.TIP: names.tip,
+            Lack.CONE: names.cone,
+        }
+        return tuple(lack for lack, name in given.items() if not name.strip())
+
+    def camera_lacks(self) -> tuple[Lack, ...]:
+        """Return what the step Camera lacks."""
+        lacks = []
+        if self.source.kind is SourceKind.RECORDED and not self.source.place:
+            lacks.append(Lack.SOURCE_PLACE)
+        elif self.image_size is None:
+            lacks.append(Lack.IMAGES)
+        camera = self.camera
+        if camera is None:
+            lacks.append(Lack.CAMERA_FILE)
+        elif self.image_size not in (None, (camera.width, camera.height)):
+            lacks.append(Lack.IMAGE_SIZE)
+        return tuple(lacks)
+
+    def leds_lacks(self) -> tuple[Lack, ...]:
+        """Return what the step LEDs lacks."""
+        lacks = {
+            Lack.PEN_FILE: self.pen_file is None,
+            Lack.SAVED_LEDS: self.has_unsaved_leds,
+        }
+        return tuple(lack for lack, is_lacking in lacks.items() if is_lacking)
+
+    def lacks(self) -> tuple[Lack, ...]:
+        """Return all that is missing before a swing."""
+        return self.start_lacks() + self.camera_lacks() + self.leds_lacks()
+
+    def swing_setup(self) -> SwingSetup:
+        """Return what the swing is captured with; nothing may be missing."""
+        camera, pen = self.camera, self.pen
+        if camera is None or pen is None:
+            raise ValueError("`camera_file` and `pen_file` must be chosen.")
+        return SwingSetup(camera, pen, self.limits, self.mask)
+
+    def swings_like(self, other: "Preparation") -> bool:
+        """Return whether a swing begun with the other would be the same."""
+        return (
+            self.camera_file is other.camera_file
+            and self.pen_file is other.pen_file
+            and self.names == other.names
+            and self.limits == other.limits
+            and _same(self.nominal_tip, other.nominal_tip)
+            and np.array_equal(self.mask, other.mask)
+        )
+
+    def header(self, settings: dict[str, Plain] | None = None) -> Header:
+        """Return the header of a record that begins now; files are read again."""
+        if self.camera_file is None or self.pen_file is None:
+            raise ValueError("`camera_file` and `pen_file` must be chosen.")
+        limits = self.limits
+        return Header(
+            camera=FileCopy.of(self.camera_file.path, "camera file"),
+            pen=FileCopy.of(self.pen_file.path, "pen file"),
+            created=datetime.now(UTC).astimezone(),
+            program=f"lightpen {version('lightpen')}",
+            station=self.names.station,
+            operator=self.names.operator,
+            tip=self.names.tip,
+            cone=self.names.cone,
+            units=self.pen_file.units,
+            nominal_tip=self.nominal_tip,
+            mask=self.mask,
+            settings={
+                "pen": self.names.pen,
+                "ball_diameter_mm": self.names.ball_diameter,
+                "source": str(self.source.kind),
+                "source_place": self.source.place,
+                "max_uncertainty_mm": limits.max_uncertainty,
+                "min_images": limits.min_images,
+                "max_images": limits.max_images,
+                "min_per_field": limits.min_per_field,
+                "spacing_rad": limits.spacing,
+                **(settings or {}),
+            },
+        )
+
+
+def _same(one: FloatArray | None, other: FloatArray | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)

@@ -1,0 +1,39 @@
+"""The cameras that stand for the choice of a source."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.protocol import ImageCamera
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.live.preparation import SourceChoice, SourceKind
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.scenes import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What sources and the program go by.
+
+    Attributes
+    ----------
+    scene : Scene
+        What the simulated camera sees.
+    clock : Clock
+    now : callable
+        Returns date and time with the time zone, to tell ages by.
+    """
+
+    scene: Scene = field(default_factory=Scene)
+    clock: Clock = field(default_factory=MachineClock)
+    now: Callable[[], datetime] = lambda: datetime.now().astimezone()
+
+
+def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
+    """Return the camera of a source, not yet opened."""
+    match choice.kind:
+        case SourceKind.SIMULATED:
+            return SimulatedCamera(around.scene, around.clock)
+        case SourceKind.RECORDED:
+            return ReplayCamera(choice.place, loops=True, clock=around.clock)

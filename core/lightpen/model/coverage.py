@@ -1,0 +1,175 @@
+"""Which postures a swing holds, and whether they fix the tip at all.
+
+The direction ``a`` of the pen frame along which the tip can be found must itself turn
+in the camera: the scatter matrix of the rotations, ``mean (R_i - R)^T (R_i - R)``, says
+by how much. A swing about one axis leaves that axis without scatter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import CalibrationError
+from lightpen.model.rigid import nearest_rotation
+
+MIN_SPREAD = np.radians(3.0)  # rms turn of the worst direction; a cone of 3 degrees
+TILT_RINGS = (np.radians(8.0), np.radians(20.0))  # upright, leaning, leaning far
+N_DIRECTIONS = 8
+DIRECTION_NAMES = (
+    "to the right",
+    "to the right and away from the camera",
+    "away from the camera",
+    "to the left and away from the camera",
+    "to the left",
+    "to the left and towards the camera",
+    "towards the camera",
+    "to the right and towards the camera",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Postures of a swing.
+
+    Attributes
+    ----------
+    tilts : (N,) array
+        Angle between the pen's axis (its y) and upright (-v of the camera), rad.
+    directions : (N,) array
+        Where the pen leans, as the camera sees it: 0 to the right, pi/2 away from
+        the camera, rad.
+    turns : (N,) array
+        Turn about the pen's own axis from the mean posture, rad.
+    counts : (2, 8) array of int
+        Images leaning moderately and far, by direction from the right.
+    n_upright : int
+        Images with hardly any tilt.
+    spread : (3,) array
+        Rms turn of the worst to the best direction of the pen frame, rad.
+    axes : (3, 3) array
+        These directions, unit vectors of the pen frame, one a row.
+    """
+
+    tilts: FloatArray
+    directions: FloatArray
+    turns: FloatArray
+    counts: FloatArray
+    n_upright: int
+    spread: FloatArray
+    axes: FloatArray
+
+    @property
+    def missing(self) -> list[str]:
+        """Directions in which the pen never leant, in words."""
+        leant = self.counts.sum(axis=0) > 0
+        return [
+            name for name, seen in zip(DIRECTION_NAMES, leant, strict=True) if not seen
+        ]
+
+
+def measure_coverage(rotations: FloatArray) -> Coverage:
+    """Measure which postures rotations (N, 3, 3) of cam_from_pen hold."""
+    axis = rotations[:, :, 1]
+    right, up, away = axis[:, 0], -axis[:, 1], axis[:, 2]
+    tilts = np.arccos(np.clip(up, -1, 1))
+    directions = np.arctan2(away, right) % (2 * np.pi)
+    ring = np.digitize(tilts, TILT_RINGS)
+    sector = np.rint(directions / (2 * np.pi / N_DIRECTIONS)).astype(int) % N_DIRECTIONS
+    counts = np.zeros((2, N_DIRECTIONS), dtype=int)
+    np.add.at(counts, (ring[ring > 0] - 1, sector[ring > 0]), 1)
+    spread, axes = posture_spread(rotations)
+    mean = nearest_rotation(rotations.mean(axis=0))
+    relative = mean.T @ rotations
+    return Coverage(
+        tilts=tilts,
+        directions=directions,
+        turns=np.arctan2(
+            relative[:, 0, 2] - relative[:, 2, 0], relative[:, 0, 0] + relative[:, 2, 2]
+        ),
+        counts=counts,
+        n_upright=int(np.sum(ring == 0)),
+        spread=spread,
+        axes=axes,
+    )
+
+
+def posture_spread(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return by how much the directions of the pen turn in the camera.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of cam_from_pen.
+
+    Returns
+    -------
+    spread : (3,) array
+        Rms turn of three orthogonal directions, the least first, rad.
+    axes : (3, 3) array
+        The directions, unit vectors of the pen frame, one a row.
+    """
+    deviations = rotations - rotations.mean(axis=0)
+    scatter = np.einsum("nki,nkj->ij", deviations, deviations) / len(rotations)
+    values, vectors = np.linalg.eigh(scatter)
+    return np.sqrt(np.maximum(values, 0)), vectors.T
+
+
+def require_spread(rotations: FloatArray) -> None:
+    """Refuse rotations (N, 3, 3) that do not fix the tip.
+
+    Raises
+    ------
+    CalibrationError
+        Says which movement is missing.
+    """
+    spread, axes = posture_spread(rotations)
+    if spread[0] >= MIN_SPREAD:
+        return
+    found = f"{np.degrees(spread[0]):.1f} degrees"
+    needed = f"{np.degrees(MIN_SPREAD):.0f} degrees are needed"
+    if spread[1] < MIN_SPREAD:
+        raise CalibrationError(
+            f"The pen hardly moved: its postures differ by {found} (rms), {needed}. "
+            "Tilt the pen to all sides, by 20 degrees or more, and turn it about its "
+            "own axis."
+        )
+    raise CalibrationError(
+        f"The pen was swung about one axis only, {_axis_name(axes[0])}: that axis "
+        f"itself turned by {found} (rms), {needed}, so the tip's place along it is "
+        f"not fixed. {_advice(axes[0])}"
+    )
+
+
+def _axis_name(axis: FloatArray) -> str:
+    largest = int(np.argmax(np.abs(axis)))
+    if abs(axis[largest]) > 0.9:
+        return f"the pen's {'xyz'[largest]} axis"
+    return "the direction ({:.2f}, {:.2f}, {:.2f}) of the pen".format(*axis)
+
+
+def _advice(axis: FloatArray) -> str:
+    largest = int(np.argmax(np.abs(axis)))
+    return (
+        "Lean the pen to the left and right as well as towards and away from the "
+        "camera, and turn it about its own axis.",
+        "Tilt the pen to all sides, by 20 degrees or more, not only about its own "
+        "axis.",
+        "Lean the pen towards and away from the camera as well as to the left and "
+        "right, and turn it about its own axis.",
+    )[largest]
+
+
+def dial_counts(rotations: FloatArray) -> IntArray:
+    """Return how many of the postures (N, 3, 3) lie in each field of the dial, (3, 8).
+
+    The rows are upright, leaning, leaning far; the columns the directions from the
+    right against the clock, as `DIRECTION_NAMES` has them. All upright ones are in the
+    first column.
+    """
+    counts = np.zeros((3, N_DIRECTIONS), dtype=np.int64)
+    if len(rotations):
+        coverage = measure_coverage(rotations)
+        counts[0, 0] = coverage.n_upright
+        counts[1:] = coverage.counts
+    return counts

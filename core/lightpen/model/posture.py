@@ -1,0 +1,78 @@
+"""How the pen is held, in the three numbers that its holder can change.
+
+The pen leans by a tilt from upright to a direction, and is turned about its own axis:
+
+    R = A(tilt, direction) U Ry(turn)
+
+Upright, U puts the pen's y axis against the v axis of the camera and turns its LEDs to
+the camera. A turns y the short way to where the pen leans, which is ``(sin(tilt)
+cos(direction), -cos(tilt), sin(tilt) sin(direction))`` in the camera frame.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import rotation_from_vector
+
+MIN_SIDEWAYS = 0.1  # of the mean normal; LEDs along the axis have no side to face with
+
+
+@dataclass(frozen=True)
+class Posture:
+    """One posture of the pen.
+
+    Attributes
+    ----------
+    tilt : float
+        Angle between the pen's axis and upright, rad.
+    direction : float
+        Where it leans to, as the camera sees it: 0 to the right, pi/2 away from the
+        camera, rad.
+    turn : float
+        About its own axis, seen from above against the clock, from where its LEDs face
+        the camera, rad.
+    """
+
+    tilt: float
+    direction: float
+    turn: float
+
+
+def rotations_of(
+    pen: Pen, tilts: FloatArray, directions: FloatArray, turns: FloatArray
+) -> FloatArray:
+    """Return the rotations of cam_from_pen, (N, 3, 3), of N postures, each (N,)."""
+    zero = np.zeros_like(tilts)
+    axes = np.stack([-np.sin(directions), zero, np.cos(directions)], axis=-1)
+    leant = rotation_from_vector(axes * tilts[:, None])
+    turned = rotation_from_vector(np.stack([zero, turns, zero], axis=-1))
+    return np.asarray(leant @ _upright(pen) @ turned)
+
+
+def posture_of(pen: Pen, rotation: FloatArray) -> Posture:
+    """Return the posture of a pen with the rotation (3, 3) of cam_from_pen."""
+    right, down, away = rotation[:, 1]
+    tilt = float(np.arctan2(np.hypot(right, away), -down))
+    direction = float(np.arctan2(away, right) % (2 * np.pi))
+    still = rotations_of(pen, np.array([tilt]), np.array([direction]), np.zeros(1))[0]
+    about_y = still.T @ rotation
+    return Posture(tilt, direction, float(np.arctan2(about_y[0, 2], about_y[0, 0])))
+
+
+def angles_between(rotations: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the angles, rad, from rotations (N, 3, 3) to others (M, 3, 3), (N, M)."""
+    traces = rotations.reshape(-1, 9) @ others.reshape(-1, 9).T
+    return np.asarray(np.arccos(np.clip((traces - 1) / 2, -1, 1)))
+
+
+def _upright(pen: Pen) -> FloatArray:
+    """Return cam_from_pen of the pen upright, its LEDs facing the camera."""
+    facing = pen.normals.mean(axis=0) * np.array([1.0, 0.0, 1.0])
+    length = float(np.linalg.norm(facing))
+    z = facing / length if length > MIN_SIDEWAYS else np.array([0.0, 0.0, 1.0])
+    y = np.array([0.0, 1.0, 0.0])
+    x = np.cross(y, z)
+    return np.asarray(np.diag([1.0, -1.0, -1.0]) @ np.stack([x, y, z]))

@@ -1,0 +1,1 @@
+"""A swing on disk, its solution and the results that were accepted."""

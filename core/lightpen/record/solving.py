@@ -1,0 +1,211 @@
+"""The tip of a recorded swing: the one computation that all who ask for it share.
+
+The wizard, its review and the command line compute the tip of a record here, always
+from the images on the disk, so that they agree to the last digit. What was seen in the
+images does not depend on which of them take part; taking one out solves anew and reads
+nothing.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.detection.observations import (
+    Observations,
+    leave_out,
+    observe_images,
+)
+from lightpen.detection.pose import MIN_LEDS
+from lightpen.detection.reasons import Reason
+from lightpen.errors import CalibrationError
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.joint import ContactModel, reduce
+from lightpen.formats.hashes import Inputs, all_hashed, hashed
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.record.reading import Record, RecordSource, source
+
+TURNS = 8  # steps by which an image that is left out is turned into the fit
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The tip of a record, and what it was computed from.
+
+    Attributes
+    ----------
+    source : RecordSource
+    numbers : (N,) array of int
+        Of the images, in the record.
+    observations : Observations
+        What all N images show, whether they take part or not.
+    taken_out : mapping of int to str
+        Numbers of images that do not take part, and why.
+    calibration : Calibration
+    residuals : (N, L, 2) array
+        Observed minus modelled LED centres with the tip in the cone, px. An image that
+        is left out is turned as fits it best. NaN for LEDs that were not seen, and for
+        images that do not show the pen.
+    """
+
+    source: RecordSource
+    numbers: IntArray
+    observations: Observations
+    taken_out: Mapping[int, str]
+    calibration: Calibration
+    residuals: FloatArray
+
+    @property
+    def misfits(self) -> FloatArray:
+        """Root mean square residual of each image, px, (N,); NaN without the pen.
+
+        Of an image that takes part, over the LEDs that do; else over all.
+        """
+        calibration = self.calibration
+        squares = np.sum(self.residuals**2, axis=2)
+        seen = np.isfinite(squares)
+        counted = np.where(calibration.used[:, None], calibration.leds_used, seen)
+        n_leds = counted.sum(axis=1)
+        total = np.sum(squares, axis=1, where=counted)
+        rms = np.sqrt(total / np.maximum(n_leds, 1))
+        return np.where(n_leds > 0, rms, np.nan)
+
+
+def solve_record(
+    record: Record, report: Callable[[float], None] = lambda fraction: None
+) -> Solution:
+    """Solve a record.
+
+    Parameters
+    ----------
+    record : Record
+    report : callable
+        Called with the fraction done, 0 to 1; what it raises ends the computation.
+
+    Raises
+    ------
+    FileError
+        No image, or not the camera or pen file, can be read.
+    CalibrationError
+        The images do not determine the tip; the text says what is missing.
+    """
+    if not record.images:
+        raise CalibrationError(
+            f"The record {record.folder.name} holds no images. Resume the swing, or "
+            "begin a new one."
+        )
+    found = source(record)
+    observations = observe_images(
+        found.images, found.camera, found.pen, report, mask=found.mask
+    )
+    return _solved(found, record.all_numbers, observations, record.taken_out)
+
+
+def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
+    """Solve with other images taken out, from what was seen before.
+
+    Parameters
+    ----------
+    solution : Solution
+    taken_out : mapping of int to str
+        Numbers of all images that are not to take part, and why.
+
+    Raises
+    ------
+    CalibrationError
+        The rest does not determine the tip; the text says what is missing.
+    """
+    return _solved(solution.source, solution.numbers, solution.observations, taken_out)
+
+
+def load_image(solution: Solution, number: int) -> Image:
+    """Read an image of a solved record again, (H, W), by its number.
+
+    Raises
+    ------
+    FileError
+        The image is missing or damaged.
+    """
+    index = int(np.searchsorted(solution.numbers, number))
+    load = next(islice(solution.source.images.open(), index, None))
+    return load()
+
+
+def record_inputs(source: RecordSource) -> Inputs:
+    """Return the files that the tip of a record is computed from, with their hashes.
+
+    Images that are gone took no part and are not among them.
+    """
+    return Inputs(
+        camera=hashed(source.camera_file),
+        pen=hashed(source.pen_file),
+        observations=all_hashed([f for f in source.images.files if f.is_file()]),
+        nominal_tip=source.pen.nominal_tip,
+    )
+
+
+def _solved(
+    source: RecordSource,
+    numbers: IntArray,
+    observations: Observations,
+    taken_out: Mapping[int, str],
+) -> Solution:
+    reasons = {
+        index: _reason(taken_out[number])
+        for index, number in enumerate(numbers.tolist())
+        if number in taken_out
+    }
+    calibration = calibrate(source.camera, source.pen, leave_out(observations, reasons))
+    return Solution(
+        source=source,
+        numbers=numbers,
+        observations=observations,
+        taken_out=dict(taken_out),
+        calibration=calibration,
+        residuals=_all_residuals(source, observations, calibration),
+    )
+
+
+def _all_residuals(
+    source: RecordSource, observations: Observations, calibration: Calibration
+) -> FloatArray:
+    """Return the residuals of all images, (N, L, 2), as `Solution` has them."""
+    joint = calibration.joint
+    residuals = np.full_like(observations.pixels, np.nan)
+    residuals[calibration.used] = joint.residuals[joint.used.any(axis=1)]
+    shows_pen = np.isfinite(observations.translations[:, 0])
+    enough = np.isfinite(observations.pixels[..., 0]).sum(axis=1) >= MIN_LEDS
+    others = np.flatnonzero(~calibration.used & shows_pen & enough)
+    if len(others):
+        leds = source.pen.leds + calibration.geometry.corrections
+        model = ContactModel(
+            source.camera,
+            replace(source.pen, leds=leds),
+            observations.pixels[others],
+        )
+        residuals[others] = _turned_to_fit(
+            model, observations.rotations[others], joint.tip_pen, joint.cone_cam
+        )
+    return residuals
+
+
+def _turned_to_fit(
+    model: ContactModel,
+    rotations: FloatArray,
+    tip_pen: FloatArray,
+    cone_cam: FloatArray,
+) -> FloatArray:
+    """Return the residuals of images turned about the tip until they fit best, px."""
+    weights = np.isfinite(model.pixels[..., 0]).astype(float)
+    state = model.at(rotations, tip_pen, cone_cam)
+    for _ in range(TURNS):
+        turns = reduce(state, weights).turn
+        rotations = rotation_from_vector(turns) @ rotations
+        state = model.at(rotations, tip_pen, cone_cam)
+    return state.residuals
+
+
+def _reason(text: str) -> Reason:
+    return Reason.SLIPPED if text == Reason.SLIPPED else Reason.TAKEN_OUT

@@ -1,0 +1,319 @@
+"""Writing the record of a swing, as `lightpen.record.reading` describes it."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from hashlib import sha256
+from io import FileIO
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.errors import FileError
+from lightpen.formats.files import printable, write_whole
+from lightpen.record.lock import lock_journal, unlock_journal
+from lightpen.record.reading import (
+    FORMAT,
+    HEADER,
+    IMAGES,
+    JOURNAL,
+    FileCopy,
+    Header,
+    Record,
+    copy_name,
+    image_name,
+    open_record,
+    sound_length,
+)
+
+
+class RecordWriter:
+    """Appends to a record; every method returns when its data is on the disk.
+
+    No other writer can be made of the record, by this program or another, until it is
+    closed.
+    """
+
+    def __init__(self, folder: Path, next_number: int, length: int) -> None:
+        self._folder = folder
+        self._next_number = next_number
+        self._length = length
+        self._journal = _own_journal(folder, length)
+
+    @classmethod
+    def create(cls, folder: Path, header: Header) -> Self:
+        """Make a record in a folder that does not exist or is empty.
+
+        Raises
+        ------
+        FileError
+            The folder holds something, or cannot be written.
+        """
+        if folder.is_dir() and any(folder.iterdir()):
+            raise FileError(
+                f"The folder {printable(str(folder))} is not empty. Choose another "
+                "for this swing; nothing is overwritten."
+            )
+        try:
+            (folder / IMAGES).mkdir(parents=True)
+        except OSError as error:
+            raise _unwritable(folder, error) from error
+        write_whole(folder / copy_name("camera", header.camera), header.camera.data)
+        write_whole(folder / copy_name("pen", header.pen), header.pen.data)
+        write_whole(folder / JOURNAL, b"")
+        text = json.dumps(_header_entries(header), indent=1, ensure_ascii=False)
+        # The bytes of a file name that is no text become JSON escapes.
+        write_whole(folder / HEADER, text.encode("utf-8", "backslashreplace"))
+        _sync_folder(folder)
+        _sync_folder(folder.parent)
+        return cls(folder, 1, 0)
+
+    @classmethod
+    def resume(cls, record: Record) -> Self:
+        """Go on with a record; what a crash left behind is cut off.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record or did so since it was read, or it
+            cannot be written.
+        """
+        writer = cls(record.folder, record.next_number, record.length)
+        for part in (record.folder / IMAGES).glob(".*.part"):
+            with suppress(OSError):  # it does no harm where it is
+                part.unlink()
+        return writer
+
+    @classmethod
+    def of_damaged(cls, folder: Path) -> Self:
+        """Write into the journal of a record that cannot be read, to conclude it.
+
+        Raises
+        ------
+        FileError
+            Another program writes to the record, or it cannot be written.
+        """
+        length = sound_length(folder) if (folder / JOURNAL).exists() else 0
+        return cls(folder, 1, length)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @property
+    def next_number(self) -> int:
+        """Number that the next image gets."""
+        return self._next_number
+
+    def append(
+        self,
+        image: Image,
+        pixels: FloatArray,
+        rotation: FloatArray,
+        translation: FloatArray,
+        time: float,
+        device_time_ns: int | None = None,
+    ) -> int:
+        """Record one image.
+
+        Parameters
+        ----------
+        image : (H, W) array
+            Grey image, 8 or 16 bit.
+        pixels : (L, 2) array
+            Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+        rotation, translation : (3, 3) and (3,) array
+            cam_from_pen, mm.
+        time : float
+            s.
+        device_time_ns : int, optional
+            By the clock of the camera.
+
+        Returns
+        -------
+        int
+            Number of the image: the acknowledgement that it is on the disk.
+
+        Raises
+        ------
+        FileError
+            The image could not be written. All images before it are safe.
+        """
+        number = self._next_number
+        data = encode_png(image)
+        path = self._folder / image_name(number)
+        write_whole(path, data)
+        _sync_folder(path.parent)
+        self._write_line(
+            {
+                "kind": "image",
+                "number": number,
+                "sha256": sha256(data).hexdigest(),
+                "time": time,
+                "device_time_ns": device_time_ns,
+                "pixels": [_point(point) for point in pixels],
+                "rotation": rotation.tolist(),
+                "translation": translation.tolist(),
+            }
+        )
+        self._next_number = number + 1
+        return number
+
+    def take_out(self, numbers: Sequence[int], reason: str) -> None:
+        """Leave images out of the calibration; they stay on the disk."""
+        self._write_line({"kind": "out", "numbers": list(numbers), "reason": reason})
+
+    def put_back(self, numbers: Sequence[int]) -> None:
+        """Let images take part in the calibration again."""
+        self._write_line({"kind": "back", "numbers": list(numbers)})
+
+    def ask_for_more(self, min_images: int, max_images: int) -> None:
+        """Note that the swing goes on after a verdict, and to how many images."""
+        self._write_line(
+            {"kind": "more", "min_images": min_images, "max_images": max_images}
+        )
+
+    def conclude(self, verdict: str) -> None:
+        """Write the verdict: the swing is no longer interrupted."""
+        self._write_line({"kind": "verdict", "verdict": verdict})
+
+    def close(self) -> None:
+        """Close the journal and let other writers in."""
+        if self._journal.closed:
+            return
+        with self._journal, suppress(OSError):  # closing does it, too
+            unlock_journal(self._journal)
+
+    def _write_line(self, entries: Mapping[str, Any]) -> None:
+        line = json.dumps(entries, allow_nan=False).encode() + b"\n"
+        length = len(line)
+        try:
+            self._journal.truncate(self._length)  # a part of a line that failed
+            while line:
+                line = line[self._journal.write(line) :]
+            os.fsync(self._journal.fileno())
+        except OSError as error:
+            with suppress(OSError):
+                self._journal.truncate(self._length)
+            raise _unwritable(self._folder / JOURNAL, error) from error
+        self._length += length
+
+
+def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
+    """Note which images of a record take part from now on.
+
+    Parameters
+    ----------
+    folder : Path
+    taken_out : mapping of int to str
+        Numbers of all images that do not, and why.
+
+    Raises
+    ------
+    FileError
+        The record cannot be written.
+    """
+    record = open_record(folder)
+    back = sorted(set(record.taken_out) - set(taken_out))
+    out = sorted(set(taken_out) - set(record.taken_out))
+    with RecordWriter.resume(record) as writer:
+        if back:
+            writer.put_back(back)
+        for reason in sorted({taken_out[number] for number in out}):
+            writer.take_out([n for n in out if taken_out[n] == reason], reason)
+
+
+def encode_png(image: Image) -> bytes:
+    """Return a grey image as PNG, made for dark images: runs of equal values.
+
+    No row is predicted from the last, which costs time and gains nothing on noise.
+    """
+    options = [
+        *(cv2.IMWRITE_PNG_COMPRESSION, 1),
+        *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
+    ]
+    if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.12 and later
+        options += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    return cv2.imencode(".png", image, options)[1].tobytes()
+
+
+def _own_journal(folder: Path, length: int) -> FileIO:
+    """Open a journal of so many bytes for this writer alone, and cut off the rest."""
+    path = folder / JOURNAL
+    with ExitStack() as stack:
+        try:
+            journal = stack.enter_context(path.open("ab", buffering=0))
+            lock_journal(journal, folder)
+            if sound_length(folder) != length:
+                raise FileError(
+                    f"The swing in {printable(str(folder))} has changed since it was "
+                    "read: another program wrote to it. Read it again to go on with "
+                    "all of its images."
+                )
+            journal.truncate(length)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        stack.pop_all()
+    return journal
+
+
+def _header_entries(header: Header) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "created": header.created.isoformat(),
+        "program": header.program,
+        "station": header.station,
+        "operator": header.operator,
+        "tip": header.tip,
+        "cone": header.cone,
+        "camera_file": _copy_entries(header.camera),
+        "pen_file": _copy_entries(header.pen),
+        "units": header.units,
+        "led_diameter_mm": header.led_diameter,
+        "nominal_tip_mm": (
+            None if header.nominal_tip is None else header.nominal_tip.tolist()
+        ),
+        "mask_px": header.mask.tolist(),
+        "settings": dict(header.settings),
+    }
+
+
+def _copy_entries(file: FileCopy) -> dict[str, str]:
+    return {"name": file.name, "sha256": sha256(file.data).hexdigest()}
+
+
+def _point(point: FloatArray) -> list[float] | None:
+    return point.tolist() if np.isfinite(point).all() else None
+
+
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(
+        f"{printable(str(path))} cannot be written: {error.strerror or error}. Free "
+        "some space or choose another folder; the images recorded so far are safe."
+    )
+
+
+def _sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk, where the system can (not Windows)."""
+    if os.name != "posix":
+        return
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        raise _unwritable(folder, error) from error

@@ -1,1 +1,0 @@
-"""A swing as it happens: its states, the next posture, the record on disk."""

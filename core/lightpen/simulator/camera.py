@@ -1,0 +1,397 @@
+"""The simulated pen as a live camera.
+
+Exposure and gain act as on a real sensor: the light of an LED fills the same fraction
+of full scale when one is doubled and the other halved, but then fewer electrons make it
+up and the image is noisier.
+"""
+
+from collections import deque
+from dataclasses import replace
+from math import ceil
+from typing import Literal
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    Caps,
+    ConfigError,
+    DeviceBusy,
+    DeviceInfo,
+    DeviceLost,
+    DeviceNotFound,
+    Frame,
+    FrameIncomplete,
+    FrameTimeout,
+    Range,
+    Stats,
+    sealed,
+)
+from lightpen.simulator.faults import Faults
+from lightpen.simulator.hand import Held, Operator
+from lightpen.simulator.image_plans import ImagePlan, led_gains, render_plan
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import leds_in_camera
+from lightpen.simulator.view import Lamp, View
+
+SERIAL = "SIM-1"
+EXPOSURE_US = Range(10.0, 50_000.0, 1.0)
+GAIN_DB = Range(0.0, 24.0, 0.1)
+FRAME_RATE = Range(0.1, 200.0)
+USUAL_EXPOSURE_US = 1000.0  # short, so that the swing hardly blurs
+USUAL_FRAME_RATE = 20.0
+BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
+
+N_BUFFERED = 2  # images that wait for a late reader
+MAX_POSES = 64  # through one exposure
+STILL = 0.02  # px moved during the exposure that blur hides
+
+
+class SimulatedCamera:
+    """A camera that looks at a simulated operator with a simulated pen.
+
+    With a `SkippingClock` images come as fast as they are made, and waits for its
+    reader; else it is a live camera, which loses images that are not read in time.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Pen, camera, tip, cone, optics and sensor; its swing and its disturbances are
+        left out.
+    clock : Clock, optional
+    operator : Operator, optional
+        Must go by the same clock.
+    lamps : tuple of Lamp
+        Foreign lights in the picture.
+    serial : str
+
+    Attributes
+    ----------
+    operator : Operator
+    faults : Faults
+    scene : Scene
+    """
+
+    def __init__(
+        self,
+        scene: Scene | None = None,
+        clock: Clock | None = None,
+        operator: Operator | None = None,
+        *,
+        lamps: tuple[Lamp, ...] = (),
+        serial: str = SERIAL,
+    ) -> None:
+        self.scene = scene or Scene()
+        self._clock = clock or MachineClock()
+        n_leds = self.scene.pen.n_leds
+        self.operator = operator or Operator(
+            self._clock, self.scene.seed, n_leds=n_leds
+        )
+        self.faults = Faults(self._clock)
+        self._lamps = lamps
+        self._serial = serial
+        self._gains = led_gains(self.scene)
+        self._settings = self._usual_settings
+        self._stats = Stats()
+        self._next_seq = 0
+        self._is_open = self._is_streaming = False
+        self._n_unplugged = 0
+        self._next_end = 0.0  # of the exposure of the next image
+        self._triggers: deque[float] = deque()
+
+    @property
+    def serial(self) -> str:
+        """Serial number."""
+        return self._serial
+
+    @property
+    def caps(self) -> Caps:
+        """What the camera can do."""
+        self._check_open()
+        usual = f"Mono{self.scene.sensor.bits}"
+        others = tuple(name for name in BITS if name != usual)
+        return Caps(
+            width=self.scene.camera.width,
+            height=self.scene.camera.height,
+            pixel_formats=(usual, *others),
+            exposure_us=EXPOSURE_US,
+            gain_db=GAIN_DB,
+            frame_rate=FRAME_RATE,
+            has_trigger=True,
+            has_timestamps=True,
+            waits=not self._clock.is_real,
+        )
+
+    def open(self) -> None:
+        """Take hold of the camera; nothing if it is open."""
+        if self._is_open:
+            return
+        broken = self.faults.now()
+        if broken.is_unplugged:
+            raise DeviceNotFound(
+                f"The simulated camera {self._serial} is not plugged in. Plug it in."
+            )
+        if self._now < broken.busy_until:
+            raise DeviceBusy(
+                f"Another program uses the simulated camera {self._serial}. Close that "
+                "program, or wait a few seconds."
+            )
+        if self._n_unplugged != broken.n_unplugged:
+            self._n_unplugged = broken.n_unplugged
+            self._settings = self._usual_settings  # it was without power
+        self._is_open = True
+
+    def close(self) -> None:
+        """Stop and let go of the camera."""
+        self.stop()
+        self._is_open = False
+
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        """Set up the camera before the start; return what is in force."""
+        self.probe()
+        if self._is_streaming:
+            raise ValueError("`configure` needs a stopped camera.")
+        now = self._settings
+        pixel_format = settings.pixel_format or now.pixel_format
+        if pixel_format not in BITS:
+            raise ConfigError(
+                f"The simulated camera has no pixel format {pixel_format}; it has "
+                f"{', '.join(BITS)}. Choose one of these."
+            )
+        self._settings = CameraSettings(
+            exposure_us=_applied(EXPOSURE_US, settings.exposure_us, now.exposure_us),
+            gain_db=_applied(GAIN_DB, settings.gain_db, now.gain_db),
+            frame_rate=_applied(FRAME_RATE, settings.frame_rate, now.frame_rate),
+            pixel_format=pixel_format,
+            triggered=settings.triggered,
+        )
+        return self._settings
+
+    def set_exposure(self, exposure_us: float) -> float:
+        """Set the exposure of the next images; return what is in force, us."""
+        self.probe()
+        applied = EXPOSURE_US.nearest(exposure_us)
+        self._settings = replace(self._settings, exposure_us=applied)
+        return applied
+
+    def set_gain(self, gain_db: float) -> float:
+        """Set the gain of the next images; return what is in force, dB."""
+        self.probe()
+        applied = GAIN_DB.nearest(gain_db)
+        self._settings = replace(self._settings, gain_db=applied)
+        return applied
+
+    def start(self) -> None:
+        """Let images come; nothing if they do."""
+        self.probe()
+        if not self._is_streaming:
+            self._is_streaming = True
+            self._triggers.clear()
+            self._next_end = self._now + self._period
+
+    def stop(self) -> None:
+        """Let no more images come; nothing if none do."""
+        self._is_streaming = False
+
+    def read(self, timeout_s: float) -> Frame:
+        """Return the next image, rendered now."""
+        self._check_streaming()
+        self._await_image(timeout_s)
+        frame = self._take_image()
+        self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
+        return frame
+
+    def trigger(self) -> None:
+        """Ask for one image."""
+        self._check_streaming()
+        if not self._settings.triggered:
+            raise ConfigError(
+                "The simulated camera runs freely. Switch its trigger on first."
+            )
+        self._triggers.append(self._now + self._exposure)
+
+    def probe(self) -> None:
+        """Do nothing if the camera answers."""
+        self._check_open()
+        if self._is_cut_off:
+            raise DeviceLost(
+                f"The simulated camera {self._serial} no longer answers. Check its "
+                "cable and its power."
+            )
+
+    def stats(self) -> Stats:
+        """Return what became of the images so far."""
+        return self._stats
+
+    @property
+    def _now(self) -> float:
+        return self._clock.now_ns() * 1e-9
+
+    @property
+    def _usual_settings(self) -> CameraSettings:
+        return CameraSettings(
+            exposure_us=USUAL_EXPOSURE_US,
+            gain_db=0.0,
+            frame_rate=USUAL_FRAME_RATE,
+            pixel_format=f"Mono{self.scene.sensor.bits}",
+        )
+
+    @property
+    def _exposure(self) -> float:
+        return (self._settings.exposure_us or USUAL_EXPOSURE_US) * 1e-6
+
+    @property
+    def _period(self) -> float:
+        return max(1 / (self._settings.frame_rate or USUAL_FRAME_RATE), self._exposure)
+
+    @property
+    def _is_cut_off(self) -> bool:
+        broken = self.faults.now()
+        return broken.is_unplugged or broken.n_unplugged != self._n_unplugged
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise ValueError("The camera is not open: call `open` first.")
+
+    def _check_streaming(self) -> None:
+        self._check_open()
+        if not self._is_streaming:
+            raise ValueError("The camera delivers no images: call `start` first.")
+
+    def _await_image(self, timeout_s: float) -> None:
+        """Wait until the exposure of the next image has ended."""
+        limit = self._now + timeout_s
+        end = self._schedule_next()
+        if end is None or end > limit:
+            self._clock.wait(limit - self._now)
+            self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
+            raise FrameTimeout(
+                f"The simulated camera {self._serial} sent no image for "
+                f"{timeout_s:.1f} s. Check its cable and its trigger."
+            )
+        self._clock.wait(end - self._now)
+
+    def _schedule_next(self) -> float | None:
+        """Settle and return when the exposure of the next image ends, if one comes."""
+        if self._is_cut_off:
+            return None
+        stalled_until = self.faults.now().stalled_until
+        if self._settings.triggered:
+            return max(self._triggers[0], stalled_until) if self._triggers else None
+        if self._next_end < stalled_until:
+            self._next_end = stalled_until + self._period
+        n_late = ceil((self._now - self._next_end) / self._period - N_BUFFERED)
+        if n_late > 0:
+            self._lose(n_late)
+            self._next_end += n_late * self._period
+        return self._next_end
+
+    def _lose(self, n_frames: int) -> None:
+        self._next_seq += n_frames
+        self._stats = replace(self._stats, missed=self._stats.missed + n_frames)
+
+    def _take_image(self) -> Frame:
+        self._lose(self.faults.take_lost())
+        if self._settings.triggered:
+            end = self._triggers.popleft()
+        else:
+            end = self._next_end
+            self._next_end += self._period
+        seq = self._next_seq
+        self._next_seq += 1
+        if self.faults.take_spoilt():
+            self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
+            raise FrameIncomplete(
+                f"Image {seq} of the simulated camera {self._serial} arrived "
+                "incomplete. Check the cable and the network."
+            )
+        return self._expose(seq, end)
+
+    def _expose(self, seq: int, end: float) -> Frame:
+        settings = self._settings
+        pixel_format = settings.pixel_format or "Mono8"
+        times = end - self._exposure * np.array([1.0, 0.5, 0.0])
+        scene = _with_gain(self.scene, settings)
+        image = render_plan(scene, self._shot(scene, seq, times))
+        return Frame(
+            image=sealed(image),
+            seq=seq,
+            host_ts_ns=self._clock.now_ns(),
+            device_ts_ns=round(times[0] * 1e9),
+            exposure_us=settings.exposure_us,
+            pixel_format=pixel_format,
+            bits=BITS[pixel_format],
+        )
+
+    def _shot(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
+        """Return what is seen in the exposure between the first and the last time."""
+        held = self.operator.held(times)
+        rotations, translations = _poses(scene, held)
+        moved = _pixels_moved(scene, rotations, translations)
+        if held.is_away or moved <= STILL:
+            path = slice(1, 2)
+            shown = rotations[path], translations[path]
+        else:
+            n_poses = min(3 + int(moved / scene.optics.psf_sigma), MAX_POSES)
+            parts = (np.arange(n_poses) + 0.5) / n_poses
+            between = times[0] + parts * (times[-1] - times[0])
+            shown = _poses(scene, self.operator.held(between))
+        gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
+        gains[[led - 1 for led in held.covered]] = 0
+        view = View(*shown, gains, self._lamps)
+        return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
+
+
+class SimulatedBackend:
+    """The simulated pen among the ways of getting at cameras."""
+
+    name = "simulated"
+
+    def available(self) -> str | None:
+        """Return None: it always can be used."""
+        return None
+
+    def discover(self) -> tuple[DeviceInfo, ...]:
+        """Return the one camera there is."""
+        return (DeviceInfo(self.name, SERIAL, "Simulated pen"),)
+
+    def camera(self, serial: str) -> SimulatedCamera:
+        """Return the camera, not yet opened."""
+        return SimulatedCamera(serial=serial)
+
+
+def _applied(
+    offered: Range, wanted: float | None, present: float | None
+) -> float | None:
+    return present if wanted is None else offered.nearest(wanted)
+
+
+def _with_gain(scene: Scene, settings: CameraSettings) -> Scene:
+    """Return the scene as it looks with these settings."""
+    gain = 10 ** ((settings.gain_db or 0.0) / 20)
+    exposure = (settings.exposure_us or USUAL_EXPOSURE_US) / USUAL_EXPOSURE_US
+    optics = replace(scene.optics, exposure=scene.optics.exposure * exposure * gain)
+    sensor = replace(
+        scene.sensor,
+        bits=BITS[settings.pixel_format or "Mono8"],
+        full_well=scene.sensor.full_well / gain,
+        offset=scene.sensor.offset / gain,  # the same number in the image
+    )
+    return replace(scene, optics=optics, sensor=sensor)
+
+
+def _poses(scene: Scene, held: Held) -> tuple[FloatArray, FloatArray]:
+    """Return cam_from_pen of a pen that is held so."""
+    rotations = held.postures.rotations
+    return rotations, scene.cone_cam + held.offsets - rotations @ scene.tip_pen
+
+
+def _pixels_moved(
+    scene: Scene, rotations: FloatArray, translations: FloatArray
+) -> float:
+    """Return how far the fastest LED moves from the first to the last pose, px."""
+    leds, _ = leds_in_camera(scene.pen, rotations[[0, -1]], translations[[0, -1]])
+    first, last = scene.camera.project(leds)
+    return float(np.linalg.norm(last - first, axis=-1).max())

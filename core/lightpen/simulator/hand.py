@@ -1,0 +1,352 @@
+"""A simulated operator's hand: it brings the pen to the cone, leans it and lets go.
+
+Time goes in equal small steps, so the movement does not depend on when it is looked at.
+"""
+
+from collections import deque
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from enum import Enum, auto
+from functools import partial
+from math import inf
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.clock import Clock
+from lightpen.simulator.motion import (
+    STEP,
+    Pursuit,
+    Tremor,
+    lean_vectors,
+    postures_of,
+    pursue,
+    swing_at,
+)
+from lightpen.simulator.postures import TREMOR, Postures
+
+N_REMEMBERED = 16  # moments: an exposure of 0.15 s
+PATIENCE = 20.0  # s without an image after which the hand rests until the next
+
+REACTION = 0.25  # s from guidance to movement
+SEAT = np.zeros(3)  # mm from the cone, camera frame
+HOVER = np.array([0.0, -40.0, 0.0])
+AWAY = np.array([420.0, -60.0, -40.0])  # out of the image
+UPRIGHT = np.radians([3.0, 0.0, 0.0])  # how a pen is brought: not quite upright
+PASSED = 8.0  # mm from a place on the way that is near enough
+CAUGHT = 1.0  # mm from which the cone pulls the tip in
+ARRIVED = 3.0  # mm
+FREE_TREMOR = 0.3  # mm, standard deviation of a tip in the air
+FREE_AT = 5.0  # mm from the cone where that tremor is whole
+SLIP_TIME = 0.05  # s that a slip takes
+
+GUIDED = Pursuit(gain=3.0, lag=0.13, top_speed=np.radians(30))
+SWUNG = Pursuit(gain=5.0, lag=0.078, top_speed=np.radians(60))
+MOUSE = Pursuit(gain=12.0, lag=0.0325, top_speed=np.radians(360))
+ARM = Pursuit(gain=4.0, lag=0.0975, top_speed=300.0)
+
+
+class Doing(Enum):
+    """What the operator does, as the last image shows it."""
+
+    ABSENT = auto()
+    APPROACHING = auto()
+    SEATED = auto()
+    SWINGING = auto()
+    LIFTED = auto()
+    LEAVING = auto()
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """How the pen is held at some times.
+
+    Attributes
+    ----------
+    postures : Postures
+        F of them.
+    offsets : (F, 3) array
+        Of the tip from the bottom of the cone in the camera frame, mm.
+    covered : frozenset of int
+        Numbers of the LEDs behind a hand, from 1.
+    is_away : bool
+        Whether the pen is out of the image.
+    """
+
+    postures: Postures
+    offsets: FloatArray
+    covered: frozenset[int]
+    is_away: bool
+
+
+class _Moment(NamedTuple):
+    lean: FloatArray  # tilt times its direction, then turn, rad
+    offset: FloatArray  # mm
+
+
+class _Slip(NamedTuple):
+    start: float
+    end: float
+    offset: FloatArray
+
+
+class _Cover(NamedTuple):
+    start: float
+    end: float
+    leds: frozenset[int]
+
+
+class Operator:
+    """A simulated operator who holds a pen of ``n_leds`` LEDs.
+
+    The commands may come from any thread. They are taken up at the time that the clock
+    shows, which makes the movement a function of the seed, the commands and their
+    times. Angles are those of `lightpen.simulator.postures`.
+
+    Parameters
+    ----------
+    clock : Clock
+    seed : int
+        Chooses the swing, the tremor and where slips go.
+    n_leds : int
+    seated : bool
+        Whether the tip is in the cone at first; else the pen is out of the image.
+    """
+
+    def __init__(
+        self, clock: Clock, seed: int = 1, *, n_leds: int = 10, seated: bool = False
+    ) -> None:
+        self._clock = clock
+        self._seed = seed
+        self._all_leds = frozenset(range(1, n_leds + 1))
+        self._rng = np.random.default_rng([seed, 1])
+        self._turn_tremor = Tremor(self._rng)
+        self._tip_tremor = Tremor(self._rng)
+        self._lock = Lock()
+        self._wishes: list[tuple[float, Callable[[], None]]] = []
+        self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
+        self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)
+        place = SEAT if seated else AWAY
+        self._offset, self._offset_rate = place.copy(), np.zeros(3)
+        self._route: list[FloatArray] = []
+        self._place = place
+        self._goal: FloatArray | None = UPRIGHT  # None while swinging
+        self._pursuit = GUIDED
+        self._slips: tuple[_Slip, ...] = ()
+        self._covers: tuple[_Cover, ...] = ()
+        first = _Moment(self._lean, self._offset)
+        self._moments = deque([first], maxlen=N_REMEMBERED)
+
+    @property
+    def doing(self) -> Doing:
+        """What the operator did when the last image was taken."""
+        with self._lock:
+            if self._route:
+                leaves = self._place is not SEAT
+                return Doing.LEAVING if leaves else Doing.APPROACHING
+            if self._place is not SEAT:
+                return Doing.ABSENT if self._place is AWAY else Doing.LIFTED
+            return Doing.SEATED if self._goal is not None else Doing.SWINGING
+
+    def seat(self) -> None:
+        """Bring the pen to the cone, put its tip in and hold it still."""
+        self._wish(partial(self._go, SEAT))
+        self.hold()
+
+    def lift(self) -> None:
+        """Take the tip out of the cone and stay above it."""
+        self._wish(partial(self._go, HOVER))
+
+    def leave(self) -> None:
+        """Take the pen out of the image."""
+        self._wish(partial(self._go, AWAY))
+        self._wish(partial(self._aim, UPRIGHT, GUIDED))
+
+    def swing(self) -> None:
+        """Swing the pen round the cone until told otherwise, seating it first."""
+        self._wish(partial(self._go, SEAT))
+        self._wish(partial(self._aim, None, SWUNG))
+
+    def hold(self) -> None:
+        """Hold the pen still as it is."""
+        self._wish(self._aim_here)
+
+    def lean_towards(self, tilt: float, direction: float, turn: float) -> None:
+        """Bring the pen to a posture as a person does who is told to.
+
+        Parameters
+        ----------
+        tilt, direction, turn : float
+            rad.
+        """
+        goal = lean_vectors(tilt, direction, turn)
+        self._wish(partial(self._aim, goal, GUIDED), delay=REACTION)
+
+    def lean(self, tilt: float, direction: float, turn: float) -> None:
+        """Let the pen follow the mouse.
+
+        Parameters
+        ----------
+        tilt, direction, turn : float
+            rad.
+        """
+        self._wish(partial(self._aim, lean_vectors(tilt, direction, turn), MOUSE))
+
+    def slip(self, distance: float, seconds: float) -> None:
+        """Let the tip slip out of the bottom of the cone.
+
+        Parameters
+        ----------
+        distance : float
+            mm, in a random direction.
+        seconds : float
+            After which it slips back.
+        """
+        self._wish(partial(self._slip, distance, seconds))
+
+    def cover(self, seconds: float = inf, leds: Collection[int] | None = None) -> None:
+        """Put a hand before LEDs.
+
+        Parameters
+        ----------
+        seconds : float
+            After which the hand goes away.
+        leds : collection of int, optional
+            Their numbers, from 1; all unless given.
+        """
+        hidden = self._all_leds if leds is None else frozenset(leds)
+        if not hidden <= self._all_leds:
+            raise ValueError(
+                f"`leds` must be from 1 to {len(self._all_leds)}, got {sorted(hidden)}."
+            )
+        self._wish(partial(self._cover, seconds, hidden))
+
+    def uncover(self) -> None:
+        """Take the hand away from the LEDs."""
+        self._wish(self._uncover)
+
+    def held(self, times: FloatArray) -> Held:
+        """Return how the pen is held; later calls must not ask for earlier times.
+
+        Parameters
+        ----------
+        times : (F,) array
+            By the clock, s, over no more than 0.15 s.
+        """
+        with self._lock:
+            self._advance(int(np.floor(times.max() / STEP)) + 1)
+            steps = np.clip(
+                times / STEP, self._n_steps - len(self._moments) + 1, self._n_steps
+            )
+            leans, offsets = self._between(steps)
+            leans = leans + TREMOR * self._turn_tremor.at(times)
+            freedom = np.minimum(np.linalg.norm(offsets, axis=-1) / FREE_AT, 1)
+            tremor = FREE_TREMOR * self._tip_tremor.at(times)
+            offsets = offsets + freedom[:, None] * tremor
+            for slip in self._slips:
+                offsets = offsets + _slipped(slip, times)
+            return Held(
+                postures_of(leans),
+                offsets,
+                self._covered(float(times.mean())),
+                not self._route and self._place is AWAY,
+            )
+
+    def _wish(self, act: Callable[[], None], delay: float = 0.0) -> None:
+        due = self._clock.now_ns() * 1e-9 + delay
+        with self._lock:
+            self._wishes.append((due, act))
+            self._wishes.sort(key=lambda wish: wish[0])
+
+    def _advance(self, n_steps: int) -> None:
+        patience = round(PATIENCE / STEP)
+        self._n_steps = max(self._n_steps, n_steps - patience)
+        while self._n_steps < n_steps:
+            self._n_steps += 1
+            while self._wishes and self._wishes[0][0] <= self._time:
+                self._wishes.pop(0)[1]()
+            self._move_tip()
+            self._move_lean()
+            self._moments.append(_Moment(self._lean, self._offset))
+
+    @property
+    def _time(self) -> float:
+        return self._n_steps * STEP
+
+    def _move_tip(self) -> None:
+        if not self._route:
+            return
+        goal, is_last = self._route[0], len(self._route) == 1
+        self._offset, self._offset_rate = pursue(
+            self._offset, self._offset_rate, goal, np.zeros(3), ARM
+        )
+        distance = np.linalg.norm(goal - self._offset)
+        if goal is SEAT and distance < CAUGHT:
+            self._offset, self._offset_rate = SEAT.copy(), np.zeros(3)
+            self._route.clear()
+        elif goal is not SEAT and distance < (ARRIVED if is_last else PASSED):
+            self._route.pop(0)
+
+    def _move_lean(self) -> None:
+        goal, rate = self._goal, np.zeros(3)
+        if goal is None:
+            if self._route:
+                goal = UPRIGHT
+            else:
+                goal, rate = swing_at(self._seed, self._n_steps)
+        self._lean, self._lean_rate = pursue(
+            self._lean, self._lean_rate, goal, rate, self._pursuit
+        )
+
+    def _go(self, place: FloatArray) -> None:
+        if place is self._place:
+            return
+        self._place = place
+        self._route = [HOVER] if place is HOVER else [HOVER, place]
+
+    def _aim(self, goal: FloatArray | None, pursuit: Pursuit) -> None:
+        self._goal, self._pursuit = goal, pursuit
+
+    def _aim_here(self) -> None:
+        self._aim(self._lean, GUIDED)
+
+    def _slip(self, distance: float, seconds: float) -> None:
+        direction = self._rng.standard_normal(3)
+        offset = distance * direction / np.linalg.norm(direction)
+        slips = tuple(slip for slip in self._slips if slip.end > self._time - 1)
+        self._slips = (*slips, _Slip(self._time, self._time + seconds, offset))
+
+    def _cover(self, seconds: float, leds: frozenset[int]) -> None:
+        covers = tuple(cover for cover in self._covers if cover.end > self._time - 1)
+        self._covers = (*covers, _Cover(self._time, self._time + seconds, leds))
+
+    def _uncover(self) -> None:
+        self._covers = ()
+
+    def _covered(self, time: float) -> frozenset[int]:
+        hidden: frozenset[int] = frozenset()
+        for cover in self._covers:
+            if cover.start <= time < cover.end:
+                hidden |= cover.leds
+        return hidden
+
+    def _between(self, steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return leans and offsets between the remembered moments, (F, 3) each."""
+        oldest = self._n_steps - len(self._moments) + 1
+        known = np.arange(oldest, self._n_steps + 1)
+        leans = np.array([moment.lean for moment in self._moments])
+        offsets = np.array([moment.offset for moment in self._moments])
+        columns = range(3)
+        return (
+            np.stack([np.interp(steps, known, leans[:, i]) for i in columns], -1),
+            np.stack([np.interp(steps, known, offsets[:, i]) for i in columns], -1),
+        )
+
+
+def _slipped(slip: _Slip, times: FloatArray) -> FloatArray:
+    """Return how far a slip displaces the tip, (F, 3), mm."""
+    nearer_end = np.minimum(times - slip.start, slip.end - times)
+    share = np.clip(nearer_end / SLIP_TIME, 0, 1)
+    return np.asarray(share[:, None] * slip.offset)

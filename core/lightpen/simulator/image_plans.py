@@ -1,0 +1,308 @@
+"""The images of a scene: everything random about them drawn, then rendered.
+
+The seed of a scene fixes all of it. Each image draws from a generator of its own, so
+that it does not depend on which others are rendered, nor in which order.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, Image
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import Ellipses, disc_images
+from lightpen.model.pen import Pen
+from lightpen.model.rigid import vector_from_rotation
+from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
+from lightpen.simulator.postures import operator_postures
+from lightpen.simulator.render import render_view
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.sensor import expose
+from lightpen.simulator.swings import (
+    Swing,
+    leds_in_camera,
+    perturbed_pen,
+    slip_tip,
+    swing_from_postures,
+    swing_poses,
+)
+from lightpen.simulator.view import Optics, View, moving_poses
+
+LED_DECIMALS = 5  # of a measuring machine's millimetres
+MIN_GAIN = 0.93  # of the dimmest LED against the brightest
+MAX_MISSING = 4
+MOTION = (2.0, 12.0)  # px moved during the exposure
+DEFOCUS = (2.0, 5.0)  # px, radius of the blur disc
+SATURATED_EXPOSURE = (1.6, 3.0)
+DIM_EXPOSURE = (0.1, 0.25)
+SLIP = (0.2, 2.0)  # mm
+AWAY_SIGMA = 15.0  # px, of an image blurred away
+AWAY_MOTION = 120.0  # px
+MAX_TIMES = 128  # poses through one exposure
+
+STILL = 0.02  # px moved during the exposure that blur hides
+
+_SWING, _GEOMETRY, _GAINS, _FRAME, _NOISE = range(5)  # independent streams of a seed
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePlan:
+    """One image of a scene before it is rendered.
+
+    Attributes
+    ----------
+    index : int
+        From 0.
+    view : View
+    optics : Optics
+    rotation, translation : (3, 3) and (3,) array
+        cam_from_pen at mid-exposure; mm.
+    flags : tuple of str
+        Names of the `Disturbances` this image suffers.
+    """
+
+    index: int
+    view: View
+    optics: Optics
+    rotation: FloatArray
+    translation: FloatArray
+    flags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePlan:
+    """A scene with everything random drawn, ready to be rendered.
+
+    Attributes
+    ----------
+    scene : Scene
+    swing : Swing
+        True poses and tips of all images.
+    measured_pen : Pen
+        The pen as its geometry was measured.
+    gains : (L,) array
+        Brightness of each LED.
+    shots : tuple of ImagePlan
+    """
+
+    scene: Scene
+    swing: Swing
+    measured_pen: Pen
+    gains: FloatArray
+    shots: tuple[ImagePlan, ...]
+
+
+def plan_scene(scene: Scene) -> ScenePlan:
+    """Draw everything random of a scene but the noise.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    ScenePlan
+        The same for the same scene.
+    """
+    rng = _stream(scene, _SWING)
+    swing = swing_poses(
+        scene.n_images,
+        rng,
+        scene.swing,
+        pen=scene.pen,
+        camera=scene.camera,
+        tip_pen=scene.tip_pen,
+        cone_cam=scene.cone_cam,
+    )
+    hit = _draw_hits(scene, rng)
+    swing = slip_tip(swing, hit["slipped"], rng.uniform(*SLIP, scene.n_images), rng)
+    geometry = _stream(scene, _GEOMETRY)
+    measured = perturbed_pen(scene.pen, scene.led_noise, geometry)
+    measured_pen = replace(measured, leds=np.round(measured.leds, LED_DECIMALS))
+    gains = led_gains(scene)
+    shots = []
+    for index in range(scene.n_images):
+        flags = tuple(name for name, frames in hit.items() if frames[index])
+        shots.append(_plan_image(scene, swing, gains, index, flags))
+    return ScenePlan(scene, swing, measured_pen, gains, tuple(shots))
+
+
+def render_plan(scene: Scene, shot: ImagePlan) -> Image:
+    """Return the image of a shot, the same every time."""
+    light = render_view(scene.camera, scene.pen, shot.view, shot.optics)
+    return expose(light, scene.sensor, _stream(scene, _NOISE, shot.index))
+
+
+def live_plan(
+    scene: Scene, index: int, time: float, exposure_time: float = 0.004
+) -> ImagePlan:
+    """Return what a camera sees of an operator's endless swing.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its disturbances are left out.
+    index : int
+        Number of the image, which chooses its noise.
+    time : float
+        Of mid-exposure, seconds.
+    exposure_time : float
+        Seconds; the pen moves meanwhile.
+
+    Returns
+    -------
+    ImagePlan
+    """
+    ends = time + exposure_time * np.array([-0.5, 0.0, 0.5])
+    first, middle, last = _operator_swing(scene, ends).rotations
+    turn = vector_from_rotation(last @ first.T)
+    translation = scene.cone_cam - middle @ scene.tip_pen
+    return _plan_in_motion(scene, index, middle, translation, turn)
+
+
+def led_gains(scene: Scene) -> FloatArray:
+    """Return how bright each LED of the scene's pen is, 1 at most."""
+    rng = _stream(scene, _GAINS)
+    return rng.uniform(MIN_GAIN, 1, scene.pen.n_leds)
+
+
+def _stream(scene: Scene, *path: int) -> np.random.Generator:
+    return np.random.Generator(np.random.SFC64([scene.seed, *path]))
+
+
+def _draw_hits(scene: Scene, rng: np.random.Generator) -> dict[str, BoolArray]:
+    """Return which images each disturbance hits.
+
+    Spoilt images suffer nothing else; none is both saturated and dim.
+    """
+    wanted = scene.disturbances
+    n = scene.n_images
+    hits: dict[str, BoolArray] = {}
+
+    def hit(pool: BoolArray, *names: str) -> None:
+        order = rng.permutation(np.flatnonzero(pool))
+        for name in names:
+            n_hit = round(getattr(wanted, name) * n)
+            hits[name] = np.zeros(n, dtype=bool)
+            hits[name][order[:n_hit]] = True
+            order = order[n_hit:]
+
+    hit(np.ones(n, dtype=bool), "empty", "blurred_away", "slipped")
+    sound = ~hits["empty"] & ~hits["blurred_away"]
+    hit(sound, "saturated", "dim")
+    for name in ("clutter", "fingers", "missing", "motion_blur", "defocus"):
+        hit(sound, name)
+    return hits
+
+
+def _plan_image(
+    scene: Scene, swing: Swing, gains: FloatArray, index: int, flags: tuple[str, ...]
+) -> ImagePlan:
+    rng = _stream(scene, _FRAME, index)
+    rotation, translation = swing.rotations[index], swing.translations[index]
+    moved = 0.0
+    optics = scene.optics
+    if "motion_blur" in flags:
+        moved = rng.uniform(*MOTION)
+    if "blurred_away" in flags:
+        moved = AWAY_MOTION
+        optics = replace(optics, psf_sigma=AWAY_SIGMA)
+    still = replace(scene, optics=_disturbed_optics(optics, flags, rng))
+    turn = _turn_that_moves(still, rotation, translation, moved, rng)
+    shot = _plan_in_motion(still, index, rotation, translation, turn)
+    view = _disturbed_view(
+        replace(shot.view, gains=gains), _discs(scene, shot), scene.camera, flags, rng
+    )
+    return replace(shot, view=view, flags=flags)
+
+
+def _disturbed_optics(
+    optics: Optics, flags: tuple[str, ...], rng: np.random.Generator
+) -> Optics:
+    if "defocus" in flags:
+        optics = replace(optics, defocus_radius=rng.uniform(*DEFOCUS))
+    if "saturated" in flags:
+        brighter = rng.uniform(*SATURATED_EXPOSURE)
+        optics = replace(optics, exposure=optics.exposure * brighter)
+    if "dim" in flags:
+        dimmer = rng.uniform(*DIM_EXPOSURE)
+        optics = replace(optics, exposure=optics.exposure * dimmer)
+    return optics
+
+
+def _disturbed_view(
+    view: View,
+    discs: Ellipses,
+    camera: Camera,
+    flags: tuple[str, ...],
+    rng: np.random.Generator,
+) -> View:
+    n_leds = len(view.gains)
+    if "empty" in flags:
+        return replace(view, gains=np.zeros(n_leds))
+    if "missing" in flags:
+        gains = view.gains.copy()
+        n_missing = rng.integers(1, min(MAX_MISSING, max(n_leds - 4, 1)) + 1)
+        gains[rng.permutation(n_leds)[:n_missing]] = 0
+        view = replace(view, gains=gains)
+    if "clutter" in flags:
+        lamps = random_lamps(camera, discs, rng)
+        glares = random_glares(camera, discs, rng)
+        view = replace(view, lamps=lamps, glares=glares)
+    if "fingers" in flags:
+        view = replace(view, fingers=(random_finger(discs, rng),))
+    return view
+
+
+def _discs(scene: Scene, shot: ImagePlan) -> Ellipses:
+    leds, normals = leds_in_camera(scene.pen, shot.rotation, shot.translation)
+    return disc_images(scene.camera, leds, normals, scene.pen.diameter / 2)
+
+
+def _operator_swing(scene: Scene, times: FloatArray) -> Swing:
+    postures = operator_postures(times, scene.seed)
+    return swing_from_postures(postures, scene.tip_pen, scene.cone_cam)
+
+
+def _turn_that_moves(
+    scene: Scene,
+    rotation: FloatArray,
+    translation: FloatArray,
+    moved: float,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Return a turn about the tip, in a random direction, that moves LEDs so far."""
+    turn = rng.standard_normal(3)
+    per_radian = _pixels_moved(scene, rotation, translation, turn)
+    return np.asarray(turn * moved / per_radian)
+
+
+def _pixels_moved(
+    scene: Scene, rotation: FloatArray, translation: FloatArray, turn: FloatArray
+) -> float:
+    """Return how far a small turn about the tip moves the fastest LED, px."""
+    leds, _ = leds_in_camera(scene.pen, rotation, translation)
+    tip_cam = rotation @ scene.tip_pen + translation
+    moves = np.cross(turn, leds - tip_cam)
+    jacobian = scene.camera.project_with_jacobian(leds).jacobian
+    pixels = np.einsum("lij,lj->li", jacobian, moves)
+    return float(np.linalg.norm(pixels, axis=-1).max())
+
+
+def _plan_in_motion(
+    scene: Scene,
+    index: int,
+    rotation: FloatArray,
+    translation: FloatArray,
+    turn: FloatArray,
+) -> ImagePlan:
+    """Return the shot of a pen that turns about its tip during the exposure."""
+    moved = _pixels_moved(scene, rotation, translation, turn)
+    n_times = 1
+    if moved > STILL:
+        n_times = min(3 + int(moved / scene.optics.psf_sigma), MAX_TIMES)
+    rotations, translations = moving_poses(
+        rotation, translation, scene.tip_pen, turn, n_times
+    )
+    view = View(rotations, translations, led_gains(scene))
+    return ImagePlan(index, view, scene.optics, rotation, translation)

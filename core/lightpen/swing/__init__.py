@@ -1,0 +1,1 @@
+"""A swing as it happens: its states and rules, and where to lean the pen next."""

@@ -1,0 +1,67 @@
+"""From a live image to a longer record: decide, and put on disk what is kept."""
+
+from lightpen.arrays import Image
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.record.writing import RecordWriter
+from lightpen.swing.rules import Transition, advance
+from lightpen.swing.state import Happening, SwingSetup, SwingState
+
+
+def capture_image(
+    setup: SwingSetup,
+    state: SwingState,
+    writer: RecordWriter,
+    image: Image,
+    sighting: Sighting,
+    time: float,
+    device_time_ns: int | None = None,
+) -> Transition:
+    """Take one live image into a swing.
+
+    Parameters
+    ----------
+    setup : SwingSetup
+    state : SwingState
+    writer : RecordWriter
+        Of the record that belongs to the state.
+    image : (H, W) array
+        Grey image of the camera's size, 8 or 16 bit.
+    sighting : Sighting
+        What it shows.
+    time : float
+        When it was taken, s.
+    device_time_ns : int, optional
+        By the clock of the camera.
+
+    Returns
+    -------
+    Transition
+        An image that is kept is on the disk by now.
+
+    Raises
+    ------
+    FileError
+        The image could not be recorded; ``state`` and the record go without it.
+    """
+    if state.next_number != writer.next_number:
+        raise ValueError(
+            f"The swing is at image {state.next_number}, the record at "
+            f"{writer.next_number}."
+        )
+    transition = advance(setup, state, sighting, time)
+    # The image last: if the disk fails before, state and record both go without it.
+    for event in transition.events:
+        if event.what is Happening.SLIPPED and event.numbers:
+            writer.take_out(event.numbers, Reason.SLIPPED)
+    for event in transition.events:
+        if event.what is Happening.KEPT:
+            writer.append(
+                image,
+                sighting.pixels,
+                sighting.rotation,
+                sighting.translation,
+                time,
+                device_time_ns,
+            )
+    return transition

@@ -1,0 +1,184 @@
+"""Where to lean the pen next: the posture that would shrink the tip's uncertainty most.
+
+What an image of a posture would say of tip and cone follows from the contact model
+before it is taken [1]_. Images are taken on the way to a posture as well, so a posture
+is judged by all the images that the pen would give until it is there: by how much they
+would shrink the variance of the tip, per image.
+
+References
+----------
+.. [1] A. C. Atkinson, A. N. Donev, "Optimum experimental designs" (1992), chapter 10.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.estimation.joint import ContactModel, reduce
+from lightpen.model.camera import Camera
+from lightpen.model.coverage import N_DIRECTIONS
+from lightpen.model.pen import Pen
+from lightpen.model.posture import Posture, angles_between, rotations_of
+from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+
+TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of the dial
+TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
+N_ON_THE_WAY = 3  # postures that stand for all from here to there
+MAX_INCIDENCE = np.radians(70.0)  # an LED seen flatter is a line, and dim
+MIN_GAP = 4.0  # px between the rims of two LEDs; blur joins closer ones
+MIN_LEDS = 6  # fewer are not labelled with certainty
+
+
+@dataclass(frozen=True, eq=False)
+class Outlook:
+    """What is known of tip and cone, for the choice of the next posture.
+
+    Attributes
+    ----------
+    camera : Camera
+    pen : Pen
+    tip_pen, cone_cam : (3,) array
+        mm.
+    information : (6, 6) array
+        Of all that is known of (tip, cone), 1/mm^2.
+    sigma : float
+        Noise of one image coordinate, px.
+    rotations : (N, 3, 3) array
+        Postures of the images kept so far; cam_from_pen.
+    spacing : float
+        Angle by which a new posture must differ from all of these, rad.
+    """
+
+    camera: Camera
+    pen: Pen
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    information: FloatArray
+    sigma: float
+    rotations: FloatArray
+    spacing: float
+
+
+def next_posture(
+    outlook: Outlook, present: FloatArray, wanted: BoolArray | None = None
+) -> Posture | None:
+    """Return the posture to lean the pen to.
+
+    Parameters
+    ----------
+    outlook : Outlook
+    present : (3, 3) array
+        Where the pen is, cam_from_pen.
+    wanted : (3, 8) array of bool, optional
+        Fields of the dial to choose from: upright (in the first column), leaning and
+        leaning far, by direction from the right. All unless given.
+
+    Returns
+    -------
+    Posture or None
+        None if the LEDs could be seen in none of the postures.
+    """
+    postures, rotations, fields = _candidates(outlook.pen)
+    fit = _is_seen(outlook, rotations)
+    if wanted is not None:
+        fit &= wanted[fields[:, 0], fields[:, 1]]
+    chosen = np.flatnonzero(fit)
+    if not len(chosen):
+        return None
+    worth = _worth(outlook, present, rotations[chosen])
+    return postures[int(chosen[np.argmax(worth)])]
+
+
+def visible_fields(outlook: Outlook) -> BoolArray:
+    """Return in which fields of the dial the pen shows enough LEDs, (3, 8)."""
+    _, rotations, fields = _candidates(outlook.pen)
+    row, column = fields[_is_seen(outlook, rotations)].T
+    visible = np.zeros((3, N_DIRECTIONS), dtype=bool)
+    visible[row, column] = True
+    return visible
+
+
+def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
+    """Return what images of postures would say of (tip, cone), (N, 6, 6), 1/mm^2.
+
+    Parameters
+    ----------
+    outlook : Outlook
+    rotations : (N, 3, 3) array
+        cam_from_pen.
+    """
+    none = np.zeros((len(rotations), outlook.pen.n_leds, 2))
+    model = ContactModel(outlook.camera, outlook.pen, none)
+    state = model.at(rotations, outlook.tip_pen, outlook.cone_cam)
+    seen = usable_leds(outlook, rotations).astype(float)
+    return np.asarray(reduce(state, seen).S / outlook.sigma**2)
+
+
+def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
+    """Return which LEDs would show whole, apart and face on enough, (N, L)."""
+    camera, pen = outlook.camera, outlook.pen
+    turned = np.swapaxes(rotations, 1, 2)
+    leds = (pen.leds - outlook.tip_pen) @ turned + outlook.cone_cam
+    cosines = -np.einsum("nli,nli->nl", leds, pen.normals @ turned)
+    cosines /= np.linalg.norm(leds, axis=2)
+    pixels = camera.project(leds)
+    radii = max(camera.fx, camera.fy) * pen.diameter / 2 / leds[..., 2]
+    size = np.array([camera.width, camera.height])
+    room = np.minimum(pixels + 0.5, size - 0.5 - pixels).min(axis=2)
+    apart = np.linalg.norm(pixels[:, :, None] - pixels[:, None], axis=3)
+    apart -= radii[:, :, None] + radii[:, None]
+    apart += np.where(np.eye(pen.n_leds, dtype=bool), np.inf, 0)
+    return np.asarray(
+        (cosines > np.cos(MAX_INCIDENCE))
+        & (leds[..., 2] > 0)
+        & (room > radii)
+        & (apart.min(axis=2) > MIN_GAP)
+    )
+
+
+def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
+    """Return postures in the fields of the dial, rotations, and row and column."""
+    fields = [(0, 0)] + [(row, k) for row in (1, 2) for k in range(N_DIRECTIONS)]
+    places = [(row, column, turn) for row, column in fields for turn in TURNS]
+    postures = [
+        Posture((0.0, *TILTS)[row], column * 2 * np.pi / N_DIRECTIONS, turn)
+        for row, column, turn in places
+    ]
+    numbers = np.array([(p.tilt, p.direction, p.turn) for p in postures])
+    rotations = rotations_of(pen, numbers[:, 0], numbers[:, 1], numbers[:, 2])
+    return postures, rotations, np.array([place[:2] for place in places])
+
+
+def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
+    """Return in which postures enough LEDs show."""
+    n_seen = usable_leds(outlook, rotations).sum(axis=1)
+    return np.asarray(n_seen >= min(MIN_LEDS, outlook.pen.n_leds))
+
+
+def _worth(outlook: Outlook, present: FloatArray, rotations: FloatArray) -> FloatArray:
+    """Return by how much the way to postures would shrink the tip's variance, mm^2.
+
+    Per image; ``rotations`` (C, 3, 3) gives (C,).
+    """
+    vectors = vector_from_rotation(rotations @ present.T)
+    shares = np.arange(1, N_ON_THE_WAY + 1) / N_ON_THE_WAY
+    steps = rotation_from_vector(vectors[:, None] * shares[:, None]) @ present
+    steps = steps.reshape(-1, 3, 3)
+    new = np.ones(len(steps))
+    if len(outlook.rotations):
+        nearest = angles_between(steps, outlook.rotations).min(axis=1)
+        new = (nearest >= outlook.spacing).astype(float)
+    each = image_information(outlook, steps) * new[:, None, None]
+    by_way = each.reshape(len(rotations), N_ON_THE_WAY, 6, 6).mean(axis=1)
+    n_images = np.maximum(np.linalg.norm(vectors, axis=1) / outlook.spacing, 1.0)
+    after = np.linalg.inv(outlook.information + n_images[:, None, None] * by_way)
+    before = np.linalg.inv(outlook.information)
+    gain = _tip_variance(np.asarray(before)) - _tip_variance(np.asarray(after))
+    return np.asarray(gain / n_images)
+
+
+def _tip_variance(covariances: FloatArray) -> FloatArray:
+    """Return the variance of the tip, summed over x y z, mm^2."""
+    tips: FloatArray = covariances[..., :3, :3]
+    return np.asarray(np.trace(tips, axis1=-2, axis2=-1))

@@ -1,0 +1,253 @@
+"""The images that a swing has kept, and what they say of the tip so far."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.pose import fit_poses
+from lightpen.detection.sighting import Sighting
+from lightpen.errors import CalibrationError
+from lightpen.estimation.joint import JointFit, fit_joint
+from lightpen.estimation.pivot import GATE, MEDIAN_CHI
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.camera import Camera
+from lightpen.model.coverage import MIN_SPREAD, posture_spread
+from lightpen.model.pen import Pen
+from lightpen.swing.seat import Seat, fit_seat, tip_distances
+
+MIN_JOINT = 8  # images of the first joint fit
+NEAR_GATE = 3.4  # square root of chi-square, 3 degrees of freedom, at 0.01
+MAX_PASSES = 3  # of looking for slipped images
+NO_NOISE = 1e-4  # px, less than any camera has
+
+
+@dataclass(frozen=True, eq=False)
+class KeptImages:
+    """N kept images and the fit to them.
+
+    Attributes
+    ----------
+    numbers : (N,) array of int
+        Number of each image in the swing's record.
+    times : (N,) array
+        Seconds.
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Pose of each image alone, cam_from_pen, mm.
+    cofactors : (N, 6, 6) array
+        Covariances of these poses for a noise of 1 px, rad and mm.
+    sigmas : (N,) array
+        Noise of each image by itself, px.
+    seat : Seat or None
+        Tip and cone by the best fit there is.
+    joint : JointFit or None
+        The joint fit, as soon as the postures allow one.
+    """
+
+    numbers: IntArray
+    times: FloatArray
+    pixels: FloatArray
+    rotations: FloatArray
+    translations: FloatArray
+    cofactors: FloatArray
+    sigmas: FloatArray
+    seat: Seat | None = None
+    joint: JointFit | None = None
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def sigma(self) -> float:
+        """Noise of one image coordinate that the images share, px."""
+        if self.joint is not None:
+            return max(self.joint.sigma, NO_NOISE)
+        return max(float(np.median(self.sigmas)), NO_NOISE) if len(self) else NO_NOISE
+
+    @property
+    def uncertainty(self) -> float:
+        """U (k = 2) of the tip along its weakest direction, mm; infinite at first."""
+        if self.joint is None:
+            return float("inf")
+        variance = np.linalg.eigvalsh(self.joint.covariance[:3, :3])[-1]
+        return COVERAGE_FACTOR * float(np.sqrt(variance))
+
+    @property
+    def misfits(self) -> FloatArray:
+        """Root mean square residual of each image in the joint fit, px, (N,).
+
+        Of an image that the fit leaves out, over all LEDs that it shows.
+        """
+        if self.joint is None:
+            return self.sigmas
+        squares = np.einsum("nli,nli->nl", self.joint.residuals, self.joint.residuals)
+        used = self.joint.used
+        takes_part = used.any(axis=1, keepdims=True)
+        counted = np.where(takes_part, used, np.isfinite(squares))
+        total = np.sum(squares, axis=1, where=counted)
+        return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
+
+
+def none_kept(n_leds: int) -> KeptImages:
+    """Return no images of a pen with this number of LEDs."""
+    return KeptImages(
+        numbers=np.zeros(0, dtype=np.int64),
+        times=np.zeros(0),
+        pixels=np.zeros((0, n_leds, 2)),
+        rotations=np.zeros((0, 3, 3)),
+        translations=np.zeros((0, 3)),
+        cofactors=np.zeros((0, 6, 6)),
+        sigmas=np.zeros(0),
+    )
+
+
+def kept_before(
+    camera: Camera,
+    pen: Pen,
+    numbers: IntArray,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> KeptImages:
+    """Return images that were kept before an interruption, with their fit.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    numbers : (N,) array of int
+        In the swing's record.
+    pixels : (N, L, 2) array
+        px; NaN where an LED was not seen.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        cam_from_pen, mm.
+    """
+    if not len(numbers):
+        return none_kept(pen.n_leds)
+    poses = fit_poses(camera, pen, pixels, rotations, translations)
+    kept = KeptImages(
+        numbers=numbers,
+        times=np.full(len(numbers), -np.inf),
+        pixels=pixels,
+        rotations=poses.rotations,
+        translations=poses.translations,
+        cofactors=poses.covariances / poses.sigma**2,
+        sigmas=np.full(len(numbers), poses.sigma),
+    )
+    return _refit(camera, pen, kept, poses.rotations)
+
+
+def keep(
+    camera: Camera,
+    pen: Pen,
+    kept: KeptImages,
+    sighting: Sighting,
+    number: int,
+    time: float,
+) -> KeptImages:
+    """Return the images with one more, and the fit to all of them."""
+    longer = KeptImages(
+        numbers=np.append(kept.numbers, number),
+        times=np.append(kept.times, time),
+        pixels=np.concatenate([kept.pixels, sighting.pixels[None]]),
+        rotations=np.concatenate([kept.rotations, sighting.rotation[None]]),
+        translations=np.concatenate([kept.translations, sighting.translation[None]]),
+        cofactors=np.concatenate([kept.cofactors, sighting.cofactors[None]]),
+        sigmas=np.append(kept.sigmas, sighting.sigma),
+    )
+    if kept.joint is None:
+        return _refit(camera, pen, longer, longer.rotations)
+    starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
+    return _refit(camera, pen, replace(longer, seat=kept.seat), starts)
+
+
+def _leave_out(
+    camera: Camera, pen: Pen, kept: KeptImages, out: BoolArray
+) -> KeptImages:
+    """Return the images but those of ``out`` (N,), and the fit to the rest."""
+    stay = ~out
+    starts = kept.rotations if kept.joint is None else kept.joint.rotations
+    rest = replace(
+        kept,
+        numbers=kept.numbers[stay],
+        times=kept.times[stay],
+        pixels=kept.pixels[stay],
+        rotations=kept.rotations[stay],
+        translations=kept.translations[stay],
+        cofactors=kept.cofactors[stay],
+        sigmas=kept.sigmas[stay],
+        joint=None,
+    )
+    return _refit(camera, pen, rest, starts[stay]) if len(rest) else rest
+
+
+def _refit(
+    camera: Camera, pen: Pen, kept: KeptImages, starts: FloatArray
+) -> KeptImages:
+    """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
+    kept = replace(kept, joint=None)
+    fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
+    seat = kept.seat
+    if seat is None or not fixed:
+        covariances = kept.cofactors * kept.sigma**2
+        seat = fit_seat(pen, kept.rotations, kept.translations, covariances)
+    if not fixed:
+        return replace(kept, seat=seat)
+    try:
+        joint = fit_joint(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam)
+    except CalibrationError:  # an image too bad to settle; the next ones may help
+        return replace(kept, seat=seat)
+    fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
+    return replace(kept, seat=fitted, joint=joint)
+
+
+def distance_unit(kept: KeptImages) -> float:
+    """Return what a distance of 1 is worth by the kept images, 1 or more.
+
+    A model that fits worse than the covariances say (geometry errors, a worn cone)
+    must not cost good images, as in `lightpen.estimation.pivot`.
+    """
+    if len(kept) < MIN_JOINT:
+        return 1.0
+    return max(1.0, float(np.median(_distances(kept))) / MEDIAN_CHI)
+
+
+def without_slipped(
+    camera: Camera, pen: Pen, kept: KeptImages, since: float = np.inf
+) -> tuple[KeptImages, set[int]]:
+    """Leave out the images whose tip is not in the cone.
+
+    Parameters
+    ----------
+    camera : Camera
+    pen : Pen
+    kept : KeptImages
+    since : float
+        From this time on, s, an image need not be far out: it was taken when the tip
+        was about to leave.
+
+    Returns
+    -------
+    kept : KeptImages
+        The rest, with a new fit.
+    numbers : set of int
+        Of the images left out.
+    """
+    numbers = set[int]()
+    for _ in range(MAX_PASSES):
+        gates = np.where(kept.times >= since, NEAR_GATE, GATE)
+        out = _distances(kept) > gates * distance_unit(kept)
+        if not out.any():
+            break
+        numbers |= set(map(int, kept.numbers[out]))
+        kept = _leave_out(camera, pen, kept, out)
+    return kept, numbers
+
+
+def _distances(kept: KeptImages) -> FloatArray:
+    if kept.seat is None or not len(kept):
+        return np.zeros(len(kept))
+    covariances = kept.cofactors * kept.sigma**2
+    return tip_distances(kept.seat, kept.rotations, kept.translations, covariances)

@@ -1,0 +1,106 @@
+"""An interrupted swing read back, to go on with it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.record.reading import Record, open_record, recorded_limits, source
+from lightpen.record.writing import RecordWriter
+from lightpen.swing.kept_images import kept_before
+from lightpen.swing.rules import start_again
+from lightpen.swing.shortfall import limits_for_more
+from lightpen.swing.state import SwingSetup, SwingState
+
+
+@dataclass(frozen=True, eq=False)
+class Resumable:
+    """An interrupted swing, ready to go on.
+
+    Attributes
+    ----------
+    record : Record
+    setup : SwingSetup
+        Of the record's own files.
+    state : SwingState
+        With all images that the record acknowledged.
+    """
+
+    record: Record
+    setup: SwingSetup
+    state: SwingState
+
+    def fits(self, image_size: tuple[int, int]) -> bool:
+        """Return whether images of this width and height, px, can go on with it."""
+        camera = self.setup.camera
+        return image_size == (camera.width, camera.height)
+
+
+def read_resumable(folder: Path) -> Resumable:
+    """Read an interrupted swing and fit its images anew.
+
+    Raises
+    ------
+    FileError
+        The record or one of its files cannot be read.
+    """
+    record = open_record(folder)
+    setup = recorded_setup(record)
+    if record.more is not None:
+        min_images, max_images = record.more
+        limits = replace(setup.limits, min_images=min_images, max_images=max_images)
+        setup = replace(setup, limits=limits)
+    return Resumable(record, setup, resume_swing(setup, record))
+
+
+def read_for_more(folder: Path) -> Resumable:
+    """Read a swing that has all it needs, to capture more images nevertheless.
+
+    The record notes it, so that the swing goes on likewise when it is interrupted.
+
+    Raises
+    ------
+    FileError
+        The record or one of its files cannot be read, or the record be written.
+    """
+    swing = read_resumable(folder)
+    limits = limits_for_more(swing.setup.limits, swing.state.n_kept)
+    with RecordWriter.resume(swing.record) as writer:
+        writer.ask_for_more(limits.min_images, limits.max_images)
+    setup = replace(swing.setup, limits=limits)
+    return replace(swing, record=open_record(folder), setup=setup)
+
+
+def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingState:
+    """Return an interrupted swing with all images that its record acknowledged.
+
+    Parameters
+    ----------
+    setup : SwingSetup
+        Of the record's own camera and pen.
+    record : Record
+    time : float
+        s.
+    """
+    images = record.used_images
+    kept = kept_before(
+        setup.camera,
+        setup.pen,
+        record.numbers,
+        np.array([image.pixels for image in images]),
+        np.array([image.rotation for image in images]),
+        np.array([image.translation for image in images]),
+    )
+    return start_again(setup, kept, record.next_number, time)
+
+
+def recorded_setup(record: Record) -> SwingSetup:
+    """Return what a record was captured with, from its own copies of the files.
+
+    Raises
+    ------
+    FileError
+        The copy of the camera or pen file cannot be read.
+    """
+    found = source(record)
+    return SwingSetup(found.camera, found.pen, recorded_limits(record), found.mask)

@@ -1,0 +1,490 @@
+"""The rules of a swing: from one image to the next.
+
+`advance` takes the state of a swing, what the next image shows and when it was taken,
+and returns the new state and what happened. It has no clock and no threads of its own.
+The tip must rest in one place for a second before anything is kept. Then an image is
+kept where its posture differs from that of all kept ones and its tip is in the cone. A
+tip that leaves the cone costs the images that it spoils, and no others. The swing ends
+when the postures and the uncertainty suffice.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.messages import Code, Message
+from lightpen.model.posture import angles_between, posture_of
+from lightpen.swing.guidance import MIN_LEDS
+from lightpen.swing.kept_images import KeptImages, keep, none_kept, without_slipped
+from lightpen.swing.rest import (
+    BATCH,
+    in_place,
+    offset,
+    rests_in_place,
+    steady_seat,
+)
+from lightpen.swing.seat import Seat
+from lightpen.swing.shortfall import guided, measure_shortfall, oriented
+from lightpen.swing.state import (
+    Glimpse,
+    Happening,
+    Pause,
+    Phase,
+    SwingEvent,
+    SwingSetup,
+    SwingState,
+    Trace,
+    start_swing,
+)
+
+SETTLING = 0.5  # s between the tip being found at rest and the countdown
+COUNTDOWN = 3.0  # s
+LOST_AFTER = 0.7  # s without the pen
+RESEATED = 0.5  # s in the cone that end a pause
+LIFTED = 3.0  # mm from the cone; less is a slip
+LEAVING = 0.2  # s out of the cone until the pen counts as lifted
+ABOUT_TO_SLIP = 0.5  # s before a slip, in which the tip may be half out
+SLIP_TOLD = 4.0  # s for which a slip is told of, at least
+ASTRAY = 2.0  # s out of the cone until the capture pauses
+FEW = 12  # images; not worth more than a new start
+BAD_SIGMA = 3.0  # times the noise of the other images
+SOME_SIGMA = 0.05  # px; less is never bad
+UPRIGHT = np.radians(8.0)
+STILL = np.radians(1.5)
+CONFIRMING = 3.0  # s upright and still, by which the operator says yes without a key
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """A swing after one more image.
+
+    Attributes
+    ----------
+    state : SwingState
+    events : tuple of SwingEvent
+    """
+
+    state: SwingState
+    events: tuple[SwingEvent, ...] = ()
+
+
+def advance(
+    setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+) -> Transition:
+    """Take one more image.
+
+    Parameters
+    ----------
+    setup : SwingSetup
+    state : SwingState
+    sighting : Sighting
+    time : float
+        When the image was taken, s; never goes back.
+
+    Returns
+    -------
+    Transition
+        An event `Happening.KEPT` asks for the image to be recorded under its number,
+        before the next image is taken; one of `Happening.SLIPPED` names kept images
+        that are dropped.
+    """
+    state = _noticed(setup, state, sighting, time)
+    rule = _RULES.get(state.phase)
+    if rule is None:
+        return Transition(state)
+    transition = rule(setup, state, sighting)
+    if any(event.what is Happening.SLIPPED for event in transition.events):
+        return replace(transition, state=replace(transition.state, slipped_at=time))
+    return transition
+
+
+def pause(state: SwingState) -> SwingState:
+    """Return the swing paused by the user."""
+    if state.phase in (Phase.SOLVING, Phase.VERDICT):
+        return state
+    paused = _enter(state, Phase.PAUSED, Message(Code.PAUSED))
+    return replace(paused, pause=Pause.BY_USER)
+
+
+def resume(state: SwingState) -> SwingState:
+    """Return the swing going on after the user's pause, from finding the seat."""
+    if state.phase is not Phase.PAUSED or state.pause is not Pause.BY_USER:
+        return state
+    return _await_seat(state)
+
+
+def finish(state: SwingState) -> Transition:
+    """End the capture, whatever is missing."""
+    solving = _enter(state, Phase.SOLVING, Message(Code.SOLVING))
+    return Transition(replace(solving, target=None), (SwingEvent(Happening.CAPTURED),))
+
+
+def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
+    """Show the verdict on the solved swing."""
+    happening = Happening.DONE if passed else Happening.FAILED
+    return Transition(_enter(state, Phase.VERDICT, verdict), (SwingEvent(happening),))
+
+
+def has_just_slipped(state: SwingState) -> bool:
+    """Return whether a slip is so recent that the operator has to be told."""
+    return state.slipped_at is not None and state.time - state.slipped_at < SLIP_TOLD
+
+
+def stillness(state: SwingState) -> float:
+    """Return how much of the time to say yes the pen is upright and still, 0 to 1."""
+    if state.still_since is None:
+        return 0.0
+    return min((state.time - state.still_since) / CONFIRMING, 1.0)
+
+
+def start_again(
+    setup: SwingSetup, kept: KeptImages, next_number: int, time: float = 0.0
+) -> SwingState:
+    """Return an interrupted swing with the images that it had kept.
+
+    Parameters
+    ----------
+    setup : SwingSetup
+    kept : KeptImages
+        See `lightpen.swing.kept_images.kept_before`.
+    next_number : int
+        Of the next image in the swing's record.
+    time : float
+        s.
+    """
+    state = start_swing(setup, time)
+    return replace(state, kept=kept, next_number=next_number)
+
+
+def _noticed(
+    setup: SwingSetup, state: SwingState, sighting: Sighting, time: float
+) -> SwingState:
+    """Return the state that remembers the sighting."""
+    recent = [glimpse for glimpse in state.recent if glimpse.time > time - BATCH]
+    if not sighting.has_pose:
+        return replace(state, time=time, recent=tuple(recent), still_since=None)
+    still_since = state.still_since
+    if posture_of(setup.pen, sighting.rotation).tilt > UPRIGHT:
+        still_since = None
+    elif still_since is None or not _is_still(recent, sighting):
+        still_since = time
+    return replace(
+        state,
+        time=time,
+        recent=(*recent, Glimpse(time, sighting)),
+        last_seen=time,
+        still_since=still_since,
+    )
+
+
+def _is_still(recent: list[Glimpse], sighting: Sighting) -> bool:
+    if not recent:
+        return False
+    before = recent[0].sighting.rotation
+    return bool(angles_between(before[None], sighting.rotation[None])[0, 0] < STILL)
+
+
+def _wait(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    if not sighting.has_pose:
+        return Transition(state)
+    return Transition(_enter(state, Phase.SEEN, _seating(setup)))
+
+
+def _seen(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    if _is_lost(state):
+        return Transition(_enter(state, Phase.WAIT, Message(Code.SHOW_PEN)))
+    seat = steady_seat(setup.pen, state)
+    if seat is None:
+        return Transition(state)
+    return _settle(setup, state, seat)
+
+
+def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
+    """Begin with a tip at rest; go on with the kept images if it is where it was."""
+    events = [SwingEvent(Happening.SEATED)]
+    if state.n_kept and not rests_in_place(state, BATCH):
+        if state.n_kept >= FEW:
+            return Transition(replace(state, message=_elsewhere(state)))
+        transition = _dropped_all(setup, state)
+        state, events = transition.state, [*events, *transition.events]
+    settled = _enter(state, Phase.SETTLED, Message(Code.HOLD_STILL))
+    return Transition(replace(settled, seat=state.kept.seat or seat), tuple(events))
+
+
+def _settled(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    unsettled = _unsettled(setup, state)
+    if unsettled is not None:
+        return unsettled
+    if state.time - state.since < SETTLING:
+        return Transition(state)
+    if state.n_kept:
+        return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
+    return Transition(
+        _enter(state, Phase.COUNTDOWN, Message(Code.STARTS_IN, (ceil(COUNTDOWN),)))
+    )
+
+
+def _countdown(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    unsettled = _unsettled(setup, state)
+    if unsettled is not None:
+        return unsettled
+    left = COUNTDOWN - (state.time - state.since)
+    if left > 0:
+        return Transition(
+            replace(state, message=Message(Code.STARTS_IN, (ceil(left),)))
+        )
+    return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
+
+
+def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
+    """Return the step back if the pen is lost or its tip has left the seat."""
+    lost = (SwingEvent(Happening.LOST),)
+    if _is_lost(state):
+        return Transition(_await_seat(state), lost)
+    if in_place(
+        state, [g for g in state.recent if g.time > state.time - LEAVING]
+    ).any():
+        return None
+    return Transition(
+        replace(_enter(state, Phase.SEEN, _seating(setup)), recent=()), lost
+    )
+
+
+def _capturing(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    if _is_lost(state):
+        return _pause_for(state, Pause.LOST, Message(Code.PEN_LOST))
+    if not sighting.has_pose:
+        return Transition(state)
+    if not in_place(state, state.recent[-1:]).all():
+        return _astray(setup, state, sighting)
+    state = replace(state, strayed_since=None, stray_rotations=np.zeros((0, 3, 3)))
+    state = guided(setup, oriented(setup, state, sighting), sighting)
+    state = replace(state, message=_asking(state))
+    if not _is_new(state.kept.rotations, sighting, setup.limits.spacing):
+        return Transition(state)
+    flaw = _flaw(setup, state, sighting)
+    if flaw is not Reason.NONE:
+        return Transition(_flawed(setup, state, sighting, flaw))
+    return _kept(setup, state, sighting)
+
+
+def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    """Keep an image, and drop those that turn out to have slipped."""
+    number, counts = state.next_number, state.counts
+    kept = keep(setup.camera, setup.pen, state.kept, sighting, number, state.time)
+    kept, dropped = without_slipped(setup.camera, setup.pen, kept)
+    state = replace(state, kept=kept)
+    if number in dropped:  # it was never recorded
+        return _dropped(replace(state, n_dropped=_more(state, 1)), dropped - {number})
+    state = replace(
+        state,
+        next_number=number + 1,
+        flawed_rotations=np.zeros((0, 3, 3)),
+    )
+    transition = _dropped(state, dropped)
+    state, events = (
+        transition.state,
+        [SwingEvent(Happening.KEPT, (number,)), *transition.events],
+    )
+    state = replace(state, trace=_longer(state.trace, kept))
+    enough = setup.limits.min_per_field
+    full = (state.counts >= enough) & (counts < enough)
+    events += [
+        SwingEvent(Happening.FIELD_FULL, (int(row), int(column)))
+        for row, column in np.argwhere(full)
+    ]
+    if state.n_kept >= setup.limits.max_images or (
+        measure_shortfall(setup, state).is_none
+    ):
+        ended = finish(state)
+        return Transition(ended.state, (*events, *ended.events))
+    return Transition(state, tuple(events))
+
+
+def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    """Note that the tip is out of the cone; never keep such an image."""
+    if state.strayed_since is None:  # one image alone may be a bad one
+        return Transition(replace(state, strayed_since=state.time))
+    strayed_for = state.time - state.strayed_since
+    kept, dropped = state.kept, set[int]()
+    begins = not len(state.stray_rotations)
+    if begins:
+        since = state.strayed_since - ABOUT_TO_SLIP
+        kept, dropped = without_slipped(setup.camera, setup.pen, kept, since)
+    strays = _with_new(setup, state.stray_rotations, sighting)
+    n_new = len(strays) - len(state.stray_rotations)
+    state = replace(
+        state, kept=kept, stray_rotations=strays, n_dropped=_more(state, n_new)
+    )
+    transition = _dropped(state, dropped)
+    state, events = transition.state, transition.events
+    if offset(state) > LIFTED:
+        if strayed_for < LEAVING:
+            return transition
+        paused = _pause_for(state, Pause.LIFTED, Message(Code.PEN_LIFTED))
+        return Transition(paused.state, (*events, *paused.events))
+    if strayed_for > ASTRAY:
+        if max(len(strays), FEW) < state.n_kept:
+            paused = _pause_for(state, Pause.ELSEWHERE, _elsewhere(state))
+            return Transition(paused.state, (*events, *paused.events))
+        transition = _dropped_all(setup, state)
+        seating = _enter(transition.state, Phase.SEEN, _seating(setup))
+        return Transition(replace(seating, recent=()), (*events, *transition.events))
+    if begins and not events:
+        events = (SwingEvent(Happening.SLIPPED),)
+    n_dropped = len(strays) + len(dropped)
+    return Transition(
+        replace(state, message=Message(Code.TIP_SLIPPED, (n_dropped,))), events
+    )
+
+
+def _paused(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
+    if state.pause is Pause.BY_USER:
+        return Transition(state)
+    if _is_lost(state):
+        return Transition(
+            replace(state, pause=Pause.LOST, message=Message(Code.PEN_LOST))
+        )
+    if state.time - state.since > RESEATED and rests_in_place(state, RESEATED):
+        capturing = _enter(state, Phase.CAPTURING, _asking(state))
+        return Transition(capturing, (SwingEvent(Happening.SEATED),))
+    seat = steady_seat(setup.pen, state)
+    if seat is None or in_place(state, state.recent[-1:]).all():
+        return Transition(state)
+    return _settle(setup, state, seat)
+
+
+_RULES: dict[Phase, Callable[[SwingSetup, SwingState, Sighting], Transition]] = {
+    Phase.WAIT: _wait,
+    Phase.SEEN: _seen,
+    Phase.SETTLED: _settled,
+    Phase.COUNTDOWN: _countdown,
+    Phase.CAPTURING: _capturing,
+    Phase.PAUSED: _paused,
+}
+
+
+def _enter(state: SwingState, phase: Phase, message: Message) -> SwingState:
+    return replace(
+        state,
+        phase=phase,
+        since=state.time,
+        message=message,
+        pause=Pause.NONE,
+        strayed_since=None,
+        stray_rotations=np.zeros((0, 3, 3)),
+    )
+
+
+def _await_seat(state: SwingState) -> SwingState:
+    """Return to where the pen must be seen and seated again."""
+    return replace(_enter(state, Phase.WAIT, Message(Code.SHOW_PEN)), recent=())
+
+
+def _pause_for(state: SwingState, why: Pause, message: Message) -> Transition:
+    paused = replace(_enter(state, Phase.PAUSED, message), pause=why)
+    return Transition(paused, (SwingEvent(Happening.LOST),))
+
+
+def _is_lost(state: SwingState) -> bool:
+    return state.time - state.last_seen > LOST_AFTER
+
+
+def _seating(setup: SwingSetup) -> Message:
+    known = setup.pen.nominal_tip is not None
+    return Message(Code.SEAT_TIP if known else Code.SWING_TO_SEAT)
+
+
+def _elsewhere(state: SwingState) -> Message:
+    return Message(Code.TIP_ELSEWHERE, (offset(state, BATCH),))
+
+
+def _asking(state: SwingState) -> Message:
+    if state.heading is None:
+        return Message(Code.LEAN_TO_YOUR_RIGHT)
+    return Message(Code.FOLLOW_ARROW)
+
+
+def _is_new(rotations: FloatArray, sighting: Sighting, spacing: float) -> bool:
+    if not len(rotations):
+        return True
+    return bool(angles_between(sighting.rotation[None], rotations).min() >= spacing)
+
+
+def _with_new(
+    setup: SwingSetup, rotations: FloatArray, sighting: Sighting
+) -> FloatArray:
+    """Return the postures, with that of the sighting if it differs from all."""
+    if not _is_new(rotations, sighting, setup.limits.spacing):
+        return rotations
+    return np.concatenate([rotations, sighting.rotation[None]])
+
+
+def _flawed(
+    setup: SwingSetup, state: SwingState, sighting: Sighting, flaw: Reason
+) -> SwingState:
+    """Say what is wrong with an image, and count it once a posture."""
+    flawed = _with_new(setup, state.flawed_rotations, sighting)
+    needed = min(MIN_LEDS, setup.pen.n_leds)
+    messages = {
+        Reason.TOO_FEW_LEDS: Message(Code.FEW_LEDS, (sighting.n_leds, needed)),
+        Reason.BLURRED: Message(Code.TOO_FAST),
+        Reason.MISFIT: Message(Code.BAD_FIT, (sighting.sigma, state.kept.sigma)),
+    }
+    return replace(
+        state,
+        message=messages[flaw],
+        flawed_rotations=flawed,
+        n_dropped=_more(state, len(flawed) - len(state.flawed_rotations), flaw),
+    )
+
+
+def _flaw(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Reason:
+    """Return why an image with a new posture is of no use."""
+    if sighting.n_leds < min(MIN_LEDS, setup.pen.n_leds):
+        return Reason.TOO_FEW_LEDS
+    if sighting.is_blurred:
+        return Reason.BLURRED
+    usual = state.kept.sigma if state.n_kept >= FEW else np.inf
+    if sighting.sigma > max(BAD_SIGMA * usual, SOME_SIGMA):
+        return Reason.MISFIT
+    return Reason.NONE
+
+
+def _dropped(state: SwingState, numbers: set[int]) -> Transition:
+    """Count kept images that are dropped, and say so."""
+    if not numbers:
+        return Transition(state)
+    state = replace(state, n_dropped=_more(state, len(numbers)))
+    return Transition(state, (SwingEvent(Happening.SLIPPED, tuple(sorted(numbers))),))
+
+
+def _dropped_all(setup: SwingSetup, state: SwingState) -> Transition:
+    """Drop all images: they were taken while the tip was in a wrong place."""
+    numbers = set(map(int, state.kept.numbers))
+    return _dropped(replace(state, kept=none_kept(setup.pen.n_leds)), numbers)
+
+
+def _more(
+    state: SwingState, n_images: int, reason: Reason = Reason.SLIPPED
+) -> Counter[Reason]:
+    counts = Counter(state.n_dropped)
+    if n_images:
+        counts[reason] += n_images
+    return counts
+
+
+def _longer(trace: Trace, kept: KeptImages) -> Trace:
+    if kept.seat is None:
+        return trace
+    return Trace(
+        np.append(trace.n_images, len(kept)),
+        np.concatenate([trace.tips, kept.seat.tip_pen[None]]),
+        np.append(trace.uncertainties, kept.uncertainty),
+    )

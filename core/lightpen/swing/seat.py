@@ -1,0 +1,117 @@
+"""Where the tip rests, as far as a few poses tell, and which poses have it elsewhere.
+
+The equations are those of `lightpen.estimation.pivot`, R_i tip_pen + t_i = cone_cam,
+weighed by the covariances of the poses. What is known of the tip beforehand joins them
+as a prior, so that a second of hardly moving poses already gives the cone point.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.pivot import tip_covariances
+from lightpen.model.pen import Pen
+
+NOMINAL_SIGMA = 3.0  # mm, of a tip about its design
+UNKNOWN_SIGMA = 200.0  # mm, of a tip about the LEDs
+CONE_SIGMA = 1e4  # mm, of the cone before anything is seen
+SEATING = 0.01  # mm, by which the tip may move in a good cone
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """Tip and cone, and how well they are known.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array
+        mm.
+    cone_cam : (3,) array
+        mm.
+    covariance : (6, 6) array
+        Of (tip_pen, cone_cam), mm^2.
+    """
+
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    covariance: FloatArray
+
+
+def prior_of(pen: Pen) -> tuple[FloatArray, float]:
+    """Return where the tip of a pen should be, mm, and the standard deviation of it."""
+    if pen.nominal_tip is None:
+        return pen.leds.mean(axis=0), UNKNOWN_SIGMA
+    return pen.nominal_tip, NOMINAL_SIGMA
+
+
+def fit_seat(
+    pen: Pen, rotations: FloatArray, translations: FloatArray, covariances: FloatArray
+) -> Seat:
+    """Fit tip and cone to poses and to what is known of the tip beforehand.
+
+    Parameters
+    ----------
+    pen : Pen
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt), rad and mm.
+
+    Returns
+    -------
+    Seat
+    """
+    expected, sigma = prior_of(pen)
+    spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
+    A = _equations(rotations)
+    AtW = np.swapaxes(A, 1, 2) @ np.linalg.inv(spread)
+    center = (rotations @ expected + translations).mean(axis=0)
+    missing = center - (rotations @ expected + translations)
+    prior = np.diag([sigma**-2] * 3 + [CONE_SIGMA**-2] * 3)
+    H = (AtW @ A).sum(axis=0) + prior
+    step = np.linalg.solve(H, (AtW @ missing[..., None]).sum(axis=0)[:, 0])
+    return Seat(expected + step[:3], center + step[3:], np.linalg.inv(H))
+
+
+def tip_offsets(
+    seat: Seat, rotations: FloatArray, translations: FloatArray
+) -> FloatArray:
+    """Return where poses put the tip, minus the cone, camera frame, (N, 3), mm."""
+    return rotations @ seat.tip_pen + translations - seat.cone_cam
+
+
+def tip_distances(
+    seat: Seat,
+    rotations: FloatArray,
+    translations: FloatArray,
+    covariances: FloatArray,
+) -> FloatArray:
+    """Return how far from the cone poses put the tip, in standard deviations.
+
+    Parameters
+    ----------
+    seat : Seat
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+    covariances : (N, 6, 6) array
+        Of each pose's (theta, dt), rad and mm.
+
+    Returns
+    -------
+    (N,) array
+        1.73 on average where the tip rests in the cone.
+    """
+    offsets = tip_offsets(seat, rotations, translations)
+    A = _equations(rotations)
+    spread = tip_covariances(rotations, covariances, seat.tip_pen)
+    spread = spread + A @ seat.covariance @ np.swapaxes(A, 1, 2)
+    spread = spread + SEATING**2 * np.eye(3)
+    whitened = np.linalg.solve(spread, offsets[..., None])[..., 0]
+    squares: FloatArray = np.einsum("ni,ni->n", offsets, whitened)
+    return np.sqrt(squares)
+
+
+def _equations(rotations: FloatArray) -> FloatArray:
+    minus = np.broadcast_to(-np.eye(3), rotations.shape)
+    return np.asarray(np.concatenate([rotations, minus], axis=2))

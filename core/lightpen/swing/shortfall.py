@@ -1,0 +1,201 @@
+"""How far a swing has come: what is missing, and where to lean the pen next."""
+
+from dataclasses import dataclass, replace
+from math import ceil
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.sighting import Sighting
+from lightpen.messages import Code, Message
+from lightpen.model.coverage import N_DIRECTIONS
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.model.posture import Posture, angles_between, posture_of, rotations_of
+from lightpen.swing.guidance import Outlook, next_posture, visible_fields
+from lightpen.swing.seat import Seat
+from lightpen.swing.state import (
+    SwingSetup,
+    SwingState,
+)
+
+LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
+REACHED = np.radians(5.0)  # of a target
+N_MORE = 40  # images at least, where more are asked for than a swing needs
+PATIENCE = 4.0  # s until a target that is not reached is chosen anew
+
+
+@dataclass(frozen=True, eq=False)
+class Shortfall:
+    """What a swing lacks.
+
+    Attributes
+    ----------
+    wanted : (3, 8) array of int
+        Images asked for in each field of the dial.
+    fields : (3, 8) array of int
+        Images missing in each of them.
+    n_images : int
+        Images missing in all, at the least.
+    n_for_uncertainty : int
+        Images that the uncertainty still needs, estimated; 0 if it suffices.
+    n_more : int
+        Images that will still be taken, estimated: no more than the limit allows.
+    """
+
+    wanted: IntArray
+    fields: IntArray
+    n_images: int
+    n_for_uncertainty: int
+    n_more: int
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing is missing."""
+        return self.n_images == 0 and self.n_for_uncertainty == 0
+
+
+def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
+    """Measure what the postures and the uncertainty of a swing lack.
+
+    Fields of the dial in which the camera would not see enough LEDs are not asked for.
+    """
+    limits = setup.limits
+    wanted: IntArray = np.full((3, N_DIRECTIONS), limits.min_per_field, dtype=np.int64)
+    wanted[0, 1:] = 0
+    seat = state.kept.seat
+    if seat is not None:
+        wanted[~visible_fields(_outlook(setup, state, seat))] = 0
+    fields = np.maximum(wanted - state.counts, 0)
+    excess = (state.kept.uncertainty / limits.max_uncertainty) ** 2 - 1
+    n_for_uncertainty = 0
+    if excess > 0:  # the variance goes with one over the number of images
+        bounded = min(excess * max(state.n_kept, 1), limits.max_images)
+        n_for_uncertainty = max(ceil(bounded), 1)
+    n_images = max(limits.min_images - state.n_kept, int(fields.sum()), 0)
+    n_allowed = max(limits.max_images - state.n_kept, 0)
+    n_more = min(max(n_images, n_for_uncertainty), n_allowed)
+    return Shortfall(wanted, fields, n_images, n_for_uncertainty, n_more)
+
+
+def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
+    """Return limits by which a swing that has all it needs goes on nevertheless."""
+    n_images = n_kept + N_MORE
+    return replace(
+        limits,
+        min_images=max(limits.min_images, n_images),
+        max_images=max(limits.max_images, n_images),
+    )
+
+
+def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
+    """Return the least and the greatest turn of a pen about its own axis, rad.
+
+    Parameters
+    ----------
+    pen : Pen
+    rotations : (N, 3, 3) array
+        cam_from_pen.
+
+    Returns
+    -------
+    pair of float or None
+        None without any rotation.
+    """
+    if not len(rotations):
+        return None
+    right, down, away = rotations[:, :, 1].T
+    tilts, directions = (
+        np.arctan2(np.hypot(right, away), -down),
+        np.arctan2(away, right),
+    )
+    still = rotations_of(pen, tilts, directions, np.zeros_like(tilts))
+    about_y = np.swapaxes(still, 1, 2) @ rotations
+    turns = np.arctan2(about_y[:, 0, 2], about_y[:, 0, 0])
+    return float(turns.min()), float(turns.max())
+
+
+def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
+    """Return what a swing lacks, for an operator who wants to finish early."""
+    short = measure_shortfall(setup, state)
+    found = []
+    if short.fields[1:].any():
+        directions = np.flatnonzero(short.fields[1:].sum(axis=0))
+        n_images = int(short.fields[1:].sum())
+        found.append(Message(Code.TOO_LITTLE_TILT, (n_images, *map(int, directions))))
+    if short.fields[0, 0]:
+        found.append(Message(Code.NOT_UPRIGHT, (int(short.fields[0, 0]),)))
+    if short.n_for_uncertainty:
+        uncertainty = state.kept.uncertainty
+        limit = setup.limits.max_uncertainty
+        n_images = short.n_for_uncertainty
+        known = np.isfinite(uncertainty)
+        uncertain = Message(Code.UNCERTAIN, (uncertainty, limit, n_images))
+        found.append(uncertain if known else Message(Code.UNKNOWN))
+    if state.n_kept < setup.limits.min_images:
+        counts = (state.n_kept, setup.limits.min_images)
+        found.append(Message(Code.TOO_FEW_IMAGES, counts))
+    return tuple(found)
+
+
+def next_target(
+    setup: SwingSetup, state: SwingState, present: FloatArray
+) -> Posture | None:
+    """Return where to lean the pen from the rotation (3, 3) that it has.
+
+    Once the uncertainty suffices, only fields that lack images are chosen from.
+    """
+    seat = state.kept.seat or state.seat
+    if seat is None:
+        return None
+    outlook = _outlook(setup, state, seat)
+    short = measure_shortfall(setup, state)
+    if short.n_for_uncertainty == 0 and short.fields.any():
+        return next_posture(outlook, present, short.fields > 0)
+    return next_posture(outlook, present)
+
+
+def oriented(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingState:
+    """Learn the operator's side from the first lean, asked for to the right."""
+    if state.heading is None:
+        posture = posture_of(setup.pen, sighting.rotation)
+        if posture.tilt > LEARNING_TILT:
+            eighth = 2 * np.pi / N_DIRECTIONS
+            heading = float(round(posture.direction / eighth) % N_DIRECTIONS * eighth)
+            state = replace(state, heading=heading)
+    return state
+
+
+def guided(setup: SwingSetup, state: SwingState, sighting: Sighting) -> SwingState:
+    """Choose a target if there is none, it is reached, or it stays out of reach."""
+    if state.heading is None:
+        return state
+    if state.target is not None and state.time - state.target_since < PATIENCE:
+        target = state.target
+        wanted = rotations_of(
+            setup.pen,
+            np.array([target.tilt]),
+            np.array([target.direction]),
+            np.array([target.turn]),
+        )
+        if angles_between(wanted, sighting.rotation[None])[0, 0] > REACHED:
+            return state
+    chosen = next_target(setup, state, sighting.rotation)
+    return replace(state, target=chosen, target_since=state.time)
+
+
+def _outlook(setup: SwingSetup, state: SwingState, seat: Seat) -> Outlook:
+    sighting = state.sighting
+    sigma = state.kept.sigma
+    if not state.n_kept and sighting is not None:
+        sigma = sighting.sigma
+    return Outlook(
+        camera=setup.camera,
+        pen=setup.pen,
+        tip_pen=seat.tip_pen,
+        cone_cam=seat.cone_cam,
+        information=np.asarray(np.linalg.inv(seat.covariance)),
+        sigma=sigma,
+        rotations=state.kept.rotations,
+        spacing=setup.limits.spacing,
+    )

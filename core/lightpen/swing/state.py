@@ -1,0 +1,234 @@
+"""A swing at one moment, what it needs, and what can happen to it.
+
+    WAIT -> SEEN -> SETTLED -> COUNTDOWN -> CAPTURING <-> PAUSED
+                                                |
+                                                v
+                                             SOLVING -> VERDICT
+
+`lightpen.swing.rules` has the rules.
+"""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.messages import Code, Message
+from lightpen.model.camera import Camera
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.model.posture import Posture
+from lightpen.swing.kept_images import KeptImages, none_kept
+from lightpen.swing.seat import Seat
+
+
+class Phase(StrEnum):
+    """Where a swing stands."""
+
+    WAIT = "wait"
+    SEEN = "seen"
+    SETTLED = "settled"
+    COUNTDOWN = "countdown"
+    CAPTURING = "capturing"
+    PAUSED = "paused"
+    SOLVING = "solving"
+    VERDICT = "verdict"
+
+
+class Pause(StrEnum):
+    """Why a swing is paused."""
+
+    NONE = ""
+    LOST = "lost"
+    LIFTED = "lifted"
+    ELSEWHERE = "elsewhere"
+    BY_USER = "by user"
+
+
+class Happening(StrEnum):
+    """What can happen, each with a sound and a sign of its own."""
+
+    SEATED = "seated"
+    KEPT = "kept"
+    SLIPPED = "slipped"
+    LOST = "lost"
+    FIELD_FULL = "field full"
+    CAPTURED = "captured"
+    DONE = "done"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class SwingEvent:
+    """Something that happened.
+
+    Attributes
+    ----------
+    what : Happening
+    numbers : tuple of int
+        Of images: the one kept, or those that were kept and are now dropped; of a field
+        that is full: its row and column on the dial.
+    """
+
+    what: Happening
+    numbers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class SwingSetup:
+    """What a swing is captured with.
+
+    Attributes
+    ----------
+    camera : Camera
+    pen : Pen
+    limits : SwingLimits
+    mask : (M, 3) array or None
+        Circles of stray light: centre x, y and radius, px.
+    """
+
+    camera: Camera
+    pen: Pen
+    limits: SwingLimits = field(default_factory=SwingLimits)
+    mask: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """A sighting with a pose, and when it was, s."""
+
+    time: float
+    sighting: Sighting
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """How the estimate went along.
+
+    Attributes
+    ----------
+    n_images : (K,) array of int
+        Number of kept images at each estimate.
+    tips : (K, 3) array
+        Tip in the pen frame, mm.
+    uncertainties : (K,) array
+        U (k = 2) along the weakest direction, mm.
+    """
+
+    n_images: IntArray
+    tips: FloatArray
+    uncertainties: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SwingState:
+    """A swing at one moment.
+
+    Attributes
+    ----------
+    phase : Phase
+    since : float
+        When the phase began, s.
+    time : float
+        Of the last image, s.
+    message : Message
+        What the operator should do or know now.
+    kept : KeptImages
+        The images and the running fit.
+    next_number : int
+        Of the image that is kept next, in the swing's record.
+    n_dropped : mapping of Reason to int
+        Postures that were new but of no use.
+    seat : Seat or None
+        Where the tip was found to rest.
+    recent : tuple of Glimpse
+        Of the last second.
+    last_seen : float
+        When the pen was seen last, s.
+    pause : Pause
+    strayed_since : float or None
+        When the tip left the cone, s; None while it is in it.
+    stray_rotations : (M, 3, 3) array
+        Postures held since then.
+    flawed_rotations : (M, 3, 3) array
+        New postures without a good image since the last that was kept.
+    heading : float or None
+        The operator's right as the camera sees it, rad; None until it is learnt.
+    target : Posture or None
+        Where to lean the pen next.
+    target_since : float
+        When the target was chosen, s.
+    slipped_at : float or None
+        When kept images were last dropped or the tip last slipped, s.
+    still_since : float or None
+        Since when the pen is upright and still, s.
+    trace : Trace
+    """
+
+    phase: Phase
+    since: float
+    time: float
+    message: Message
+    kept: KeptImages
+    next_number: int
+    n_dropped: Mapping[Reason, int]
+    seat: Seat | None
+    recent: tuple[Glimpse, ...]
+    last_seen: float
+    pause: Pause
+    strayed_since: float | None
+    stray_rotations: FloatArray
+    flawed_rotations: FloatArray
+    heading: float | None
+    target: Posture | None
+    target_since: float
+    slipped_at: float | None
+    still_since: float | None
+    trace: Trace
+
+    @property
+    def n_kept(self) -> int:
+        """Number of kept images."""
+        return len(self.kept)
+
+    @property
+    def sighting(self) -> Sighting | None:
+        """The last sighting with a pose, if it was within a second."""
+        return self.recent[-1].sighting if self.recent else None
+
+    @property
+    def counts(self) -> IntArray:
+        """Kept images by field of the dial, (3, 8); upright in the first column."""
+        return dial_counts(self.kept.rotations)
+
+
+def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
+    """Return a swing of which nothing has been seen; the time is in s."""
+    return SwingState(
+        phase=Phase.WAIT,
+        since=time,
+        time=time,
+        message=Message(Code.SHOW_PEN),
+        kept=none_kept(setup.pen.n_leds),
+        next_number=1,
+        n_dropped=Counter(),
+        seat=None,
+        recent=(),
+        last_seen=time,
+        pause=Pause.NONE,
+        strayed_since=None,
+        stray_rotations=np.zeros((0, 3, 3)),
+        flawed_rotations=np.zeros((0, 3, 3)),
+        heading=None,
+        target=None,
+        target_since=time,
+        slipped_at=None,
+        still_since=None,
+        trace=Trace(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)),
+    )

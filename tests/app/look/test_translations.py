@@ -1,0 +1,231 @@
+"""Every text that a user sees is translated, compiled, and can be drawn."""
+
+import ast
+import importlib.util
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from xml.etree import ElementTree
+
+import pytest
+from PySide6.QtCore import QCoreApplication
+from PySide6.QtGui import QFont, QRawFont
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.theme import FAMILIES, RESOURCES, font
+from lightpen_app.shell.notice_bar import NoticeBar
+
+ROOT = RESOURCES.parents[1]
+APPLICATION = ROOT / "app" / "lightpen_app"
+TRANSLATIONS = RESOURCES / "translations"
+CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
+HELP_TOPICS = ("start", "camera", "leds", "swing", "review")
+# Calls whose text a user reads, and how many of their first arguments are such.
+SHOWN = {
+    "QLabel": 1,
+    "QPushButton": 1,
+    "QCheckBox": 1,
+    "QRadioButton": 1,
+    "QGroupBox": 1,
+    "addRow": 1,
+    "addTab": 2,
+    "setAccessibleDescription": 1,
+    "setAccessibleName": 1,
+    "setPlaceholderText": 1,
+    "setStatusTip": 1,
+    "setText": 1,
+    "setTitle": 1,
+    "setToolTip": 1,
+    "setWindowTitle": 1,
+    "set_text": 1,
+}
+NAMES = {"Lightpen"}  # the same in every language
+
+
+def load_tool() -> ModuleType:
+    path = ROOT / "resources" / "update_translations.py"
+    spec = importlib.util.spec_from_file_location("update_translations", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+TOOL = load_tool()
+
+
+def messages(ts_file: Path) -> Iterator[tuple[str, str, ElementTree.Element]]:
+    for context in ElementTree.parse(ts_file).getroot().iter("context"):
+        for message in context.iter("message"):
+            translation = message.find("translation")
+            assert translation is not None
+            yield (
+                context.findtext("name", ""),
+                message.findtext("source", ""),
+                translation,
+            )
+
+
+def texts_of(translation: ElementTree.Element) -> list[str]:
+    """The translation, or its plural forms."""
+    forms = [form.text or "" for form in translation.iter("numerusform")]
+    return forms or [translation.text or ""]
+
+
+def untranslated(ts_file: Path) -> list[str]:
+    return [
+        f"{context}: {source}"
+        for context, source, translation in messages(ts_file)
+        if translation.get("type") is not None or not all(texts_of(translation))
+    ]
+
+
+def bare_texts(source: str) -> list[str]:
+    """Texts with letters that reach the screen without tr()."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call):
+            continue
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        for argument in node.args[: SHOWN.get(name, 0)]:
+            match argument:
+                case ast.Constant(value=str() as text):
+                    if re.search("[A-Za-z]", text) and text not in NAMES:
+                        found.append(f"{name}({text!r})")
+    return found
+
+
+def formatted_texts(source: str) -> list[str]:
+    """Calls of tr() with an f-string, which lupdate takes word for word."""
+    return [
+        ast.unparse(node)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call)
+        and getattr(node.func, "attr", "") == "tr"
+        and any(isinstance(argument, ast.JoinedStr) for argument in node.args)
+    ]
+
+
+def test_every_text_is_translated(tmp_path: Path) -> None:
+    """The texts are collected anew, so that one added since is found as well."""
+    fresh = tmp_path / CHINESE.name
+    fresh.write_bytes(CHINESE.read_bytes())
+
+    TOOL.collect(fresh, APPLICATION)
+
+    assert untranslated(fresh) == []
+
+
+def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "page.py").write_text(
+        "class Page(QWidget):\n    def f(self):\n        self.tr('New text')\n"
+    )
+    fresh = tmp_path / CHINESE.name
+
+    TOOL.collect(fresh, tmp_path)
+
+    assert untranslated(fresh) == ["Page: New text"]
+
+
+def test_no_text_reaches_the_screen_untranslatable() -> None:
+    for path in APPLICATION.rglob("*.py"):
+        source = path.read_text("utf-8")
+        assert bare_texts(source) == [], path.name
+        assert formatted_texts(source) == [], path.name
+
+
+def test_an_untranslatable_text_is_noticed() -> None:
+    assert bare_texts("label.setText('Hello')") == ["setText('Hello')"]
+    assert formatted_texts("self.tr(f'{n} images')") == ["self.tr(f'{n} images')"]
+
+
+@pytest.mark.parametrize("ts_file", sorted(TRANSLATIONS.glob("*.ts")), ids=str)
+def test_the_compiled_translations_are_fresh(ts_file: Path, tmp_path: Path) -> None:
+    compiled = TOOL.compile_ts(ts_file, tmp_path)
+
+    assert compiled.read_bytes() == ts_file.with_suffix(".qm").read_bytes()
+
+
+def test_a_translation_keeps_the_places_of_the_values() -> None:
+    for _, source, translation in messages(CHINESE):
+        places = sorted(re.findall(r"\{\d*\}|%n", source))
+        for text in texts_of(translation):
+            assert sorted(re.findall(r"\{\d*\}|%n", text)) == places, source
+
+
+def test_the_language_changes_while_a_widget_is_shown(
+    qapp: QApplication, qtbot: QtBot
+) -> None:
+    notice = NoticeBar()
+    qtbot.addWidget(notice)
+    switch = LanguageSwitch(qapp)
+
+    switch.set_language(Language.CHINESE)
+    QCoreApplication.processEvents()
+    chinese = notice.close_text()
+    switch.set_language(Language.ENGLISH)
+    QCoreApplication.processEvents()
+
+    assert chinese == "\u5173\u95ed"
+    assert notice.close_text() == "Close"
+
+
+def test_texts_of_qt_itself_are_translated_too(qapp: QApplication) -> None:
+    switch = LanguageSwitch(qapp)
+    switch.set_language(Language.CHINESE)
+
+    assert QCoreApplication.translate("QPlatformTheme", "Cancel") == "\u53d6\u6d88"
+
+
+def missing_characters(text: str) -> set[str]:
+    fonts = []
+    for family in FAMILIES:
+        for bold in (False, True):
+            one = QFont(font(16, bold=bold))
+            one.setFamilies([family])
+            fonts.append((bold, QRawFont.fromFont(one)))
+    return {
+        character
+        for character in text
+        if character.isprintable()
+        for weight in (False, True)
+        if not any(
+            raw.supportsCharacter(ord(character))
+            for bold, raw in fonts
+            if bold is weight
+        )
+    }
+
+
+def test_the_bundled_fonts_hold_every_character_that_is_shown() -> None:
+    files = [
+        *TRANSLATIONS.glob("*.ts"),
+        *(RESOURCES / "help").rglob("*.md"),
+        *APPLICATION.rglob("*.py"),
+    ]
+    text = "".join(path.read_text("utf-8") for path in files)
+
+    assert missing_characters(text) == set(), "run resources/cut_fonts.py"
+
+
+def test_a_missing_character_is_noticed() -> None:
+    assert missing_characters("a\u9f98") == {"\u9f98"}
+
+
+@pytest.mark.parametrize("language", list(Language))
+@pytest.mark.parametrize("topic", HELP_TOPICS)
+def test_every_step_has_help(language: Language, topic: str) -> None:
+    text = (RESOURCES / "help" / language / f"{topic}.md").read_text("utf-8")
+
+    assert text.startswith("# ")
+    assert len(text) > 100
+
+
+def test_the_languages_name_themselves() -> None:
+    names = [language.own_name for language in Language]
+
+    assert names == ["English", "\u7b80\u4f53\u4e2d\u6587"]

@@ -1,0 +1,624 @@
+"""The shell leads from step to step, by mouse and by keys alone."""
+
+from collections.abc import Callable
+
+import pytest
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QLineEdit,
+    QMenu,
+    QMessageBox,
+    QPushButton,
+    QVBoxLayout,
+)
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen_app.look.theme import Appearance
+from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.shell.placement import fitted_place
+from lightpen_app.shell.step_states import StepState
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.work.settings import Preferences, Settings
+
+Key = Qt.Key
+
+
+class Leaf(Page):
+    """A page that notes what happens to it."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self.key = name.lower()
+        self.name = name
+        self.closed_because = ""
+        self.why_not = ""
+        self.at_screen = False
+        self.hands_free = False
+        self.question = ""
+        self.log: list[str] = []
+        self.field = QLineEdit()
+        self.button = QPushButton(name)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.field)
+        layout.addWidget(self.button)
+
+    @override
+    def title(self) -> str:
+        return self.name
+
+    @override
+    def is_complete(self) -> bool:
+        return bool(self.field.text())
+
+    @override
+    def why_closed(self) -> str:
+        return self.closed_because
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction(f"Leave {self.name}", self.why_not, self.at_screen)
+
+    @override
+    def is_hands_free(self) -> bool:
+        return self.hands_free
+
+    @override
+    def toggle_pause(self) -> None:
+        self.log.append("pause")
+
+    @override
+    def entered(self) -> None:
+        self.log.append("entered")
+
+    @override
+    def left(self) -> None:
+        self.log.append("left")
+
+    @override
+    def unsaved(self) -> str:
+        return self.question
+
+    @override
+    def shut_down(self) -> None:
+        self.log.append("shut down")
+
+
+class Shell:
+    """A window over three pages."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.pages = [Leaf("Start"), Leaf("Camera"), Leaf("Swing")]
+        self.chosen: list[Preferences] = []
+        self.window = MainWindow(self.pages, settings, Preferences())
+        self.window.preferences_changed.connect(self.chosen.append)
+
+    @property
+    def shown(self) -> str:
+        return self.window.page().title()
+
+    @property
+    def main_button(self) -> QPushButton:
+        button = self.window.findChild(QPushButton, "main_button")
+        assert isinstance(button, QPushButton)
+        return button
+
+
+@pytest.fixture
+def shell(qtbot: QtBot, settings: Settings) -> Shell:
+    shell = Shell(settings)
+    qtbot.addWidget(shell.window)
+    shell.window.show()
+    qtbot.waitActive(shell.window).__enter__()
+    return shell
+
+
+@pytest.fixture
+def press(qtbot: QtBot) -> Callable[[Key], None]:
+    """Press a key where the focus is, as a keyboard does."""
+
+    def press_key(key: Key) -> None:
+        target = QApplication.focusWidget() or QApplication.activeWindow()
+        assert target is not None
+        QTest.keyClick(target, key)
+
+    return press_key
+
+
+def test_the_first_page_is_entered_at_once(shell: Shell) -> None:
+    assert shell.shown == "Start"
+    assert shell.pages[0].log == ["entered"]
+
+
+def test_a_shell_without_pages_is_refused(settings: Settings) -> None:
+    with pytest.raises(ValueError, match="at least one page"):
+        MainWindow([], settings, Preferences())
+
+
+def test_the_main_button_leads_to_the_next_page(shell: Shell, qtbot: QtBot) -> None:
+    QTest.mouseClick(shell.main_button, Qt.MouseButton.LeftButton)
+
+    assert shell.shown == "Camera"
+    assert shell.pages[0].log == ["entered", "left"]
+    assert shell.pages[1].log == ["entered"]
+    assert shell.main_button.text() == "Leave Camera"
+
+
+@pytest.mark.parametrize("key", [Key.Key_Return, Key.Key_Enter, Key.Key_PageDown])
+def test_keys_press_the_main_button_even_from_a_field(
+    shell: Shell, press: Callable[[Key], None], key: Key
+) -> None:
+    shell.pages[0].field.setFocus()
+
+    press(key)
+
+    assert shell.shown == "Camera"
+
+
+def test_page_up_goes_back_and_keeps_what_was_typed(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].field.setText("LP-04")
+    press(Key.Key_PageDown)
+    press(Key.Key_PageUp)
+
+    assert shell.shown == "Start"
+    assert shell.pages[0].field.text() == "LP-04"
+
+
+def test_enter_on_another_button_presses_that_one(
+    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].button.setFocus()
+
+    with qtbot.waitSignal(shell.pages[0].button.clicked):
+        press(Key.Key_Return)
+
+    assert shell.shown == "Start"
+
+
+def test_enter_on_a_check_box_presses_the_main_button(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    box = QCheckBox(shell.pages[0])
+    box.show()
+    box.setFocus()
+
+    press(Key.Key_Return)
+
+    assert not box.isChecked()
+    assert shell.shown == "Camera"
+
+
+def test_escape_neither_leaves_the_page_nor_closes_the_window(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].hands_free = True
+    shell.pages[0].changed.emit()
+
+    press(Key.Key_Escape)
+
+    assert shell.window.isVisible()
+    assert shell.pages[0].log == ["entered"]
+
+
+def test_a_main_action_that_is_not_possible_says_why(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].why_not = "Choose the pen first."
+    shell.pages[0].changed.emit()
+
+    press(Key.Key_Return)
+
+    assert shell.shown == "Start"
+    assert not shell.main_button.isEnabled()
+    assert shell.main_button.accessibleDescription() == "Choose the pen first."
+    assert "Choose the pen first." in shell.window.words()
+
+
+def test_the_main_button_keeps_the_focus_while_it_cannot_be_pressed(
+    shell: Shell, press: Callable[[Key], None], qtbot: QtBot
+) -> None:
+    page = shell.pages[0]
+    shell.window.activateWindow()
+    shell.main_button.setFocus()
+    for why_not in ("Wait a moment.", ""):
+        page.why_not = why_not
+        page.changed.emit()
+
+    assert shell.main_button.hasFocus()
+
+    page.field.setFocus()
+    for why_not in ("Wait a moment.", ""):
+        page.why_not = why_not
+        page.changed.emit()
+    assert page.field.hasFocus()
+
+
+def test_a_page_leads_to_any_step_by_its_key(shell: Shell) -> None:
+    shell.pages[0].step_requested.emit("swing")
+
+    assert shell.shown == "Swing"
+    shell.pages[2].step_requested.emit("start")
+    assert shell.shown == "Start"
+
+
+def test_a_closed_step_that_a_page_leads_to_says_why(shell: Shell) -> None:
+    shell.pages[2].closed_because = "Needs a camera."
+
+    shell.pages[0].step_requested.emit("swing")
+
+    assert shell.shown == "Start"
+    assert "Needs a camera." in shell.window.words()
+
+
+def test_the_window_opens_with_the_focus_on_the_first_control_of_the_page(
+    shell: Shell,
+) -> None:
+    assert QApplication.focusWidget() is shell.pages[0].field
+
+
+def test_a_closed_step_says_why_in_the_list_and_when_it_is_asked_for(
+    shell: Shell,
+) -> None:
+    shell.pages[2].closed_because = "Needs a camera."
+    shell.pages[0].changed.emit()
+    steps = shell.window.steps()
+
+    shell.window.go_to(2)
+
+    assert steps[2].state is StepState.CLOSED
+    assert steps[2].why_closed == "Needs a camera."
+    assert shell.shown == "Start"
+    assert "Needs a camera." in shell.window.words()
+
+
+def test_a_page_that_has_done_its_work_is_marked_done(shell: Shell) -> None:
+    shell.pages[0].field.setText("LP-04")
+    shell.pages[0].advance_requested.emit()
+
+    states = [step.state for step in shell.window.steps()]
+
+    assert states == [StepState.DONE, StepState.NOW, StepState.TO_DO]
+
+
+def test_every_step_can_be_reached_and_pressed_by_keys_alone(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    """Tab goes round all controls; from the list, Space opens a step."""
+    seen = []
+    while (widget := QApplication.focusWidget()) not in seen:
+        seen.append(widget)
+        QTest.keyClick(widget or shell.window, Key.Key_Tab)
+    names = {widget.accessibleName() for widget in seen if widget is not None}
+
+    assert {"Start, now", "Camera, to do", "Swing, to do"} <= names
+    assert shell.main_button in seen
+    assert shell.pages[0].field in seen
+
+    camera = next(w for w in seen if w and w.accessibleName() == "Camera, to do")
+    QTest.keyClick(camera, Key.Key_Space)
+    assert shell.shown == "Camera"
+
+
+def test_a_new_page_has_the_focus_on_its_first_control(shell: Shell) -> None:
+    shell.window.advance()
+
+    assert QApplication.focusWidget() is shell.pages[1].field
+
+
+def test_every_control_has_a_name_for_screen_readers(shell: Shell) -> None:
+    for button in shell.window.findChildren(QPushButton):
+        assert button.accessibleName() or button.text()
+
+
+def test_space_pauses_wherever_the_focus_is_while_the_hands_are_at_the_pen(
+    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
+) -> None:
+    page = shell.pages[0]
+    page.hands_free = True
+    page.changed.emit()
+    page.button.setFocus()
+
+    with qtbot.assertNotEmitted(page.button.clicked):
+        press(Key.Key_Space)
+
+    assert page.log == ["entered", "pause"]
+
+
+def test_space_presses_buttons_on_other_pages(
+    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
+) -> None:
+    page = shell.pages[0]
+    page.button.setFocus()
+
+    with qtbot.waitSignal(page.button.clicked):
+        press(Key.Key_Space)
+
+    assert page.log == ["entered"]
+
+
+def test_b_mutes_but_can_be_typed(shell: Shell, press: Callable[[Key], None]) -> None:
+    shell.pages[0].field.setFocus()
+    press(Key.Key_B)
+    assert shell.pages[0].field.text() == "b"
+    assert shell.chosen == []
+
+    shell.main_button.setFocus()
+    press(Key.Key_B)
+    press(Key.Key_B)
+
+    assert [preferences.muted for preferences in shell.chosen] == [True, False]
+    assert "Sounds are on." in shell.window.words()
+
+
+def test_f11_opens_the_operator_view_and_escape_leaves_only_that(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    view = shell.window.operator_view()
+    QTest.keyClick(shell.window, Key.Key_F11)
+    assert view.isVisible()
+
+    QTest.keyClick(view, Key.Key_Escape)
+
+    assert not view.isVisible()
+    assert shell.window.isVisible()
+    assert shell.pages[0].log == ["entered"]
+    QTest.keyClick(shell.window, Key.Key_F11)
+    assert view.isVisible()
+
+
+def test_the_operator_view_takes_the_keys_of_a_remote(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    view = shell.window.operator_view()
+    QTest.keyClick(shell.window, Key.Key_F11)
+
+    QTest.keyClick(view, Key.Key_Space)
+    QTest.keyClick(view, Key.Key_PageDown)
+    assert shell.shown == "Camera"
+    QTest.keyClick(view, Key.Key_PageUp)
+
+    assert shell.shown == "Start"
+    assert shell.pages[0].log == ["entered", "pause", "left", "entered"]
+
+
+def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    shell.pages[0].at_screen = True
+    view = shell.window.operator_view()
+    QTest.keyClick(shell.window, Key.Key_F11)
+    QTest.keyClick(view, Key.Key_PageDown)
+    QTest.keyClick(view, Key.Key_Return)
+    QTest.keyClick(view, Key.Key_F11)
+    QTest.keyClick(shell.window, Key.Key_PageDown)
+    assert shell.shown == "Start"
+    assert "Press this button at the screen." in shell.window.words()
+
+    QTest.keyClick(shell.window, Key.Key_Return)
+
+    assert shell.shown == "Camera"
+
+
+def test_f11_works_while_the_help_is_in_front(shell: Shell) -> None:
+    QTest.keyClick(shell.window, Key.Key_F1)
+
+    QTest.keyClick(shell.window.help_window(), Key.Key_F11)
+
+    assert shell.window.operator_view().isVisible()
+
+
+def test_f11_in_the_operator_view_leaves_it(shell: Shell, qtbot: QtBot) -> None:
+    view = shell.window.operator_view()
+    QTest.keyClick(shell.window, Key.Key_F11)
+
+    QTest.keyClick(view, Key.Key_F11)
+
+    assert not view.isVisible()
+
+
+def test_a_page_speaks_through_the_window(shell: Shell) -> None:
+    page = shell.pages[0]
+    page.status_changed.emit("21 images a second")
+    page.subject_changed.emit("Pen LP-04")
+    page.notice_raised.emit("The file holds no LED.")
+    page.operator_value_changed.emit(OperatorValue(instruction="Lean right"))
+
+    words = shell.window.words()
+
+    assert {"21 images a second", "Pen LP-04", "The file holds no LED."} <= set(words)
+    assert shell.window.operator_view().value().instruction == "Lean right"
+    page.notice_raised.emit("")
+    assert "The file holds no LED." not in shell.window.words()
+
+
+def test_f1_shows_the_help_of_the_step(shell: Shell, qtbot: QtBot) -> None:
+    shell.window.advance()
+
+    QTest.keyClick(shell.window, Key.Key_F1)
+
+    assert "Stray light" in shell.window.help_window().text()
+    QTest.keyClick(shell.window.help_window(), Key.Key_Escape)
+    assert not shell.window.help_window().isVisible()
+
+
+@pytest.mark.qt_log_ignore(
+    "^This plugin does not support (raise|grabbing)", extend=True
+)
+def test_options_open_by_key_and_change_the_appearance(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    QTest.keyClick(shell.window, Key.Key_F10)
+    down, right, enter = Key.Key_Down, Key.Key_Right, Key.Key_Return
+    for key in (down, down, right, down, enter):
+        menu = QApplication.activePopupWidget()
+        assert isinstance(menu, QMenu)
+        QTest.keyClick(menu, key)
+    assert [preferences.appearance for preferences in shell.chosen] == [
+        Appearance.LIGHT
+    ]
+
+
+def test_every_choice_has_a_name(shell: Shell) -> None:
+    names = [
+        [action.text() for action in menu.actions()]
+        for menu in shell.window.findChildren(QMenu)
+    ]
+
+    assert ["English", "\u7b80\u4f53\u4e2d\u6587"] in names
+    assert ["As the system", "Light", "Dark"] in names
+    assert ["1 m", "2 m", "3 m", "4 m", "6 m"] in names
+
+
+def test_a_crash_is_told_in_a_sentence_with_the_place_of_the_report(
+    shell: Shell,
+) -> None:
+    shell.window.show_crash_report("/data/crash-1.txt")
+    (text,) = [each for each in shell.window.words() if "/data/crash-1.txt" in each]
+    assert "safe" in text
+
+    shell.window.show_crash_report("")
+
+    assert any("No report could be written" in each for each in shell.window.words())
+
+
+def test_an_error_of_a_page_goes_with_it_but_a_crash_stays(shell: Shell) -> None:
+    shell.pages[0].notice_raised.emit("The file holds no LED.")
+    shell.window.go_to(1)
+    assert "The file holds no LED." not in shell.window.words()
+
+    shell.window.show_crash_report("/data/crash-1.txt")
+    shell.window.go_to(0)
+
+    assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
+def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
+    shell.window.show_notice("The disk is full.")
+    shell.window.drop_notice("The disk is full.")
+    assert "The disk is full." not in shell.window.words()
+
+    shell.window.show_notice("The disk is full.")
+    shell.window.show_crash_report("/data/crash-1.txt")
+    shell.window.drop_notice("The disk is full.")
+
+    assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
+def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:
+    shell.pages[0].notice_raised.emit("The file holds no LED.")
+    shell.window.show_notice("The disk is full.")
+
+    shell.pages[0].notice_raised.emit("")
+
+    assert "The disk is full." in shell.window.words()
+
+
+def test_closing_leaves_the_page_and_stops_every_page(shell: Shell) -> None:
+    shell.window.operator_view().show()
+
+    assert shell.window.close()
+
+    assert shell.pages[0].log == ["entered", "left", "shut down"]
+    assert shell.pages[2].log == ["shut down"]
+    assert not shell.window.operator_view().isVisible()
+
+
+@pytest.mark.parametrize(
+    ("answer", "closes"), [("Stay", False), ("Close anyway", True)]
+)
+def test_closing_asks_where_something_would_be_lost(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch, answer: str, closes: bool
+) -> None:
+    shell.pages[1].question = "The LED table has changes that are not saved."
+    asked = []
+
+    def choose(box: QMessageBox) -> int:
+        asked.append(box.text())
+        (button,) = [each for each in box.buttons() if each.text() == answer]
+        button.click()
+        return 0
+
+    monkeypatch.setattr(QMessageBox, "exec", choose)
+
+    assert shell.window.close() is closes
+
+    assert asked == ["The LED table has changes that are not saved."]
+    assert ("shut down" in shell.pages[1].log) is closes
+    shell.pages[1].question = ""
+
+
+def test_closing_where_nobody_can_answer_asks_nothing(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shell.pages[1].question = "The LED table has changes that are not saved."
+    monkeypatch.setattr(QMessageBox, "exec", lambda box: pytest.fail(box.text()))
+
+    shell.window.close_unasked()
+
+    assert not shell.window.isVisible()
+    assert shell.pages[1].log == ["shut down"]
+
+
+def test_the_window_is_gone_before_it_waits_for_what_is_under_way(
+    shell: Shell,
+) -> None:
+    seen: list[bool] = []
+    shell.window.closing.connect(lambda: seen.append(shell.window.isVisible()))
+    shell.window.close()
+
+    assert seen == [False]
+
+
+def test_the_window_comes_back_where_it_was(
+    shell: Shell, qtbot: QtBot, settings: Settings
+) -> None:
+    shell.window.setGeometry(20, 30, 760, 640)
+    place = shell.window.geometry()
+    shell.window.close()
+
+    again = Shell(settings)
+    qtbot.addWidget(again.window)
+
+    assert again.window.geometry() == place
+
+
+def test_the_window_opens_within_its_screen(shell: Shell) -> None:
+    assert shell.window.screen().availableGeometry().contains(shell.window.geometry())
+
+
+@pytest.mark.parametrize("place", [(20, 30, 3000, 2000), (5000, -700, 760, 640)])
+def test_a_window_of_another_screen_comes_back_within_this_one(
+    shell: Shell, qtbot: QtBot, settings: Settings, place: tuple[int, int, int, int]
+) -> None:
+    shell.window.setGeometry(*place)
+    shell.window.close()
+
+    again = Shell(settings)
+    qtbot.addWidget(again.window)
+    again.window.show()
+
+    available = again.window.screen().availableGeometry()
+    assert available.contains(again.window.geometry())
+
+
+@pytest.mark.parametrize(
+    ("place", "fitted"),
+    [
+        ((10, 50, 700, 400), (10, 50, 700, 400)),
+        ((10, 50, 1280, 800), (8, 50, 952, 470)),
+        ((-300, 0, 700, 400), (0, 30, 700, 400)),
+        ((900, 500, 700, 400), (260, 140, 700, 400)),
+    ],
+)
+def test_a_place_is_changed_only_as_far_as_the_screen_asks_for(
+    place: tuple[int, int, int, int], fitted: tuple[int, int, int, int]
+) -> None:
+    available = QRect(0, 30, 960, 510)  # below a panel
+
+    assert fitted_place(QRect(*place), available) == QRect(*fitted)

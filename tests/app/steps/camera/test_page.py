@@ -1,0 +1,948 @@
+"""The step Camera as an operator sees it: live image, exposure, intrinsics, masks."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen.cameras.protocol import CameraSettings, Frame, own_image
+from lightpen.detection.inspection import SEARCHED_IMAGES
+from lightpen.detection.spots import detect_spots
+from lightpen.formats.camera_files import write_camera
+from lightpen.live.looking import LiveImage
+from lightpen.live.preparation import (
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.record.names import Names
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.hand import Doing
+from lightpen.simulator.scene_files import write_scene
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.view import Lamp
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import unbroken
+from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.steps.camera.focus_meter import FocusMeter
+from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.steps.camera.page import CameraPage
+from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Workbench
+
+LAMPS = (
+    Lamp(np.array([200.0, 150.0]), (8.0, 6.0)),
+    Lamp(np.array([1050.0, 760.0]), (5.0, 5.0)),
+)
+
+
+W = TypeVar("W", bound=QWidget)
+
+
+class Seen:
+    """What an operator finds on the page, by the words on it."""
+
+    def __init__(self, page: CameraPage, qtbot: QtBot) -> None:
+        self.page = page
+        self._qtbot = qtbot
+
+    @property
+    def words(self) -> str:
+        """All that is written on the page."""
+        labels = self.page.findChildren(QLabel)
+        view = self.child(ImageView)
+        shown = [unbroken(each.text()) for each in labels if each.isVisible()]
+        return "\n".join([*shown, view.accessibleDescription()])
+
+    @property
+    def markers(self) -> tuple[Marker, ...]:
+        return self.child(ImageView).markers()
+
+    @property
+    def numbers(self) -> set[str]:
+        return {marker.label for marker in self.markers if marker.tone is Tone.GOOD}
+
+    @property
+    def others(self) -> list[Marker]:
+        return [marker for marker in self.markers if marker.tone is Tone.WARN]
+
+    @property
+    def crossed(self) -> list[Marker]:
+        return [marker for marker in self.markers if marker.crossed]
+
+    @property
+    def exposure(self) -> str:
+        return self.child(ExposureBar).accessibleDescription()
+
+    def child(self, kind: type[W]) -> W:
+        """Return the only, or the first, widget of a kind."""
+        widget = self.page.findChild(kind)
+        assert isinstance(widget, kind)
+        return widget
+
+    def named(self, name: str) -> QWidget:
+        """Return the visible control of that name or on which it is written."""
+        for each in self.page.findChildren(QWidget):
+            written = each.text() if isinstance(each, QPushButton) else ""
+            if each.isVisible() and name in (written, each.accessibleName()):
+                return each
+        raise AssertionError(f"No {name} on the page, but:\n{self.words}")
+
+    def click(self, name: str) -> None:
+        QTest.mouseClick(self.named(name), Qt.MouseButton.LeftButton)
+
+    def enter(self, name: str, text: str) -> None:
+        """Type into a field and press Enter."""
+        field = self.named(name)
+        field.setFocus()
+        QTest.keySequence(field, "Ctrl+A")
+        QTest.keyClicks(field, text)
+        QTest.keyClick(field, Qt.Key.Key_Return)
+
+    def choose(self, source: str) -> None:
+        """Choose a source by the keyboard."""
+        combo = self.child(QComboBox)
+        combo.setFocus()
+        is_below = combo.findText(source) > combo.currentIndex()
+        QTest.keyClick(combo, Qt.Key.Key_Down if is_below else Qt.Key.Key_Up)
+        assert combo.currentText() == source
+
+    def wait(self, words: str) -> None:
+        """Wait until it is written on the page."""
+
+        def is_written() -> None:
+            assert words in self.words, self.words
+
+        self._qtbot.waitUntil(is_written)
+
+    def until(self, condition: Callable[[], object]) -> None:
+        self._qtbot.waitUntil(lambda: bool(condition()))
+
+
+@pytest.fixture
+def page(qtbot: QtBot, services: Services) -> Iterator[CameraPage]:
+    page = CameraPage(services)
+    qtbot.addWidget(page)
+    page.resize(976, 600)
+    page.show()
+    yield page
+    page.shut_down()
+
+
+@pytest.fixture
+def seen(page: CameraPage, qtbot: QtBot) -> Seen:
+    return Seen(page, qtbot)
+
+
+@pytest.fixture
+def live(seen: Seen) -> Seen:
+    """The page with live images of the simulated pen."""
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+    return seen
+
+
+def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> SimulatedCamera:
+    """Open a simulated camera in which things can go wrong."""
+    clock = workbench.around.clock
+    camera = SimulatedCamera(scene, clock, lamps=lamps)
+    workbench.live.open(camera, CameraSettings(), clock)
+    return camera
+
+
+def recording(
+    folder: Path, n_images: int = 2, size: tuple[int, int] = (80, 64)
+) -> Path:
+    """Write a folder of images without any LED."""
+    folder.mkdir()
+    for i in range(n_images):
+        image = np.zeros(size[::-1], np.uint8)
+        (folder / f"frame_{i}.png").write_bytes(
+            cv2.imencode(".png", image)[1].tobytes()
+        )
+    return folder
+
+
+def intrinsics(workbench: Workbench, folder: Path, **changes: object) -> Path:
+    """Write a file like the one in use, with changes."""
+    camera = workbench.preparation.camera
+    assert camera is not None
+    path = folder / "other.yaml"
+    write_camera(replace(camera, **changes), path)  # type: ignore[arg-type]
+    return path
+
+
+# Live image
+
+
+def test_each_led_has_a_ring_with_its_number(live: Seen) -> None:
+    assert live.numbers == {str(led) for led in range(1, 11)}
+    assert live.others == []
+
+
+def test_size_and_rate_of_the_images_are_told(live: Seen) -> None:
+    assert "1224 x 1024 px" in live.words
+    assert "images/s" in live.words
+    assert "Live" in live.words
+
+
+def test_the_simulated_pen_comes_by_itself(seen: Seen) -> None:
+    seen.page.entered()
+
+    seen.wait("10 of 10 LEDs")
+    assert seen.exposure == "Good: 10 LEDs"
+
+
+def test_spots_that_are_no_leds_are_dashed(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    plugged(workbench, small_scene, *LAMPS)
+    seen.page.entered()
+
+    seen.wait("10 of 10 LEDs, other spots: 2")
+    assert len(seen.others) == 2
+    assert seen.exposure == "Good: 10 LEDs"
+
+
+def test_without_a_pen_file_all_spots_are_equal(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    plugged(workbench, small_scene, LAMPS[0])
+    seen.page.entered()
+
+    seen.wait("bright spots: 11")
+    assert {marker.tone for marker in seen.markers} == {Tone.ACTIVE}
+    assert seen.exposure == "Good: 11 spots"
+
+
+def test_images_are_taken_only_while_the_page_is_shown(
+    live: Seen, workbench: Workbench, qtbot: QtBot
+) -> None:
+    live.page.left()
+    before = live.markers
+    for _ in range(3):
+        with qtbot.waitSignal(workbench.live.image_shown):
+            pass
+
+    assert live.markers is before
+
+
+def test_a_sharp_image_has_narrow_rims(live: Seen) -> None:
+    meter = live.child(FocusMeter)
+
+    assert meter.verdict() == "Sharp"
+    assert 1 < float(meter.number().removesuffix(" px")) < 3
+
+
+# Exposure and gain
+
+
+def test_a_long_exposure_saturates_and_a_short_one_is_dark(live: Seen) -> None:
+    assert "All lie in the good part of the scale." in live.words
+
+    live.enter("Exposure", "4")
+    live.until(lambda: live.exposure == "Saturated: 10 of 10 LEDs")
+    assert "Shorten the exposure until no LED is saturated." in live.words
+
+    live.enter("Exposure", "0.2")
+    live.until(lambda: live.exposure == "Too dark: 10 of 10 LEDs")
+    assert "Lengthen the exposure until all LEDs are good." in live.words
+
+
+def test_gain_that_saturates_is_to_be_lowered(live: Seen) -> None:
+    live.enter("Gain", "12")
+
+    live.until(lambda: live.exposure == "Saturated: 10 of 10 LEDs")
+    assert "Lower the gain until no LED is saturated." in live.words
+
+
+def test_exposure_and_gain_in_force_are_shown(
+    seen: Seen, workbench: Workbench, qtbot: QtBot
+) -> None:
+    workbench.open_camera()
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+    with qtbot.waitSignal(workbench.live.settings_applied):
+        workbench.live.set_exposure(2500.0)
+
+    exposure, gain = seen.named("Exposure"), seen.named("Gain")
+    assert isinstance(exposure, NumberField)
+    assert isinstance(gain, NumberField)
+    assert (exposure.text(), gain.text()) == ("2.50 ms", "0.0 dB")
+
+
+def test_recorded_images_have_no_exposure_to_set(
+    seen: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    place = str(recording(tmp_path / "swing"))
+    source = SourceChoice(SourceKind.RECORDED, place)
+    workbench.set_preparation(replace(workbench.preparation, source=source))
+    seen.page.entered()
+
+    seen.wait("Recorded: exposure and gain are as they were taken.")
+    with pytest.raises(AssertionError):
+        seen.named("Exposure")
+
+
+# Intrinsics
+
+
+def test_the_checks_of_the_intrinsics_are_shown(live: Seen) -> None:
+    assert "Fits the live images: 1224 x 1024" in live.words
+    assert "2319.10 and 2318.55 px" in live.words
+    assert "k1\u00a0-0.082" in live.words
+    assert "no date, no uncertainty in the file" in live.words
+
+
+def test_date_and_uncertainty_of_the_intrinsics_are_shown(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    path = intrinsics(
+        workbench,
+        tmp_path,
+        covariance=np.diag([0.25, 0.16, 0.04, 0.09, *[0.0] * 5]),
+        calibrated_on=date(2025, 8, 14),
+    )
+
+    live.enter("Intrinsics file", str(path))
+
+    live.wait("2319.10 \u00b1 0.50 and 2318.55 \u00b1 0.40 px")
+    assert "14" in live.words
+    assert "2025" in live.words
+    assert "no uncertainty" not in live.words
+
+
+def test_facts_that_are_not_known_take_no_focus(
+    live: Seen, workbench: Workbench
+) -> None:
+    facts = live.child(IntrinsicsPanel).findChildren(QLabel)
+    selectable = Qt.TextInteractionFlag.TextSelectableByMouse
+    told = [each for each in facts if each.textInteractionFlags() & selectable]
+    assert len(told) == 4
+    assert all(each.text() for each in told)
+
+    workbench.set_preparation(replace(workbench.preparation, camera_file=None))
+
+    focusable = [each for each in facts if each.focusPolicy() != Qt.FocusPolicy.NoFocus]
+    assert focusable == []
+
+
+def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    path = intrinsics(workbench, tmp_path, width=612, height=512)
+
+    live.enter("Intrinsics file", str(path))
+
+    live.wait(
+        "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
+        "Choose the file for this camera or switch off binning."
+    )
+    assert not live.page.is_complete()
+    assert "another size" in live.page.main_action().why_not
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (None, "does not exist"),
+        ("", "is empty"),
+        ("LED,x,y,z\n1,0,0,0\n", "Check that the right file is named."),
+        ("image_width: 1224\nimage_height: [", "Line 3 of other.yaml is not valid"),
+    ],
+)
+def test_an_unfit_file_is_told_beside_the_field_and_the_one_before_stays(
+    live: Seen, workbench: Workbench, tmp_path: Path, content: str | None, sentence: str
+) -> None:
+    path = tmp_path / "other.yaml"
+    if content is not None:
+        path.write_text(content)
+    before = workbench.preparation.camera_file
+
+    live.enter("Intrinsics file", str(path))
+
+    live.wait(sentence)
+    assert "In use\ncamera.yaml" in live.words
+    assert workbench.preparation.camera_file is before
+    assert live.page.is_complete()
+    field = live.named("Intrinsics file")
+    assert isinstance(field, QLineEdit)
+    assert field.text() == str(path)
+    assert "Fits the live images" in live.words
+
+
+def test_the_complaint_goes_with_a_fit_file(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    live.enter("Intrinsics file", str(tmp_path / "nowhere.yaml"))
+    live.wait("does not exist")
+
+    live.enter("Intrinsics file", f'"{intrinsics(workbench, tmp_path)}"')
+
+    live.until(lambda: "does not exist" not in live.words)
+    assert workbench.preparation.camera_file is not None
+    assert workbench.preparation.camera_file.path.name == "other.yaml"
+
+
+def test_a_file_is_opened_in_the_dialog(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    path = intrinsics(workbench, tmp_path)
+    live.click("Open...")
+    dialog = live.child(QFileDialog)
+    dialog.selectFile(str(path))
+    dialog.accept()
+
+    live.until(lambda: workbench.preparation.camera_file.path == path)  # type: ignore[union-attr]
+
+
+def test_a_dialog_that_is_left_changes_nothing(
+    live: Seen, workbench: Workbench
+) -> None:
+    before = workbench.preparation
+    live.click("Open...")
+    live.child(QFileDialog).reject()
+
+    assert workbench.preparation is before
+
+
+def test_the_files_of_the_simulated_pen_are_used_at_a_click(
+    seen: Seen, workbench: Workbench
+) -> None:
+    workbench.set_preparation(
+        replace(workbench.preparation, camera_file=None, pen_file=None)
+    )
+    seen.page.entered()
+    seen.wait("Open the file with the calibration of camera and lens.")
+    assert not seen.page.is_complete()
+    assert seen.page.main_action().why_not
+
+    seen.click("Use its files")
+
+    seen.wait("Fits the live images")
+    assert workbench.preparation.pen_file is not None
+    assert seen.page.is_complete()
+
+
+# Recorded images
+
+
+def test_a_recording_asks_where_it_is(live: Seen, workbench: Workbench) -> None:
+    live.choose("Recorded images")
+
+    live.wait("Choose the folder of the recorded images.")
+    assert live.page.main_action().why_not == (
+        "Choose the folder of the recorded images."
+    )
+    assert live.markers == ()
+    assert live.exposure == "No LED is seen"
+    assert live.named("Folder, record or video").hasFocus()
+
+
+def test_a_recorded_swing_is_played(
+    live: Seen, small_scene: Scene, tmp_path: Path
+) -> None:
+    write_scene(replace(small_scene, n_images=2), tmp_path / "swing")
+    live.choose("Recorded images")
+
+    live.enter("Folder, record or video", str(tmp_path / "swing"))
+
+    live.wait("10 of 10 LEDs")
+    assert live.page.is_complete()
+
+
+def test_a_folder_is_picked_in_the_dialog(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    folder = recording(tmp_path / "swing")
+    live.choose("Recorded images")
+    button = live.named("Open...")
+    assert isinstance(button, QPushButton)
+    button.menu().actions()[0].trigger()
+    dialog = live.child(QFileDialog)
+    dialog.setDirectory(str(folder))
+    dialog.accept()
+
+    live.until(lambda: workbench.preparation.source.place == str(folder))
+    live.wait("80 x 64 px")
+
+
+def test_a_missing_folder_is_told_and_tried_again(live: Seen, tmp_path: Path) -> None:
+    folder = tmp_path / "swing"
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(folder))
+    live.wait(f"There is no folder, video or image at {folder}. Check the name.")
+    assert "Not connected" in live.words
+
+    recording(folder)
+    live.click("Try again")
+
+    live.wait("80 x 64 px")
+    assert "Live" in live.words
+
+
+def test_a_folder_without_images_is_told(live: Seen, tmp_path: Path) -> None:
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    live.choose("Recorded images")
+
+    live.enter("Folder, record or video", str(folder))
+
+    live.wait(f"The folder {folder} holds no images")
+    assert not live.page.is_complete()
+
+
+def test_a_damaged_image_is_counted_and_the_others_are_shown(
+    live: Seen, workbench: Workbench, tmp_path: Path, qtbot: QtBot
+) -> None:
+    folder = recording(tmp_path / "swing", 3)
+    damaged = folder / "frame_1.png"
+    damaged.write_bytes(damaged.read_bytes()[:-20])
+    live.choose("Recorded images")
+
+    with qtbot.waitSignal(workbench.troubled) as trouble:
+        live.enter("Folder, record or video", str(folder))
+
+    assert trouble.args == ["frame_1.png is cut off. Capture or copy it again."]
+    live.wait("lost: ")
+    assert "80 x 64 px" in live.words
+
+
+def test_a_recording_that_begins_damaged_is_told(live: Seen, tmp_path: Path) -> None:
+    folder = recording(tmp_path / "swing")
+    (folder / "frame_0.png").write_bytes(b"no image")
+    live.choose("Recorded images")
+
+    live.enter("Folder, record or video", str(folder))
+
+    live.wait("frame_0.png is damaged or no image")
+
+
+def test_the_pen_is_back_after_a_recording(live: Seen, tmp_path: Path) -> None:
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(tmp_path / "nowhere"))
+    live.wait("There is no folder")
+
+    live.choose("Simulated pen")
+
+    live.wait("10 of 10 LEDs")
+    assert "There is no folder" not in live.words
+
+
+def test_another_source_takes_the_notice_of_the_last_away(
+    live: Seen, tmp_path: Path, qtbot: QtBot
+) -> None:
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(tmp_path / "nowhere"))
+    live.wait("There is no folder")
+
+    with qtbot.waitSignal(live.page.notice_raised) as notice:
+        live.choose("Simulated pen")
+
+    assert notice.args == [""]
+
+
+# A camera that fails
+
+
+def test_a_camera_that_is_unplugged_is_told_and_comes_back(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    camera = plugged(workbench, small_scene)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+
+    camera.faults.unplug()
+    seen.wait("Lost, reconnecting")
+    assert "no longer answers. Check its cable and its power." in seen.words
+    assert "It is looked for until it is back." in seen.words
+    assert seen.markers == ()
+    assert not seen.named("Search").isEnabled()
+
+    camera.faults.plug_in()
+    seen.wait("10 of 10 LEDs")
+    assert "Live" in seen.words
+
+
+@pytest.mark.parametrize("kind", ["folder", "images"])
+def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
+    live: Seen, small_scene: Scene, tmp_path: Path, kind: str
+) -> None:
+    write_scene(replace(small_scene, n_images=3), tmp_path / "swing")
+    gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(tmp_path / "swing"))
+    live.wait("10 of 10 LEDs")
+
+    gone.rename(tmp_path / "elsewhere")
+    live.wait("Lost, reconnecting")
+    assert f"No image of {tmp_path / 'swing'} can be read any more." in live.words
+    assert "It is looked for until it is back." in live.words
+    for stale in ("of 10 LEDs", "images/s", "Live"):
+        assert stale not in live.words
+    assert live.markers == ()
+    assert live.exposure == "No LED is seen"
+
+    (tmp_path / "elsewhere").rename(gone)
+    live.wait("Live")
+    live.wait("10 of 10 LEDs")
+    assert "can be read any more" not in live.words
+
+
+def test_a_camera_that_is_not_there_is_told(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    clock = workbench.around.clock
+    camera = SimulatedCamera(small_scene, clock)
+    camera.faults.unplug()
+    workbench.live.open(camera, CameraSettings(), clock)
+    seen.page.entered()
+
+    seen.wait("is not plugged in. Plug it in.")
+    seen.click("Try again")
+    seen.wait("10 of 10 LEDs")
+
+
+def test_a_silent_camera_is_told(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    camera = plugged(workbench, small_scene)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+
+    camera.faults.stall(4.0)
+
+    seen.wait("The camera answers but sends no images.")
+    assert "Silent" in seen.words
+    seen.wait("10 of 10 LEDs")
+
+
+def test_a_search_ends_with_the_images(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    camera = plugged(workbench, small_scene)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+    camera.faults.stall(4.0)
+    seen.click("Search")
+
+    seen.wait("Silent")
+
+    assert "Searching" not in seen.words
+
+
+# Stray light
+
+
+def test_what_shines_beside_the_covered_pen_is_found_and_masked(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    plugged(workbench, small_scene, *LAMPS)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs, other spots: 2")
+
+    seen.click("Cover the LEDs")
+    seen.wait("too few LEDs")
+    seen.click("Search")
+    seen.wait("Stray spots: 2.")
+    seen.until(lambda: [m.label for m in seen.markers] == ["stray", "stray"])
+
+    seen.click("Mask the spots: 2")
+    seen.wait("Masked places: 2")
+    seen.click("Uncover the LEDs")
+    seen.wait("10 of 10 LEDs")
+    seen.until(lambda: not seen.others)
+    assert len(seen.crossed) == 2
+    assert len(workbench.preparation.mask) == 2
+
+
+def test_a_mask_is_cleared(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    mask = np.array([[*lamp.center, 30.0] for lamp in LAMPS])
+    workbench.set_preparation(replace(workbench.preparation, mask=mask))
+    plugged(workbench, small_scene, *LAMPS)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+    seen.until(lambda: len(seen.crossed) == 2)
+
+    seen.click("Clear the mask")
+
+    seen.until(lambda: len(seen.others) == 2)
+    assert seen.crossed == []
+    assert not seen.named("Clear the mask").isEnabled()
+
+
+def test_a_mask_is_of_one_source_only(
+    live: Seen, workbench: Workbench, tmp_path: Path
+) -> None:
+    workbench.set_preparation(
+        replace(workbench.preparation, mask=np.array([[9.0, 9.0, 5.0]]))
+    )
+
+    folder = recording(tmp_path / "swing")
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(folder))
+
+    assert workbench.preparation.source.place == str(folder)
+    assert len(workbench.preparation.mask) == 0
+
+
+def test_a_mask_adds_to_the_one_before(
+    seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    first = np.array([[*LAMPS[0].center, 30.0]])
+    workbench.set_preparation(replace(workbench.preparation, mask=first))
+    plugged(workbench, small_scene, *LAMPS).operator.leave()
+    seen.page.entered()
+    seen.wait("Live")
+    seen.click("Cover the LEDs")
+    seen.wait("too few LEDs")
+
+    seen.click("Search")
+    seen.wait("Stray spots: 1.")
+    seen.click("Mask the spots: 1")
+
+    assert len(workbench.preparation.mask) == 2
+
+
+def test_a_pen_that_is_still_seen_is_not_masked(live: Seen) -> None:
+    live.click("Search")
+
+    live.wait("The pen is still seen. Cover all of its LEDs, then search again.")
+    assert not live.named("Mask the spots").isEnabled()
+
+
+def test_nothing_left_is_told(live: Seen) -> None:
+    live.click("Cover the LEDs")
+    live.wait("no LED seen")
+
+    live.click("Search")
+
+    live.wait("No stray light: nothing bright is left.")
+
+
+def test_without_a_pen_file_the_operator_is_asked_whether_it_is_covered(
+    seen: Seen, workbench: Workbench
+) -> None:
+    workbench.set_preparation(replace(workbench.preparation, pen_file=None))
+    seen.page.entered()
+    seen.wait("bright spots: 10")
+    operator = workbench.live.operator
+    assert operator is not None
+    seen.until(lambda: operator.doing is Doing.SEATED)
+
+    seen.click("Search")
+
+    seen.wait("Bright spots: 10. Is the pen covered?")
+
+
+def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
+    panel = StrayLightPanel()
+    qtbot.addWidget(panel)
+    panel.set_live(True)
+    (search,) = (b for b in panel.findChildren(QPushButton) if b.text() == "Search")
+    QTest.mouseClick(search, Qt.MouseButton.LeftButton)
+
+    for i in range(SEARCHED_IMAGES):
+        image = np.zeros((256, 512), np.uint8)
+        cv2.circle(image, (60 + 40 * i, 128), 9, 200, cv2.FILLED)
+        frame = Frame(own_image(image), i, 0)
+        panel.feed(LiveImage(frame, detect_spots(frame.image), None))
+
+    assert panel.outcome().text.startswith("What shines moves")
+    assert len(panel.found()) == 0
+
+
+def test_a_grey_button_says_why(seen: Seen) -> None:
+    reasons = {
+        name: seen.named(name).toolTip()
+        for name in ("Search", "Mask the spots", "Clear the mask")
+    }
+
+    assert reasons == {
+        "Search": "No images come.",
+        "Mask the spots": "Nothing was found to mask.",
+        "Clear the mask": "Nothing is masked.",
+    }
+
+
+def test_the_pen_is_uncovered_when_the_page_is_left(
+    live: Seen, workbench: Workbench
+) -> None:
+    live.click("Cover the LEDs")
+    live.wait("no LED seen")
+
+    live.page.left()
+    live.page.entered()
+
+    live.wait("10 of 10 LEDs")
+    assert live.named("Cover the LEDs")
+
+
+def test_another_simulated_operator_covers_nothing(live: Seen) -> None:
+    live.click("Cover the LEDs")
+    live.wait("no LED seen")
+    live.choose("Recorded images")
+    live.choose("Simulated pen")
+
+    live.wait("10 of 10 LEDs")
+    assert live.named("Cover the LEDs")
+
+
+# The step among the others
+
+
+class Ends(Page):
+    """A step after this one."""
+
+    key = "leds"
+
+    @override
+    def title(self) -> str:
+        return "LEDs"
+
+    @override
+    def is_complete(self) -> bool:
+        return False
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction("Continue")
+
+
+@pytest.fixture
+def window(live: Seen, settings: Settings, qtbot: QtBot) -> MainWindow:
+    window = MainWindow([live.page, Ends()], settings, Preferences())
+    qtbot.addWidget(window)
+    window.show()
+    return window
+
+
+def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
+    window: MainWindow, seen: Seen, workbench: Workbench, small_scene: Scene
+) -> None:
+    workbench.troubled.connect(window.show_notice)
+    camera = plugged(workbench, small_scene)
+    seen.wait("10 of 10 LEDs")
+
+    camera.faults.unplug()
+    seen.wait("Lost, reconnecting")
+    assert any("no longer answers" in each for each in window.words())
+
+    camera.faults.plug_in()
+    seen.wait("10 of 10 LEDs")
+    assert not any("no longer answers" in each for each in window.words())
+
+
+def test_the_trouble_of_a_swing_is_not_taken_for_one_of_the_camera(
+    window: MainWindow, live: Seen, workbench: Workbench
+) -> None:
+    workbench.troubled.connect(window.show_notice)
+    workbench.live.troubled.emit("The disk is full.")
+
+    workbench.live.close()
+    live.wait("No camera is open.")
+    assert "The disk is full." not in live.words
+    live.choose("Recorded images")
+
+    assert "The disk is full." in window.words()
+
+
+def test_the_step_leads_on_to_the_leds(window: MainWindow, live: Seen) -> None:
+    assert live.page.main_action() == MainAction("Continue to the LEDs")
+    button = window.findChild(QPushButton, "main_button")
+    assert isinstance(button, QPushButton)
+
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    assert window.page().title() == "LEDs"
+
+
+@pytest.mark.parametrize(
+    ("field", "text"),
+    [("Intrinsics file", "/nowhere.yaml"), ("Exposure", "2"), ("Gain", "1")],
+)
+def test_enter_in_a_field_does_not_leave_the_step(
+    window: MainWindow, live: Seen, field: str, text: str
+) -> None:
+    live.enter(field, text)
+
+    assert window.page() is live.page
+
+
+def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) -> None:
+    assert page.why_closed() == ""
+
+    workbench.set_preparation(replace(workbench.preparation, names=Names()))
+
+    assert page.why_closed() == "Enter the name of the station."
+
+
+def test_a_swing_under_way_is_told(live: Seen, workbench: Workbench) -> None:
+    assert "A swing is under way." not in live.words
+
+    workbench.run.begin(workbench.preparation)
+
+    live.wait("A swing is under way.")
+
+
+def test_every_control_is_named_and_reached_by_tab(
+    live: Seen, window: MainWindow
+) -> None:
+    reached = set()
+    for _ in range(40):
+        QTest.keyClick(QApplication.focusWidget() or live.page, Qt.Key.Key_Tab)
+        widget = QApplication.focusWidget()
+        if widget is not None and live.page.isAncestorOf(widget):
+            written = widget.text() if isinstance(widget, QPushButton) else ""
+            reached.add(widget.accessibleName() or written)
+
+    assert reached == {
+        "Source of the images",
+        "Use its files",
+        "Intrinsics file",
+        "Open...",
+        "Search",
+        "Cover the LEDs",
+        "Live image",
+        "Exposure",
+        "Gain",
+    }
+
+
+def test_another_language_keeps_what_is_shown(live: Seen) -> None:
+    live.click("Search")
+    live.wait("The pen is still seen.")
+
+    QCoreApplication.sendEvent(live.page, QEvent(QEvent.Type.LanguageChange))
+    for each in live.page.findChildren(QWidget):
+        QCoreApplication.sendEvent(each, QEvent(QEvent.Type.LanguageChange))
+
+    assert "The pen is still seen." in live.words
+    assert "Fits the live images: 1224 x 1024" in live.words
+    live.wait("10 of 10 LEDs")

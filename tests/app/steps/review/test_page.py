@@ -1,0 +1,862 @@
+"""The step Review: from the verdict to the accepted tip, and every way back."""
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, Qt, QThreadPool
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QFileDialog,
+    QLabel,
+    QPushButton,
+    QTabBar,
+    QTabWidget,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import look
+from lightpen.estimation.verdict import Grade
+from lightpen.live.preparation import (
+    CameraFile,
+    PenFile,
+    Preparation,
+)
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.results import Result, last_result, store_result
+from lightpen.record.writing import RecordWriter
+from lightpen.simulator.image_plans import ImagePlan, render_plan
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import swing_from_postures
+from lightpen.simulator.view import still_view
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.shortfall import N_MORE
+from lightpen_app.steps import review
+from lightpen_app.steps.page import MainAction
+from lightpen_app.steps.review.image_table import ImageTable
+from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.number_table import NumberTable
+from lightpen_app.steps.review.page import ReviewPage
+from lightpen_app.steps.review.plot_card import PlotCard
+from lightpen_app.steps.review.plots_panel import MethodsPanel
+from lightpen_app.steps.review.remark_list import RemarkList
+from lightpen_app.steps.review.residual_plots import MisfitPlot
+from lightpen_app.steps.review.residual_view import ResidualView
+from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.tip_readout import TipReadout
+from lightpen_app.steps.services import Services
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.work.workbench import Workbench
+
+W = TypeVar("W", bound=QWidget)
+
+N_IMAGES = 20
+DAMAGED = 7
+SLIPPED = 9
+THEN = datetime.now().astimezone() - timedelta(days=99)
+PATIENCE_MS = 10_000
+
+
+@pytest.fixture(scope="session")
+def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record a swing that leans to all sides; copy it before it is changed."""
+    folder = tmp_path_factory.mktemp("recorded")
+    files = write_sample_files(small_scene, folder / "files")
+    preparation = Preparation(
+        names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
+        camera_file=CameraFile.read(files.camera),
+        pen_file=PenFile.read(files.pen),
+        limits=SwingLimits(min_images=N_IMAGES),
+    )
+    camera, pen = small_scene.camera, small_scene.pen
+    tilts = np.radians([2.0, 15.0, 28.0]).repeat(8)[4:]
+    directions = np.radians(np.tile(np.arange(0, 360, 45), 3))[4:]
+    turns = np.radians(np.resize([-25.0, 0.0, 25.0], N_IMAGES))
+    swing = swing_from_postures(Postures(tilts, directions, turns))
+    with RecordWriter.create(folder / "swing", preparation.header()) as writer:
+        for i in range(N_IMAGES):
+            R, t = swing.rotations[i], swing.translations[i]
+            shot = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
+            image = render_plan(small_scene, shot)
+            seen = look(image, camera, pen)
+            writer.append(image, seen.pixels, seen.rotation, seen.translation, 0.1 * i)
+    return folder / "swing"
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Shows the page of a swing that was solved."""
+
+    qtbot: QtBot
+    services: Services
+    swing: Path
+    pages: list[ReviewPage]
+
+    def solve(self, limit: float = 0.05) -> Workbench:
+        """Solve the swing, with a limit of U, mm."""
+        workbench = self.services.workbench
+        folder = workbench.run.records_folder / "swing"
+        header = json.loads((folder / "header.json").read_text("utf-8"))
+        header["settings"]["max_uncertainty_mm"] = limit
+        (folder / "header.json").write_text(json.dumps(header), "utf-8")
+        workbench.open_camera()
+        workbench.run.go_on(read_resumable(folder))
+        workbench.run.finish()
+        self.qtbot.waitUntil(
+            lambda: workbench.run.verdict is not None, timeout=PATIENCE_MS
+        )
+        workbench.live.close()
+        return workbench
+
+    def show(self) -> ReviewPage:
+        """Show the page."""
+        page = ReviewPage(self.services)
+        self.pages.append(page)
+        self.qtbot.addWidget(page)
+        page.resize(1000, 600)
+        page.show()
+        page.entered()
+        return page
+
+
+@pytest.fixture
+def bed(qtbot: QtBot, services: Services, recorded: Path) -> Iterator[Bed]:
+    """Lay a recorded swing ready."""
+    folder = services.workbench.run.records_folder / "swing"
+    shutil.copytree(recorded, folder)
+    bed = Bed(qtbot, services, folder, [])
+    yield bed
+    for page in bed.pages:
+        page.shut_down()
+    QThreadPool.globalInstance().waitForDone(PATIENCE_MS)
+
+
+@pytest.fixture
+def page(bed: Bed) -> ReviewPage:
+    """Return the page of a good swing."""
+    bed.solve()
+    return bed.show()
+
+
+def the(parent: QWidget, kind: type[W]) -> W:
+    """Return the only child of a kind."""
+    (found,) = parent.findChildren(kind)
+    return found
+
+
+def banner(page: ReviewPage) -> State:
+    return the(page, StateBanner).value()
+
+
+def table(page: ReviewPage) -> ImageTable:
+    return the(page, ImageTable)
+
+
+def remarks(page: ReviewPage) -> str:
+    return " ".join(remark.text for remark in the(page, RemarkList).value())
+
+
+def button(page: ReviewPage, text: str) -> QPushButton:
+    """Return a button of the page, but for those that answer its question."""
+    asks = the(page, QuestionBar)
+    return next(
+        each
+        for each in page.findChildren(QPushButton)
+        if each.text() == text and not asks.isAncestorOf(each)
+    )
+
+
+def answer(page: ReviewPage, text: str) -> None:
+    found = the(page, QuestionBar).findChildren(QPushButton)
+    (chosen,) = [each for each in found if each.text() == text]
+    QTest.mouseClick(chosen, Qt.MouseButton.LeftButton)
+
+
+def click(page: ReviewPage, text: str) -> None:
+    QTest.mouseClick(button(page, text), Qt.MouseButton.LeftButton)
+
+
+def look_at_all_tabs(page: ReviewPage) -> None:
+    """Go through the tabs with the keyboard."""
+    bar = the(the(page, QTabWidget), QTabBar)
+    bar.setFocus()
+    for _ in range(bar.count() - 1):
+        QTest.keyClick(bar, Qt.Key.Key_Right)
+
+
+def differences(page: ReviewPage) -> dict[str, tuple[str, ...]]:
+    shown = the(the(page, ResultPanel), NumberTable).value()
+    return dict(zip(shown.rows, shown.cells, strict=True))
+
+
+def count(page: ReviewPage) -> str:
+    labels = the(page, ImagesPanel).findChildren(QLabel)
+    return next(label.text() for label in labels if " used" in label.text())
+
+
+def centres(page: ReviewPage) -> list[list[float]]:
+    """Return where rings are drawn, px."""
+    return [[ring.x, ring.y] for ring in the(page, ResidualView).markers()]
+
+
+def tip(workbench: Workbench) -> FloatArray:
+    assert workbench.run.solution is not None
+    return workbench.run.solution.calibration.joint.tip_pen
+
+
+def await_solution(qtbot: QtBot, workbench: Workbench) -> None:
+    qtbot.waitUntil(lambda: not workbench.run.is_solving, timeout=PATIENCE_MS)
+
+
+def in_force(workbench: Workbench) -> Result | None:
+    names = workbench.preparation.names
+    return last_result(workbench.run.results_folder, names.pen, names.tip)
+
+
+def put_in_force(workbench: Workbench, tip_pen: FloatArray, pen: str = "LP-04") -> None:
+    """Store a result of some time ago."""
+    names = replace(workbench.run.names, pen=pen)
+    uncertainty = np.full(3, 0.002)
+    store_result(
+        workbench.run.results_folder,
+        Result(names, THEN, Grade.PASS, tip_pen, uncertainty, "elsewhere"),
+    )
+
+
+def slip(swing: Path) -> None:
+    """Note of an image that the tip slipped in it."""
+    with RecordWriter.resume(open_record(swing)) as writer:
+        writer.take_out([SLIPPED], Reason.SLIPPED)
+
+
+# What is shown
+
+
+def test_the_step_is_closed_until_the_pen_was_swung(
+    qtbot: QtBot, services: Services
+) -> None:
+    page = ReviewPage(services)
+    qtbot.addWidget(page)
+
+    assert page.why_closed() == "Swing the pen first."
+    assert page.main_action().why_not == "Swing the pen first."
+    assert page.unsaved() == ""
+    assert not button(page, "Repeat").isEnabled()
+    assert button(page, "Repeat").toolTip() == "Swing the pen first."
+    page.run_main_action()
+    assert not page.is_complete()
+
+
+def test_a_good_swing_passes_with_its_reason_and_the_next_step(
+    page: ReviewPage,
+) -> None:
+    state = banner(page)
+    assert state.word == "PASS: Good"
+    assert re.match(r"U \(k = 2\) of the tip is 0\.\d{4} mm\.", state.detail)
+    assert page.lead().startswith("Next: accept the tip.")
+    assert page.why_closed() == ""
+    assert page.main_action() == MainAction("Accept", at_screen=True)
+
+
+def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    assert workbench.run.solution is not None
+    uncertainty = workbench.run.solution.calibration.budget.expanded_uncertainty
+    shown = the(page, TipReadout).texts()
+    for text, value, u in zip(shown, tip(workbench), uncertainty[:3], strict=True):
+        number, _, within = text.split()
+        assert float(within) == pytest.approx(u, rel=0.05)  # two significant digits
+        assert len(number.partition(".")[2]) == len(within.partition(".")[2])
+        assert float(number) == pytest.approx(value, abs=0.5 * u)
+
+
+def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve()
+    assert workbench.run.solution is not None
+    uncertainty = workbench.run.solution.calibration.budget.weakest_uncertainty
+    bed.solve(0.7 * uncertainty)
+    page = bed.show()
+
+    assert banner(page).word == "CHECK: Not certain enough"
+    assert page.lead().startswith("Next: capture more images")
+    assert button(page, "Capture more").property("recommended")
+    assert not button(page, "Repeat").property("recommended")
+    assert page.main_action().why_not == ""
+
+
+def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
+    workbench = bed.solve(1e-6)
+    page = bed.show()
+
+    assert banner(page).word == "REPEAT: Not certain enough"
+    assert page.main_action().why_not.startswith("Not good enough")
+    page.run_main_action()
+    assert not page.is_complete()
+    assert in_force(workbench) is None
+
+
+def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
+    page: ReviewPage,
+) -> None:
+    rows = differences(page)
+    assert rows["no earlier result"] == ("", "", "")
+    assert "odd - even" in rows
+    assert remarks(page) == ""
+
+
+def test_a_small_change_since_the_last_result_is_told_in_micrometres(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve()
+    put_in_force(workbench, tip(workbench) - [0.010, 0.0, -0.005])
+    put_in_force(workbench, tip(workbench) + 1.0, pen="another")
+    page = bed.show()
+
+    x, y, z = map(float, differences(page)[f"since {THEN:%Y-%m-%d}"])
+    assert (x, y, z) == pytest.approx((10.0, 0.0, -5.0), abs=0.5)
+    assert remarks(page) == ""
+
+
+def test_a_large_change_asks_whether_the_tip_was_exchanged(bed: Bed) -> None:
+    workbench = bed.solve()
+    put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
+    page = bed.show()
+
+    assert remarks(page) == (
+        f"The tip lies 0.420 mm from the calibration of {THEN:%Y-%m-%d} (usual "
+        "change: 0.02 mm). Was the tip exchanged?"
+    )
+
+
+def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> None:
+    bed.solve()
+    page = bed.show()
+    texts = [each.text() for each in page.findChildren(QLabel)]
+    assert "Tip T-10 in the frame of pen LP-04 / mm, U\xa0(k\xa0=\xa02)" in texts
+    assert remarks(page) == ""
+
+    names = replace(workbench.preparation.names, tip="T-11")
+    workbench.set_preparation(replace(workbench.preparation, names=names))
+    page.left()
+    page.entered()
+
+    assert remarks(page) == (
+        "This swing is of tip T-10, pen LP-04, whatever the step Start names now: tip "
+        "T-11, pen LP-04."
+    )
+
+
+def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
+    folder = bed.services.workbench.run.records_folder / "swing"
+    header = json.loads((folder / "header.json").read_text("utf-8"))
+    header["nominal_tip_mm"] = [3.0, -90.0, -20.0]
+    (folder / "header.json").write_text(json.dumps(header), "utf-8")
+    bed.solve()
+
+    said = remarks(bed.show())
+    assert re.search(r"The tip lies \d\.\d mm from its nominal place", said)
+
+
+def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
+    workbench = bed.solve()
+    put_in_force(workbench, tip(workbench))
+    (file,) = workbench.run.results_folder.glob("*.json")
+    file.write_text("{")
+    page = ReviewPage(bed.services)
+    bed.pages.append(page)
+    bed.qtbot.addWidget(page)
+    with bed.qtbot.waitSignal(page.notice_raised) as told:
+        page.entered()
+
+    assert "is damaged" in told.args[0]
+    assert page.main_action().why_not == ""
+    assert "no earlier result" in differences(page)
+
+
+def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
+    header = json.loads((bed.swing / "header.json").read_text("utf-8"))
+    header["nominal_tip_mm"] = [-1.0, -90.0, -24.0]
+    (bed.swing / "header.json").write_text(json.dumps(header), "utf-8")
+    workbench = bed.solve()
+    page = bed.show()
+
+    deviation = (tip(workbench) - [-1.0, -90.0, -24.0]) * 1000
+    shown = list(map(float, differences(page)["since nominal"]))
+    assert shown == pytest.approx(deviation.tolist(), abs=1.0)
+
+
+def test_the_words_change_with_the_language(page: ReviewPage) -> None:
+    the(page, QTabWidget).setTabText(0, "other")
+
+    QApplication.sendEvent(page, QEvent(QEvent.Type.LanguageChange))
+
+    assert the(page, QTabWidget).tabText(0) == "Images"
+    assert banner(page).word == "PASS: Good"
+
+
+def test_every_control_has_a_name_for_a_screen_reader(page: ReviewPage) -> None:
+    controls = [
+        each
+        for each in page.findChildren(QWidget)
+        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and each.isVisibleTo(page)
+        and not isinstance(each, QTabBar)  # its tabs have names
+    ]
+
+    assert len(controls) > 5
+    for each in controls:
+        text = each.text() if isinstance(each, QAbstractButton) else ""
+        assert each.accessibleName() or text, each
+
+
+# Images
+
+
+def test_images_are_listed_worst_first_with_their_reasons(bed: Bed) -> None:
+    (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
+    slip(bed.swing)
+    bed.solve()
+    page = bed.show()
+
+    model = table(page).model()
+    rows = [
+        [model.index(row, column).data() for column in range(4)]
+        for row in range(model.rowCount())
+    ]
+    assert rows[0] == [str(DAMAGED), "", "0", "unreadable"]
+    states = {number: state for number, _, _, state in rows}
+    assert states[str(SLIPPED)] == "tip slipped"
+    misfits = [float(misfit) for _, misfit, _, _ in rows[1:]]
+    assert misfits == sorted(misfits, reverse=True)
+    assert (
+        count(page) == f"{N_IMAGES - 2} of {N_IMAGES} used; 1 unreadable; 1 tip slipped"
+    )
+
+
+def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    table(page).choose(3)
+
+    assert workbench.run.solution is not None
+    points = workbench.run.solution.observations.seen_pixels[2]
+    seen = points[np.isfinite(points[:, 0])].tolist()
+    qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
+    shown = the(page, ResidualView)
+    assert shown.image_size().width() == workbench.run.solution.source.camera.width
+    assert len(shown.arrows().residuals) == len(seen)
+    assert shown.zoom() > 1  # the pen fills the view
+    assert the(page, MisfitPlot).number() == 3
+
+
+def test_of_images_passed_over_quickly_the_last_is_shown(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    for _ in range(8):
+        QTest.keyClick(table(page), Qt.Key.Key_Down)
+    number = table(page).number()
+
+    assert number == table(page).value()[8].number
+    assert workbench.run.solution is not None
+    points = workbench.run.solution.observations.seen_pixels[number - 1]
+    seen = points[np.isfinite(points[:, 0])].tolist()
+    qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
+
+
+def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    panel, view = the(page, ImagesPanel), the(page, ResidualView)
+    qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
+    solution, number = workbench.run.solution, table(page).number()
+    assert solution is not None
+    other = replace(solution, source=replace(solution.source))
+
+    panel.set_value(other)
+    assert table(page).number() == number
+    assert view.image_size().isEmpty()
+    panel.set_value(replace(other, source=replace(other.source)))  # while it is read
+
+    qtbot.waitUntil(lambda: not view.image_size().isEmpty(), timeout=PATIENCE_MS)
+    assert panel.number() == number
+    assert view.markers()
+
+
+def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
+    (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
+    bed.solve()
+    page = bed.show()
+
+    assert table(page).number() == DAMAGED
+    bed.qtbot.waitUntil(
+        lambda: "wrong checksum" in the(page, ResidualView).accessibleDescription(),
+        timeout=PATIENCE_MS,
+    )
+    assert the(page, ResidualView).image_size().isEmpty()
+
+
+def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    bed.solve()
+    with monkeypatch.context() as broken:
+        broken.setattr(
+            "lightpen_app.steps.review.images_panel.load_image", lambda *_: 1 / 0
+        )
+        page = bed.show()
+        view, numbers = the(page, ResidualView), table(page)
+        bed.qtbot.waitUntil(
+            lambda: "The image cannot be shown." in view.accessibleDescription(),
+            timeout=PATIENCE_MS,
+        )
+    assert isinstance(caught[0], ZeroDivisionError)
+    assert view.image_size().isEmpty()
+    first = numbers.number()
+
+    for key in (Qt.Key.Key_Down, Qt.Key.Key_Up):
+        QTest.keyClick(numbers, key)
+        bed.qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
+    bed.qtbot.waitUntil(lambda: not view.image_size().isEmpty(), timeout=PATIENCE_MS)
+    assert numbers.number() == first
+    assert "cannot be shown" not in view.accessibleDescription()
+
+
+def test_a_click_on_the_misfit_chooses_the_image(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    the(page, MisfitPlot).number_chosen.emit(11)
+
+    assert table(page).number() == 11
+
+
+def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    before = tip(workbench).copy()
+    number = table(page).number()
+    assert number is not None
+    assert not button(page, "Put back").isEnabled()
+    assert button(page, "Put back").toolTip() == "It takes part already."
+
+    click(page, "Take out")
+    assert page.main_action().why_not == "The tip is being computed."
+    await_solution(qtbot, workbench)
+
+    assert count(page) == f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out"
+    assert table(page).number() == number
+    assert not np.array_equal(tip(workbench), before)
+    assert open_record(workbench.run.records_folder / "swing").taken_out == {
+        number: "taken out"
+    }
+    assert not button(page, "Take out").isEnabled()
+    assert page.main_action().why_not == ""
+
+    click(page, "Put back")
+    await_solution(qtbot, workbench)
+
+    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+    np.testing.assert_array_equal(tip(workbench), before)
+
+
+def test_keys_take_several_images_out_and_put_them_back(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    table(page).setFocus()
+    shift = Qt.KeyboardModifier.ShiftModifier
+    for _ in range(2):
+        QTest.keyClick(table(page), Qt.Key.Key_Down, shift)
+
+    QTest.keyClick(table(page), Qt.Key.Key_Delete)
+    await_solution(qtbot, workbench)
+    assert count(page) == f"{N_IMAGES - 3} of {N_IMAGES} used; 3 taken out"
+    assert len(table(page).selected()) == 3
+
+    QTest.keyClick(table(page), Qt.Key.Key_Insert)
+    await_solution(qtbot, workbench)
+    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+
+
+def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
+    slip(bed.swing)
+    workbench = bed.solve()
+    page = bed.show()
+    table(page).choose(SLIPPED)
+
+    click(page, "Put back")
+    await_solution(bed.qtbot, workbench)
+
+    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+
+
+def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None:
+    (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
+    bed.solve()
+    page = bed.show()
+
+    assert table(page).number() == DAMAGED
+    assert not button(page, "Put back").isEnabled()
+    why = "It would be left out again: unreadable."
+    assert button(page, "Put back").toolTip() == why
+    assert not button(page, "Take out").isEnabled()
+
+
+def test_taking_out_too_many_is_refused_and_nothing_is_lost(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    before = tip(workbench).copy()
+    table(page).selectAll()
+
+    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+        click(page, "Take out")
+
+    assert "at least 6" in told.args[0]
+    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+    np.testing.assert_array_equal(tip(workbench), before)
+    assert open_record(workbench.run.records_folder / "swing").taken_out == {}
+
+
+def test_a_computation_shows_its_progress_and_can_be_cancelled(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(review, "PATIENCE_MS", 0)
+    workbench = bed.solve()
+    page = bed.show()
+    before = workbench.run.solution
+
+    workbench.run.solve()
+    bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
+    click(page, "Cancel")
+
+    assert not workbench.run.is_solving
+    assert not button(page, "Cancel").isVisible()
+    assert workbench.run.solution is before
+    assert page.main_action().why_not == ""
+
+
+# Plots
+
+
+def test_every_plot_is_saved_as_picture_and_as_numbers(
+    page: ReviewPage, qtbot: QtBot, tmp_path: Path
+) -> None:
+    look_at_all_tabs(page)
+    cards = page.findChildren(PlotCard)
+    assert len(cards) == 9
+
+    for i, card in enumerate(cards):
+        for suffix in ("png", "csv"):
+            with qtbot.waitSignal(page.status_changed) as told:
+                card.save(tmp_path / f"{i}.{suffix}")
+            assert told.args[0] == f"Saved as {tmp_path / f'{i}.{suffix}'}"
+        lines = (tmp_path / f"{i}.csv").read_text().splitlines()
+        assert len(lines) > 3
+        assert (tmp_path / f"{i}.png").stat().st_size > 1000
+
+
+def test_a_plot_that_cannot_be_saved_is_told(
+    page: ReviewPage, qtbot: QtBot, tmp_path: Path
+) -> None:
+    card = page.findChildren(PlotCard)[0]
+    with qtbot.waitSignal(page.notice_raised) as told:
+        card.save(tmp_path / "nowhere" / "plot.csv")
+
+    assert "cannot be written" in told.args[0]
+
+
+def test_a_file_is_chosen_in_a_dialog_that_stops_nothing(
+    page: ReviewPage, qtbot: QtBot, tmp_path: Path
+) -> None:
+    card = the(the(page, ImagesPanel), PlotCard)
+    _, _, save_csv = card.actions_offered()
+    save_csv.trigger()
+    (dialog,) = card.findChildren(QFileDialog)
+
+    with qtbot.waitSignal(card.saved):
+        dialog.fileSelected.emit(str(tmp_path / "misfit.csv"))
+    dialog.reject()
+
+    first, *_ = (tmp_path / "misfit.csv").read_text().splitlines()
+    assert first == "image,misfit_px,used"
+
+
+def test_the_two_stage_method_stands_beside_the_joint_fit(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    look_at_all_tabs(page)
+    shown = the(the(page, MethodsPanel), NumberTable).value()
+    rows = dict(zip(shown.rows, shown.cells, strict=True))
+
+    assert workbench.run.solution is not None
+    calibration = workbench.run.solution.calibration
+    joint = [float(cell) for cell in rows["Joint fit"][:3]]
+    paper = [float(cell) for cell in rows["Two-stage (paper)"][:3]]
+    assert joint == pytest.approx(calibration.joint.tip_pen.tolist(), abs=1e-3)
+    assert paper == pytest.approx(calibration.two_stage.tip_pen.tolist(), abs=1e-3)
+    assert float(rows["Two-stage (paper)"][3]) == pytest.approx(
+        calibration.two_stage.rms, abs=1e-4
+    )
+
+
+# What next
+
+
+def test_an_accepted_tip_is_in_force_and_said_to_be(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    assert page.unsaved().startswith("The tip is not accepted.")
+    assert in_force(workbench) is None
+
+    with qtbot.waitSignal(page.changed):
+        page.run_main_action()
+
+    result = in_force(workbench)
+    assert result is not None
+    np.testing.assert_array_equal(result.tip_pen, tip(workbench))
+    state = banner(page)
+    assert state.word == "IN FORCE"
+    assert f"{result.accepted.astimezone():%Y-%m-%d %H:%M:%S}" in state.detail
+    assert page.is_complete()
+    assert page.unsaved() == ""
+    assert "no earlier result" in differences(page)  # not compared with itself
+    assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
+
+
+def test_an_accepted_swing_is_changed_no_more(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    page.run_main_action()
+    why = "The tip is accepted; start the next calibration."
+
+    for text in ("Take out", "Put back", "Capture more", "Repeat"):
+        assert not button(page, text).isEnabled()
+        assert button(page, text).toolTip() == why
+    table(page).setFocus()
+    QTest.keyClick(table(page), Qt.Key.Key_Delete)
+    assert not workbench.run.is_solving
+
+
+def test_after_acceptance_the_next_calibration_starts(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    page.run_main_action()
+    # The second click of a double one must not go on.
+    assert page.main_action() == MainAction(
+        "Start the next calibration", "The tip is in force."
+    )
+    qtbot.waitUntil(lambda: not page.main_action().why_not)
+
+    with qtbot.waitSignal(page.step_requested) as asked:
+        page.run_main_action()
+
+    assert asked.args == ["start"]
+    assert page.why_closed() == "Swing the pen first."
+
+
+def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    workbench.run.results_folder.write_text("a file where a folder should be")
+
+    with qtbot.waitSignal(page.notice_raised) as told:
+        page.run_main_action()
+
+    assert "cannot be" in told.args[0]
+    assert not page.is_complete()
+    assert banner(page).word == "PASS: Good"
+    assert open_record(workbench.run.records_folder / "swing").verdict is None
+
+
+def test_more_images_are_captured_into_the_same_swing(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    workbench.open_camera()
+    assert page.main_action().why_not == ""
+    with qtbot.waitSignal(page.step_requested, timeout=PATIENCE_MS) as asked:
+        click(page, "Capture more")
+        assert page.main_action().why_not == "The swing goes on."
+
+    assert asked.args == ["swing"]
+    assert workbench.run.is_capturing
+    assert workbench.run.setup is not None
+    assert workbench.run.setup.limits.min_images == N_IMAGES + N_MORE
+    assert workbench.run.state is not None
+    assert workbench.run.state.n_kept == N_IMAGES
+    assert workbench.run.record_folder == workbench.run.records_folder / "swing"
+
+
+def test_a_record_that_is_gone_cannot_be_captured_into(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    (workbench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
+
+    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+        click(page, "Capture more")
+
+    assert "is damaged" in told.args[0]
+    assert workbench.run.solution is not None
+    assert page.main_action().why_not == ""
+
+
+def test_a_repetition_is_asked_for_and_can_be_declined(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    click(page, "Repeat")
+    asks = the(page, QuestionBar)
+    assert asks.words() == (
+        "Repeat the swing from the start? These images stay on the disk."
+    )
+
+    answer(page, "Go on with these")
+
+    assert asks.words() == ""
+    assert workbench.run.solution is not None
+
+
+def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    click(page, "Repeat")
+
+    with qtbot.waitSignal(page.step_requested) as asked:
+        answer(page, "Repeat")
+
+    assert asked.args == ["swing"]
+    record = open_record(workbench.run.records_folder / "swing")
+    assert record.verdict == DISCARDED
+    assert len(record.images) == N_IMAGES
+    assert workbench.run.solution is None
+
+
+def test_a_swing_that_cannot_be_set_aside_is_told(
+    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+) -> None:
+    shutil.rmtree(workbench.run.records_folder / "swing")
+    click(page, "Repeat")
+
+    with qtbot.waitSignal(page.notice_raised) as told:
+        answer(page, "Repeat")
+
+    assert "does not exist" in told.args[0]
+    assert workbench.run.solution is not None

@@ -1,0 +1,169 @@
+"""The widgets of the review: figures to copy, remarks, a question, digits."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication, QKeySequence
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from lightpen.detection.reasons import Reason
+from lightpen.record.image_rows import ImageRow
+from lightpen_app.look.quantities import decimals_for, number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import Tone
+from lightpen_app.steps.review.image_table import ImageTable
+from lightpen_app.steps.review.number_table import Figures, NumberTable
+from lightpen_app.steps.review.remark_list import MOST, RemarkList
+from lightpen_app.steps.review.residual_view import Arrows, ResidualView
+from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.sign_label import Remark
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "decimals"),
+    [
+        (0.0046, 4),
+        (0.0101, 3),
+        (0.0998, 2),  # rounds to 0.10, not to 0.100
+        (0.012, 3),
+        (3.14, 1),
+        (41.0, 0),
+        (410.0, 0),
+        (1e-9, 6),
+        (0.0, 6),
+        (float("nan"), 6),
+    ],
+)
+def test_an_uncertainty_is_shown_by_two_digits(
+    uncertainty: float, decimals: int
+) -> None:
+    assert decimals_for(uncertainty) == decimals
+
+
+def test_zero_has_no_sign() -> None:
+    assert number_text(-0.00001, 3) == "0.000"
+    assert number_text(-0.5, 1) == "-0.5"
+
+
+def test_each_coordinate_has_the_digits_of_its_own_uncertainty(qtbot: QtBot) -> None:
+    readout = TipReadout()
+    qtbot.addWidget(readout)
+
+    readout.set_value(TipValue((-1.319796, -90.40969, 0.0), (0.00011, 0.0031, 0.02)))
+
+    assert readout.texts() == (
+        "-1.31980 \xb1 0.00011",
+        "-90.4097 \xb1 0.0031",
+        "0.000 \xb1 0.020",
+    )
+    readout.set_value(None)
+    assert {text.strip() for text in readout.texts()} == {""}
+
+
+FIGURES = Figures(("x", "y"), ("a", "b"), (("1", "2"), ("3", "4")))
+
+
+def test_figures_are_copied_as_a_spreadsheet_takes_them(qtbot: QtBot) -> None:
+    table = NumberTable()
+    qtbot.addWidget(table)
+    table.set_value(FIGURES)
+    table.selectAll()
+
+    QTest.keySequence(table, QKeySequence(QKeySequence.StandardKey.Copy))
+
+    assert QGuiApplication.clipboard().text() == "1\t2\n3\t4"
+
+
+def test_a_table_is_as_high_as_its_figures_and_lets_tab_pass(qtbot: QtBot) -> None:
+    table = NumberTable()
+    qtbot.addWidget(table)
+    empty = table.sizeHint().height()
+
+    table.set_value(FIGURES)
+
+    assert table.sizeHint().height() == empty + 2 * 24
+    assert not table.tabKeyNavigation()
+
+
+def test_remarks_take_no_more_room_than_they_need(qtbot: QtBot) -> None:
+    remarks = RemarkList()
+    qtbot.addWidget(remarks)
+    assert remarks.isHidden()
+    warning = Remark("Look into this.", Sign.WARNING, Tone.WARN)
+
+    remarks.set_value([warning])
+    low = remarks.sizeHint().height()
+    remarks.set_value([warning] * 12)
+
+    assert not remarks.isHidden()
+    assert low < MOST
+    assert remarks.sizeHint().height() == MOST
+    remarks.set_value([])
+    assert remarks.isHidden()
+
+
+@pytest.mark.parametrize(("answer", "signal"), [("Yes", "agreed"), ("No", "declined")])
+def test_a_question_is_answered_once(qtbot: QtBot, answer: str, signal: str) -> None:
+    around = QWidget()
+    qtbot.addWidget(around)
+    bar = QuestionBar(around)
+    bar.set_words("Really?", "Yes", "No")
+    around.show()
+    assert bar.words() == ""
+
+    bar.ask()
+    assert bar.words() == "Really?"
+    buttons = bar.findChildren(QPushButton)
+    chosen = next(each for each in buttons if each.text() == answer)
+    with qtbot.waitSignal(getattr(bar, signal)):
+        QTest.mouseClick(chosen, Qt.MouseButton.LeftButton)
+
+    assert bar.words() == ""
+
+
+def row(number: int, misfit: float, reason: Reason = Reason.NONE) -> ImageRow:
+    return ImageRow(number, misfit, 10, reason, is_taken_out=bool(reason))
+
+
+def test_the_current_image_stays_current_when_the_order_changes(qtbot: QtBot) -> None:
+    table = ImageTable()
+    qtbot.addWidget(table)
+    table.set_value([row(4, 0.09), row(2, 0.08), row(1, 0.05)])
+    assert table.number() == 4
+    table.choose(2)
+
+    table.set_value([row(2, 0.2, Reason.TAKEN_OUT), row(4, 0.09), row(1, 0.05)])
+
+    assert table.number() == 2
+    assert [each.number for each in table.selected()] == [2]
+    table.choose(77)
+    assert table.number() == 2
+    table.set_value([])
+    assert table.number() is None
+    assert table.selected() == ()
+
+
+def test_arrows_are_drawn_about_the_pen_that_fills_the_view(qtbot: QtBot) -> None:
+    view = ResidualView()
+    qtbot.addWidget(view)
+    view.resize(400, 300)
+    view.set_image(np.zeros((2048, 2448), np.uint8))
+    view.show()
+    points = np.array([[1000.0, 800.0], [1200.0, 1200.0]])
+    plain = view.grab().toImage()
+
+    view.show_around(points)
+    view.set_arrows(Arrows(points, np.array([[0.05, 0.0], [0.0, 0.05]]), 1000.0))
+
+    assert view.zoom() > 2
+    for point in points:
+        assert view.rect().contains(view.place_of(*point).toPoint())
+    middle = view.place_of(*points.mean(axis=0))
+    assert middle.x() == pytest.approx(200, abs=2)
+    assert middle.y() == pytest.approx(150, abs=2)
+    assert view.grab().toImage() != plain
+    view.show_around(np.zeros((0, 2)))
+    assert view.zoom() == 1

@@ -1,0 +1,1390 @@
+"""Start: what is typed is remembered, and what there is already is shown."""
+
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QTranslator
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QAbstractSpinBox,
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QGroupBox,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen.live.preparation import (
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.results import Result, last_result, store_result
+from lightpen.record.writing import RecordWriter
+from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen_app.look.sounds import Mute, Silence, Sound, Sounds
+from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
+from lightpen_app.steps.start.page import StartPage
+from lightpen_app.steps.start.result_panel import LastResultPanel
+from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Workbench
+
+Key = Qt.Key
+LEFT = Qt.MouseButton.LeftButton
+BLACK = np.zeros((8, 8), np.uint8)
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+ODD = 'Ä/\\ 王 %41, "x"; \'' + 170 * "w"
+
+
+class Opened:
+    """A Start page on the screen, driven as an operator does."""
+
+    def __init__(self, qtbot: QtBot, workbench: Workbench, sounds: Sounds) -> None:
+        self.page = StartPage(Services(workbench, sounds))
+        self.subjects: list[str] = []
+        self.notices: list[str] = []
+        self.statuses: list[str] = []
+        self.steps: list[str] = []
+        self.page.subject_changed.connect(self.subjects.append)
+        self.page.notice_raised.connect(self.notices.append)
+        self.page.status_changed.connect(self.statuses.append)
+        self.page.step_requested.connect(self.steps.append)
+        qtbot.addWidget(self.page)
+        self.page.resize(1000, 640)
+        self.page.show()
+        self.page.entered()
+        self.settle()
+
+    def field(self, name: str) -> QWidget:
+        """Return the visible control of an accessible name."""
+        (found,) = [
+            widget
+            for widget in self.page.findChildren(QWidget)
+            if widget.accessibleName() == name and widget.isVisibleTo(self.page)
+        ]
+        return found
+
+    def type_into(self, name: str, text: str, end: Key | None = Key.Key_Tab) -> None:
+        """Replace the text of a field by keys, and leave it."""
+        field = self.field(name)
+        field.setFocus()
+        edit = focused()
+        QTest.keyClick(edit, Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(edit, Key.Key_Delete)
+        QTest.keyClicks(edit, text)
+        if end is not None:
+            QTest.keyClick(edit, end)
+
+    def text_of(self, name: str) -> str:
+        field = self.field(name)
+        match field:
+            case QComboBox():
+                return field.currentText()
+            case QLineEdit() | QAbstractSpinBox():
+                return field.text()
+        raise TypeError(name)
+
+    def press(self, text: str) -> None:
+        """Press the first visible button of a text."""
+        button = next(
+            button
+            for button in self.page.findChildren(QPushButton)
+            if button.text() == text and button.isVisibleTo(self.page)
+        )
+        QTest.mouseClick(button, LEFT)
+
+    def settle(self) -> None:
+        """Let what is looked up in the background be shown."""
+        for _ in range(2):
+            QApplication.processEvents()
+            QThreadPool.globalInstance().waitForDone()
+        QApplication.processEvents()
+
+    def last(self) -> tuple[str, ...]:
+        """Return what is said of the last calibration."""
+        (panel,) = self.page.findChildren(LastResultPanel)
+        return panel.words()
+
+    def rows(self) -> tuple[InterruptedRow, ...]:
+        (panel,) = self.page.findChildren(InterruptedPanel)
+        assert panel.isVisibleTo(self.page) is bool(panel.rows())
+        return panel.rows()
+
+    def buttons(self) -> list[str]:
+        """Return what can be pressed of the swings and below."""
+        return [
+            button.text()
+            for button in self.page.findChildren(QPushButton)
+            if button.isVisibleTo(self.page)
+            and button.text() in ("Resume", "Discard", "Look again", "Test the sounds")
+        ]
+
+    @property
+    def why_not(self) -> str:
+        return self.page.main_action().why_not
+
+
+def focused() -> QWidget:
+    widget = QApplication.focusWidget()
+    assert widget is not None
+    return widget
+
+
+@pytest.fixture
+def fresh(settings: Settings, tmp_path: Path) -> Iterator[Workbench]:
+    """A workbench on which nothing was ever chosen."""
+    workbench = Workbench(settings, tmp_path / "data")
+    yield workbench
+    workbench.shut_down()
+
+
+@pytest.fixture
+def show(qtbot: QtBot) -> Iterator[Callable[[Workbench], Opened]]:
+    pages: list[StartPage] = []
+
+    def opened(workbench: Workbench, sounds: Sounds | None = None) -> Opened:
+        result = Opened(qtbot, workbench, sounds or Silence())
+        pages.append(result.page)
+        return result
+
+    yield opened
+    for page in pages:
+        page.shut_down()
+    QThreadPool.globalInstance().waitForDone()
+
+
+@pytest.fixture
+def start(show: Callable[[Workbench], Opened], workbench: Workbench) -> Opened:
+    return show(workbench)
+
+
+def accepted(
+    workbench: Workbench, age: timedelta, pen: str | None = None, tip: str | None = None
+) -> None:
+    """Put a tip in force that was accepted some time ago."""
+    names = workbench.preparation.names
+    result = Result(
+        names=replace(names, pen=pen or names.pen, tip=tip or names.tip),
+        accepted=datetime.now().astimezone() - age,
+        grade="pass",
+        tip_pen=np.array([-1.31823, -90.40951, -23.85483]),
+        uncertainty=np.array([0.0031, 0.0121, 0.0998]),
+        record="somewhere",
+    )
+    store_result(workbench.run.results_folder, result)
+
+
+def interrupted(
+    workbench: Workbench,
+    name: str,
+    hours_ago: float = 1.0,
+    n_images: int = 12,
+    names: Names | None = None,
+) -> Path:
+    """Leave a swing without a verdict on the disk."""
+    now = workbench.preparation
+    given = replace(now, names=names or now.names)
+    created = datetime.now().astimezone() - timedelta(hours=hours_ago)
+    setup, rng = given.swing_setup(), np.random.default_rng(5)
+    swing = swing_poses(n_images, rng)
+    pixels = simulate_centers(
+        setup.camera, setup.pen, swing.rotations, swing.translations, 0.05, rng
+    )
+    folder = workbench.run.records_folder / name
+    header = replace(given.header(), created=created)
+    with RecordWriter.create(folder, header) as writer:
+        for index in range(n_images):
+            pose = swing.rotations[index], swing.translations[index]
+            writer.append(BLACK, pixels[index], *pose, 0.05 * index)
+    return folder
+
+
+# Names
+
+
+def test_at_first_each_missing_name_is_asked_for_in_turn(
+    show: Callable[[Workbench], Opened], fresh: Workbench
+) -> None:
+    start = show(fresh)
+    asked = []
+    for name in ("Station", "Operator", "Pen, serial number", "Probe tip", "Cone"):
+        asked.append(start.why_not)
+        assert not start.page.is_complete()
+        start.type_into(name, "A-1")
+
+    assert asked == [
+        "Enter the name of the station.",
+        "Enter the name of the operator.",
+        "Enter the serial number of the pen.",
+        "Enter the name of the probe tip.",
+        "Enter the name of the cone.",
+    ]
+    assert start.page.is_complete()
+    assert start.page.main_action() == MainAction("Continue to the camera")
+
+
+def test_a_name_of_blanks_is_none(start: Opened) -> None:
+    start.type_into("Cone", "   ")
+
+    assert start.why_not == "Enter the name of the cone."
+
+
+def test_the_last_name_counts_before_its_field_is_left(start: Opened) -> None:
+    """Else the main button would stay grey, and could not be pressed."""
+    start.type_into("Cone", "", end=None)
+    assert start.why_not
+
+    QTest.keyClicks(start.field("Cone"), "C")
+
+    assert start.why_not == ""
+
+
+def test_what_is_typed_is_taken_over_by_itself(
+    start: Opened, workbench: Workbench, qtbot: QtBot
+) -> None:
+    start.type_into("Operator", " Bea ", end=None)
+
+    qtbot.wait_until(lambda: workbench.preparation.names.operator == "Bea")
+
+    assert start.text_of("Operator") == " Bea "  # more may be typed
+
+
+def test_what_is_typed_is_taken_over_when_the_page_is_left(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Operator", "Bea", end=None)
+    start.type_into("Ball diameter", "3.0005", end=None)
+
+    start.page.left()
+
+    assert workbench.preparation.names.operator == "Bea"
+    assert workbench.preparation.names.ball_diameter == 3.0005
+
+
+def test_all_of_it_is_remembered_for_the_station(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    start.type_into("Operator", "Bea")
+    start.type_into("Pen, serial number", "LP-07")
+    start.type_into("Probe tip", "T-3")
+    start.type_into("Cone", "C-9")
+    start.type_into("Ball diameter", "3.0005")
+    start.type_into("U (k = 2) at most", "0.0075")
+    start.type_into("Images at most", "250")
+    start.type_into("Images at least", "80")
+
+    again = Workbench(Settings(settings.file), Path("unused"))
+    again.choose_station("Hall 2")
+
+    assert again.preparation.names == Names(
+        "Hall 2", "Bea", "LP-07", "T-3", "C-9", 3.0005
+    )
+    assert again.preparation.limits == SwingLimits(0.0075, 80, 250)
+
+
+@pytest.mark.parametrize("name", [ODD, "a" * 200, "General", "../..", "王"])
+def test_any_name_will_do(
+    start: Opened, workbench: Workbench, settings: Settings, name: str
+) -> None:
+    for field in ("Station", "Operator", "Pen, serial number", "Probe tip", "Cone"):
+        edit = start.field(field)
+        edit.setFocus()
+        QApplication.clipboard().setText(name)
+        line = focused()
+        QTest.keyClick(line, Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(line, Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+        QTest.keyClick(line, Key.Key_Tab)
+
+    names = Names(name, name, name, name, name, 10.0)
+    assert workbench.preparation.names == names
+    again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
+    assert again.stations() == tuple(sorted(("Hall 2", name)))
+    again.start()
+    assert again.preparation.names == names
+    again.run.begin(again.preparation)
+    assert again.run.record_folder is not None
+    again.shut_down()
+    accepted(workbench, timedelta(0))
+    found = last_result(again.run.results_folder, name, name)
+    assert found is not None
+
+
+def test_the_subject_is_pen_and_cone_as_they_are_typed(start: Opened) -> None:
+    assert start.subjects[-1] == "Pen LP-04  \u00b7  Cone C-1"
+
+    start.type_into("Pen, serial number", "", end=None)
+    assert start.subjects[-1] == "Cone C-1"
+
+    start.type_into("Pen, serial number", 200 * "w", end=None)
+    assert len(start.subjects[-1]) < 60
+
+
+# Stations
+
+
+@pytest.mark.qt_log_ignore(
+    "^This plugin does not support (raise|grabbing)", extend=True
+)
+def test_a_known_station_brings_back_all_that_was_chosen_there(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    start.type_into("Station", "Hall 3")
+    start.type_into("Operator", "Bea")
+    start.type_into("Images at most", "99")
+    combo = start.field("Station")
+    assert isinstance(combo, QComboBox)
+    assert [combo.itemText(i) for i in range(combo.count())] == ["Hall 2", "Hall 3"]
+
+    combo.setFocus()
+    QTest.keyClick(combo, Key.Key_Down)
+    popup = combo.view()
+    assert popup.isVisible()
+    popup.setCurrentIndex(combo.model().index(0, 0))
+    QTest.keyClick(popup, Key.Key_Return)
+
+    assert start.text_of("Station") == "Hall 2"
+    assert start.text_of("Operator") == "Ann"
+    assert start.text_of("Images at most") == "300"
+    assert workbench.preparation.names.operator == "Ann"
+    assert settings.last_station() == "Hall 2"
+
+
+def test_a_new_station_takes_over_the_present_choices(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    before = workbench.preparation
+
+    start.type_into("Station", "Hall 3")
+
+    assert workbench.preparation.names == replace(before.names, station="Hall 3")
+    assert workbench.preparation.pen_file is before.pen_file
+    assert workbench.stations() == ("Hall 2", "Hall 3")
+    assert Settings(settings.file).last_station() == "Hall 3"
+
+
+def test_a_station_is_not_made_of_each_letter_that_is_typed(
+    start: Opened, workbench: Workbench, qtbot: QtBot
+) -> None:
+    start.type_into("Station", "Hall 34", end=None)
+    start.type_into("Operator", "Bea")
+
+    assert workbench.stations() == ("Hall 2", "Hall 34")
+
+
+def test_the_start_of_a_known_name_is_a_name_of_its_own(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Station", "Hall")
+
+    assert workbench.preparation.names.station == "Hall"
+
+
+def test_a_station_that_was_emptied_is_asked_for_and_keeps_the_rest(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Station", "")
+
+    assert start.why_not == "Enter the name of the station."
+    assert start.text_of("Operator") == "Ann"
+    assert workbench.stations() == ("Hall 2",)
+
+
+def test_what_was_typed_before_stays_with_the_station_before(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    settings.set_station("Hall 3", replace(settings.station("Hall 2"), operator="Cy"))
+    start.type_into("Operator", "Bea", end=None)
+    start.type_into("Station", "Hall 3")
+
+    assert settings.station("Hall 2").operator == "Bea"
+    assert start.text_of("Operator") == "Cy"
+
+
+def test_a_station_whose_files_are_gone_is_told(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    gone = replace(settings.station("Hall 2"), pen_file="/gone/lp04.csv")
+    settings.set_station("Hall 3", gone)
+    told: list[str] = []
+    workbench.troubled.connect(told.append)
+
+    start.type_into("Station", "Hall 3")
+
+    assert any("/gone/lp04.csv does not exist" in sentence for sentence in told)
+    assert start.text_of("Station") == "Hall 3"
+
+
+def test_the_station_survives_a_change_of_preferences(
+    start: Opened, workbench: Workbench, settings: Settings
+) -> None:
+    settings.set_preferences(Preferences(muted=True))
+
+    again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
+    again.start()
+
+    assert again.preparation.names.station == "Hall 2"
+    again.shut_down()
+
+
+@pytest.mark.parametrize(
+    "name", ["Station", "Ball diameter", "Images at most", "U (k = 2) at most"]
+)
+def test_the_wheel_does_not_change_a_field_that_scrolls_by(
+    start: Opened, workbench: Workbench, name: str
+) -> None:
+    before = workbench.preparation
+    start.field("Operator").setFocus()
+    field = start.field(name)
+    center = QPointF(field.rect().center())
+    event = QWheelEvent(
+        center, QPointF(field.mapToGlobal(field.rect().center())),
+        QPointF(0, -120).toPoint(), QPointF(0, -120).toPoint(),
+        Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+
+    QApplication.sendEvent(field, event)
+
+    assert workbench.preparation is before
+
+
+# Numbers
+
+
+def test_a_negative_ball_diameter_cannot_be_entered(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Ball diameter", "-3")
+
+    assert (workbench.preparation.names.ball_diameter or 0.0) >= 0
+    assert "-" not in start.text_of("Ball diameter")
+
+
+def test_a_decimal_comma_is_a_decimal_point(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Ball diameter", "3,5")
+
+    assert workbench.preparation.names.ball_diameter == 3.5
+    assert start.text_of("Ball diameter") == "3.5000 mm"
+
+
+def test_a_ball_need_not_be_known(start: Opened, workbench: Workbench) -> None:
+    start.type_into("Ball diameter", "0")
+
+    assert start.text_of("Ball diameter") == "not known"
+    assert start.page.is_complete()
+
+
+def test_the_nominal_centre_is_that_of_the_led_file_unless_another_is_typed(
+    start: Opened, workbench: Workbench
+) -> None:
+    (box,) = start.page.findChildren(QCheckBox)
+    assert box.text() == "As in the LED file: 0.000  -90.000  -25.000 mm"
+    assert workbench.preparation.nominal_tip is None
+
+    QTest.keyClick(box, Key.Key_Space)
+    assert start.text_of("Nominal centre of the tip, y") == "-90.0000 mm"
+    start.type_into("Nominal centre of the tip, x", "-1,25")
+    start.type_into("Nominal centre of the tip, z", "a-24b.5")
+
+    assert workbench.preparation.nominal_tip is not None
+    np.testing.assert_array_equal(
+        workbench.preparation.nominal_tip, [-1.25, -90, -24.5]
+    )
+    QTest.keyClick(box, Key.Key_Space)
+    assert workbench.preparation.nominal_tip is None
+
+
+def test_a_nominal_centre_comes_back_with_its_station(
+    start: Opened, workbench: Workbench
+) -> None:
+    point = np.array([1 / 3, -90.0, -25.0])
+    workbench.set_preparation(replace(workbench.preparation, nominal_tip=point))
+    start.type_into("Operator", "Bea")
+
+    assert start.text_of("Nominal centre of the tip, x") == "0.3333 mm"
+    assert workbench.preparation.nominal_tip is not None
+    np.testing.assert_array_equal(workbench.preparation.nominal_tip, point)
+
+
+def test_without_an_led_file_no_centre_is_told(
+    show: Callable[[Workbench], Opened], fresh: Workbench
+) -> None:
+    start = show(fresh)
+    (box,) = start.page.findChildren(QCheckBox)
+    assert box.text() == "As in the LED file"
+
+    QTest.keyClick(box, Key.Key_Space)
+
+    assert start.text_of("Nominal centre of the tip, x") == "0.0000 mm"
+
+
+def test_the_least_and_the_most_images_keep_their_order(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Images at least", "400")
+    assert start.text_of("Images at most") == "400"
+
+    start.type_into("Images at most", "50")
+    assert start.text_of("Images at least") == "50"
+    assert workbench.preparation.limits == SwingLimits(min_images=50, max_images=50)
+
+
+def test_limits_that_make_no_sense_cannot_be_entered(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("U (k = 2) at most", "0")
+    start.type_into("Images at least", "0")
+
+    assert workbench.preparation.limits.max_uncertainty >= 0.0001
+    assert workbench.preparation.limits.min_images >= 10
+
+
+# The last result
+
+
+def test_a_pen_and_tip_that_were_never_calibrated_have_none_yet(start: Opened) -> None:
+    assert start.last() == (
+        *("None yet", "The tip that you accept will be the first in force."),
+    )
+
+
+def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=12))
+
+    age, verdict, when, *table = show(workbench).last()
+
+    assert (age, verdict) == ("12 days ago", "PASS")
+    assert when.endswith("  \u00b7  Ann")
+    assert table == ["x -1.3182 0.0031", "y -90.410 0.012", "z -23.85 0.10"]
+
+
+@pytest.mark.parametrize(
+    ("days", "age"),
+    [
+        *((0, "Today"), (1, "Yesterday"), (2, "2 days ago"), (59, "59 days ago")),
+        *((60, "2 months ago"), (729, "24 months ago"), (730, "2 years ago")),
+    ],
+)
+def test_the_age_is_told_in_words(
+    show: Callable[[Workbench], Opened], workbench: Workbench, days: int, age: str
+) -> None:
+    accepted(workbench, timedelta(days=days))
+
+    assert show(workbench).last()[0] == age
+
+
+def test_an_old_tip_comes_with_a_warning(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=31))
+
+    assert show(workbench).last()[-1] == (
+        "It is older than 30 days. Calibrate before you measure."
+    )
+
+
+def test_a_tip_of_the_future_tells_of_the_clock(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=-400))
+
+    age, *_, warning = show(workbench).last()
+
+    assert age == "In the future"
+    assert warning == "It is dated later than now. Check the clock here."
+
+
+def test_another_pen_or_tip_shows_its_own_result(
+    start: Opened, workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=5), pen="LP-05")
+    accepted(workbench, timedelta(days=7), tip="T-3")
+
+    start.type_into("Pen, serial number", "LP-05")
+    start.settle()
+    assert start.last()[0] == "5 days ago"
+
+    start.type_into("Pen, serial number", "LP-04")
+    start.type_into("Probe tip", "T-3")
+    start.settle()
+    assert start.last()[0] == "7 days ago"
+
+    start.type_into("Probe tip", "")
+    start.settle()
+    assert start.last() == ("It is shown when the pen and its tip are named.",)
+
+
+def test_a_result_accepted_meanwhile_is_shown_on_return(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.page.left()
+    accepted(workbench, timedelta(0))
+
+    start.page.entered()
+    start.settle()
+
+    assert start.last()[0] == "Today"
+
+
+def test_a_damaged_result_is_told_where_the_result_would_be(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=12))
+    (file,) = workbench.run.results_folder.iterdir()
+    file.write_text("{")
+
+    (sentence,) = show(workbench).last()
+
+    assert sentence.startswith(f"The result {file} is damaged.")
+
+
+def test_a_verdict_of_a_later_version_is_shown_as_it_stands(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=12))
+    (file,) = workbench.run.results_folder.iterdir()
+    file.write_text(file.read_text().replace('"pass"', '"splendid"'))
+
+    assert show(workbench).last()[1] == "splendid"
+
+
+# Interrupted swings
+
+
+def test_without_an_interrupted_swing_nothing_is_offered(start: Opened) -> None:
+    assert start.rows() == ()
+
+
+def test_interrupted_swings_are_offered_the_newest_first(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    interrupted(workbench, "a", hours_ago=30)
+    interrupted(
+        workbench, "b", hours_ago=2, n_images=1, names=replace(NAMES, pen="LP-05")
+    )
+    interrupted(workbench, "c", hours_ago=50)
+
+    told = [row.words()[1] for row in show(workbench).rows()]
+
+    assert told == [
+        *("LP-05  \u00b7  T-10  \u00b7  1 image",),
+        *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
+    ]
+
+
+def test_the_page_is_there_before_the_swings_are_looked_for(
+    qtbot: QtBot, workbench: Workbench
+) -> None:
+    interrupted(workbench, "a")
+    page = StartPage(Services(workbench, Silence()))
+    qtbot.addWidget(page)
+    page.entered()
+    QThreadPool.globalInstance().waitForDone()
+    QApplication.processEvents()
+    (panel,) = page.findChildren(InterruptedPanel)
+    assert panel.rows() == ()
+
+    page.show()
+
+    qtbot.wait_until(lambda: len(panel.rows()) == 1)
+    page.shut_down()
+
+
+def test_a_swing_goes_on_with_its_images_at_the_step_swing(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    names = replace(NAMES, pen="LP-05", operator="Bea")
+    folder = interrupted(workbench, "a", names=names)
+    workbench.open_camera()
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert workbench.run.record_folder == folder
+    assert workbench.run.state is not None
+    assert workbench.run.state.n_kept == 12
+    assert workbench.run.names.pen == workbench.preparation.names.pen == "LP-05"
+    assert start.text_of("Operator") == "Bea"
+    assert start.subjects[-1].startswith("Pen LP-05")
+    assert start.notices == []
+
+
+def test_the_swing_under_way_is_not_offered(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    interrupted(workbench, "a")
+    interrupted(workbench, "b", hours_ago=3)
+    workbench.open_camera()
+    start = show(workbench)
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    start.page.hide()
+    start.page.show()
+    qtbot.wait_until(lambda: len(start.rows()) == 1)
+
+    (record,) = start.page.findChildren(InterruptedPanel)[0].value().interrupted
+    assert record.folder.name == "b"
+
+
+def test_a_swing_of_another_station_goes_on_there(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    settings: Settings,
+    qtbot: QtBot,
+) -> None:
+    there = replace(settings.station("Hall 2"), max_images=123)
+    settings.set_station("Hall 3", there)
+    interrupted(workbench, "a", names=replace(NAMES, station="Hall 3"))
+    workbench.open_camera()
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert start.text_of("Station") == "Hall 3"
+    assert workbench.preparation.limits.max_images == 123
+
+
+def test_a_closed_camera_is_opened_for_the_swing(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    interrupted(workbench, "a")
+    start = show(workbench)
+    assert not workbench.live.is_open
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert workbench.live.is_open
+
+
+def test_without_a_camera_it_is_told_where_to_choose_one(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    interrupted(workbench, "a")
+    recorded = SourceChoice(SourceKind.RECORDED)
+    workbench.set_preparation(replace(workbench.preparation, source=recorded))
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert start.notices[-1].startswith("No camera is open. Choose the source")
+    assert start.steps == []
+    assert workbench.run.state is None
+
+
+def test_a_swing_does_not_go_on_with_images_of_another_size(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    interrupted(workbench, "a")
+    workbench.open_camera()
+    qtbot.wait_until(lambda: workbench.preparation.image_size is not None)
+    workbench.live.close()
+    workbench.set_preparation(replace(workbench.preparation, image_size=(640, 480)))
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert start.notices[-1].startswith(
+        "The camera sends 640 x 480, the swing was captured with 1224 x 1024."
+    )
+    assert start.steps == []
+
+
+def test_a_swing_that_was_damaged_since_is_told_and_no_longer_offered(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    folder = interrupted(workbench, "a")
+    workbench.open_camera()
+    start = show(workbench)
+    (folder / "journal.jsonl").write_bytes(b"{\n{\n{\n")
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+    qtbot.wait_until(lambda: start.rows()[0].words()[0] == "Damaged: a")
+
+    assert "Line 1 of" in start.notices[-1]
+    assert start.steps == []
+
+
+def cut_header(folder: Path) -> str:
+    header = folder / "header.json"
+    header.write_bytes(header.read_bytes()[:100])
+    return f"{header} is damaged. Restore it from a copy."
+
+
+def remove_camera(folder: Path) -> str:
+    (camera,) = folder.glob("camera.*")
+    camera.unlink()
+    return f"The camera file {camera} does not exist."
+
+
+def damage_line(folder: Path) -> str:
+    journal = folder / "journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")
+    lines[4] = lines[4][:50]
+    journal.write_bytes(b"\n".join(lines))
+    return f"Line 5 of {journal} is damaged. Restore the file from a copy"
+
+
+def remove_header(folder: Path) -> str:
+    (folder / "header.json").unlink()
+    return f"{folder} holds images of a swing, but no header.json."
+
+
+@pytest.mark.parametrize(
+    "damage", [cut_header, remove_camera, damage_line, remove_header]
+)
+def test_a_damaged_swing_is_told_of_until_it_is_mended(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    damage: Callable[[Path], str],
+    tmp_path: Path,
+) -> None:
+    folder = interrupted(workbench, "a")
+    shutil.copytree(folder, tmp_path / "copy")
+    sentence = damage(folder)
+    start = show(workbench)
+
+    (row,) = start.rows()
+    assert row.words()[0] == "Damaged: a"
+    assert row.words()[1].startswith(sentence)
+    assert start.buttons() == ["Discard", "Look again", "Test the sounds"]
+
+    shutil.copytree(tmp_path / "copy", folder, dirs_exist_ok=True)
+    start.press("Look again")
+    qtbot.wait_until(lambda: start.rows()[0].words()[0] != "Damaged: a")
+    assert start.buttons() == ["Resume", "Discard", "Test the sounds"]
+
+
+def test_a_damaged_swing_can_be_discarded_and_keeps_its_images(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    folder = interrupted(workbench, "a")
+    remove_header(folder)
+    start = show(workbench)
+
+    start.press("Discard")
+    assert start.rows()[0].words()[1] == "Discard it? Its images stay on the disk."
+    start.press("Discard")
+    qtbot.wait_until(lambda: start.rows() == ())
+
+    assert len(list((folder / "images").iterdir())) == 12
+    assert start.statuses[-1] == f"Discarded. The images stay in {folder}."
+    assert start.notices == []
+
+
+def test_the_whole_sentence_of_a_damage_is_seen(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    damage_line(interrupted(workbench, "20260930-100000_LP-04-of-Hall-2_T-10-of-80-mm"))
+    start = show(workbench)
+
+    (label,) = [
+        label
+        for label in start.rows()[0].findChildren(QLabel)
+        if label.text().startswith("Line 5")
+    ]
+
+    assert label.height() >= label.heightForWidth(label.width())
+    assert label.visibleRegion().boundingRect() == label.rect()
+    assert label.minimumSizeHint().width() <= label.width()
+
+
+def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    folder = interrupted(workbench, "a")
+    interrupted(workbench, "b", hours_ago=3)
+    other = holding(folder)
+    start = show(workbench)
+
+    qtbot.wait_until(lambda: len(start.rows()) == 2)
+    assert [row.words()[1] for row in start.rows()] == [
+        "LP-04  \u00b7  T-10  \u00b7  12 images",
+        "Another program is capturing it.",
+    ]
+    assert start.buttons() == ["Resume", "Discard", "Look again", "Test the sounds"]
+
+    other.kill()
+    other.wait()
+    workbench.open_camera()
+    start.press("Look again")
+    qtbot.wait_until(lambda: start.buttons().count("Resume") == 2)
+    start.press("Resume")
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+
+    assert workbench.run.record_folder == folder
+
+
+def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    holding: Callable[[Path], "subprocess.Popen[str]"],
+) -> None:
+    folder = interrupted(workbench, "a")
+    workbench.open_camera()
+    start = show(workbench)
+    holding(folder)
+    before = (folder / "journal.jsonl").read_bytes()
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: len(start.notices) == 1)
+    start.press("Discard")
+    start.press("Discard")
+    qtbot.wait_until(lambda: len(start.notices) == 2)
+
+    sentence = f"Another program is writing to the swing in {folder}."
+    assert all(notice.startswith(sentence) for notice in start.notices)
+    assert start.steps == []
+    assert (folder / "journal.jsonl").read_bytes() == before
+
+
+def test_a_record_that_cannot_be_written_is_told(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    folder = interrupted(workbench, "a")
+    workbench.open_camera()
+    start = show(workbench)
+    row = start.rows()[0]
+    journal = folder / "journal.jsonl"
+    content = journal.read_bytes()
+
+    start.press("Resume")
+    QThreadPool.globalInstance().waitForDone()
+    journal.unlink()
+    journal.mkdir()  # before the answer of the reading is taken
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    assert "journal.jsonl" in start.notices[-1]
+    assert start.steps == []
+    assert row.words()[1] == "LP-04  \u00b7  T-10  \u00b7  12 images"
+    journal.rmdir()
+    journal.write_bytes(content)
+
+
+def test_to_discard_asks_and_keeps_by_default(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    folder = interrupted(workbench, "a")
+    start = show(workbench)
+    (row,) = start.rows()
+
+    start.press("Discard")
+    assert row.words()[1] == "Discard it? Its images stay on the disk."
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Keep"
+    QTest.keyClick(focused, Key.Key_Space)
+
+    assert row.words()[1] == "LP-04  \u00b7  T-10  \u00b7  12 images"
+    assert open_record(folder).verdict is None
+
+
+def test_a_double_click_discards_nothing(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    folder = interrupted(workbench, "a")
+    start = show(workbench)
+    button = start.rows()[0].findChildren(QPushButton)[1]
+    place = button.mapTo(start.page, button.rect().center())
+    assert button.text() == "Discard"
+
+    QTest.mouseClick(button, LEFT)
+    QApplication.processEvents()  # the question takes its place
+    second = start.page.childAt(place)
+    assert isinstance(second, QPushButton)
+    QTest.mouseClick(second, LEFT)
+    start.settle()
+
+    assert second.text() == "Keep"
+    assert open_record(folder).verdict is None
+
+
+def test_a_discarded_swing_keeps_its_images_and_is_not_offered_again(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    folder = interrupted(workbench, "a")
+    interrupted(workbench, "b", hours_ago=5)
+    start = show(workbench)
+
+    start.press("Discard")
+    start.press("Discard")
+    qtbot.wait_until(lambda: len(start.rows()) == 1)
+
+    assert open_record(folder).verdict == DISCARDED
+    assert len(list((folder / "images").iterdir())) == 12
+    assert start.statuses[-1] == f"Discarded. The images stay in {folder}."
+
+
+@pytest.mark.parametrize("also_searching", [False, True])
+@pytest.mark.parametrize(
+    ("word", "broken_part"),
+    [("Resume", "read_resumable"), ("Discard", "discard_swing")],
+)
+def test_after_a_bug_the_swing_is_offered_as_before(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
+    word: str,
+    broken_part: str,
+    also_searching: bool,
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    folder = interrupted(workbench, "a")
+    workbench.open_camera()
+    start = show(workbench)
+    broken_parts = [broken_part] + ["find_unfinished"] * also_searching
+    with monkeypatch.context() as broken:
+        for part in broken_parts:
+            broken.setattr(f"lightpen_app.steps.start.page.{part}", lambda *_: 1 / 0)
+        start.press(word)
+        if word == "Discard":
+            start.press(word)
+        qtbot.wait_until(lambda: len(caught) == len(broken_parts))
+        start.settle()
+    assert start.steps == start.statuses == []
+    assert open_record(folder).verdict is None
+    (row,) = start.rows()
+    buttons = [b for b in row.findChildren(QPushButton) if b.isVisibleTo(row)]
+    assert all(button.isEnabled() and not button.toolTip() for button in buttons)
+
+    start.press(word)
+    if word == "Resume":
+        qtbot.wait_until(lambda: start.steps == ["swing"])
+        return
+    if not also_searching:  # the row is a new one, which asks again
+        start.press(word)
+    qtbot.wait_until(lambda: start.rows() == ())
+    assert open_record(folder).verdict == DISCARDED
+
+
+def test_a_bug_in_the_lookup_leaves_no_result_of_another_pen(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    accepted(workbench, timedelta(days=12))
+    start = show(workbench)
+    before = start.last()
+    with monkeypatch.context() as broken:
+        broken.setattr("lightpen_app.steps.start.page.last_result", lambda *_: 1 / 0)
+        start.type_into("Pen, serial number", "LP-05")
+        start.settle()
+    assert len(caught) == 1
+    assert start.last() == ("The last calibration cannot be shown.",)
+
+    start.type_into("Pen, serial number", "LP-04")
+    start.settle()
+    assert start.last() == before
+
+
+def test_buttons_wait_while_a_swing_is_read(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    interrupted(workbench, "a")
+    workbench.open_camera()
+    start = show(workbench)
+    start.press("Resume")
+
+    buttons = start.rows()[0].findChildren(QPushButton)
+    assert not any(button.isEnabled() for button in buttons)
+    assert {button.toolTip() for button in buttons} == {"The swing is being read."}
+
+    qtbot.wait_until(lambda: start.steps == ["swing"])
+    assert all(button.isEnabled() for button in buttons)
+
+
+def test_in_one_column_what_waits_for_an_answer_comes_first(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    interrupted(workbench, "a")
+    start = show(workbench)
+    (panel,) = start.page.findChildren(InterruptedPanel)
+    station = start.field("Station")
+
+    def place(widget: QWidget) -> QPoint:
+        return widget.mapTo(start.page, QPoint())
+
+    assert place(panel).x() > place(station).x()
+
+    start.page.resize(720, 400)
+    start.settle()
+
+    assert place(panel).y() < place(station).y()
+    assert place(panel).y() + panel.height() < start.page.height()
+
+    start.page.resize(1000, 640)
+    start.settle()
+
+    assert place(panel).x() > place(station).x()
+
+
+@pytest.mark.parametrize("width", [810, 850, 1000])
+def test_an_interrupted_swing_is_seen_whole(
+    show: Callable[[Workbench], Opened], workbench: Workbench, width: int
+) -> None:
+    interrupted(workbench, "a", n_images=168)
+    start = show(workbench)
+    start.page.resize(width, 640)
+    start.settle()
+    (panel,) = start.page.findChildren(InterruptedPanel)
+    (scroll,) = panel.findChildren(QScrollArea)
+
+    assert scroll.verticalScrollBar().maximum() == 0
+    (row,) = start.rows()
+    for label in row.findChildren(QLabel):
+        assert label.height() >= label.heightForWidth(label.width())
+
+
+# Sounds
+
+
+class Recorder:
+    """Remembers what was played, and what was said meanwhile."""
+
+    def __init__(self) -> None:
+        self.played: list[Sound] = []
+        self.said: list[str] = []
+        self.words: Callable[[], str] = str
+
+    def play(self, sound: Sound, progress: float = 0.0) -> None:
+        self.played.append(sound)
+        self.said.append(self.words())
+
+    def why_silent(self) -> str:
+        return ""
+
+
+def test_the_sound_test_plays_each_sound_with_its_word(qtbot: QtBot) -> None:
+    sounds = Recorder()
+    widget = SoundTest(sounds, step_ms=0)
+    sounds.words = widget.words
+    qtbot.addWidget(widget)
+    widget.show()
+
+    (button,) = widget.findChildren(QPushButton)
+    QTest.mouseClick(button, LEFT)
+    qtbot.wait_until(lambda: widget.words() == "")
+
+    assert sounds.played == list(Sound)
+    assert sounds.said == [
+        *("Tip seated", "Image kept", "Field full", "Tip slipped, or pen lost"),
+        *("All captured", "Done", "Failed"),
+    ]
+
+
+def test_it_is_told_why_there_is_no_sound(
+    show: Callable[..., Opened], workbench: Workbench
+) -> None:
+    start = show(workbench, Silence(["pw-play", "aplay"]))
+
+    start.press("Test the sounds")
+
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == (
+        "No sound here: none of pw-play, aplay is installed. All is shown in words and "
+        "signs, too."
+    )
+
+
+def test_it_is_told_that_sounds_are_off(
+    show: Callable[..., Opened], workbench: Workbench
+) -> None:
+    recorder = Recorder()
+    start = show(workbench, Mute(recorder, muted=True))
+
+    start.press("Test the sounds")
+
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == "Sounds are off. Press B to switch them on."
+    assert recorder.played == []
+
+
+def test_the_sound_test_ends_with_the_page(
+    show: Callable[..., Opened], workbench: Workbench
+) -> None:
+    start = show(workbench, Recorder())
+    start.press("Test the sounds")
+    (widget,) = start.page.findChildren(SoundTest)
+    assert widget.words() == "Tip seated"
+
+    start.page.left()
+
+    assert widget.words() == ""
+
+
+# Keys, names, languages
+
+
+class Next(Page):
+    """The step after this one."""
+
+    key = "camera"
+
+    @override
+    def title(self) -> str:
+        return "Camera"
+
+    @override
+    def is_complete(self) -> bool:
+        return False
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction("Next")
+
+
+@pytest.fixture
+def window(
+    qtbot: QtBot, workbench: Workbench, settings: Settings
+) -> Iterator[MainWindow]:
+    page = StartPage(Services(workbench, Silence()))
+    window = MainWindow([page, Next()], settings, Preferences())
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitActive(window).__enter__()
+    yield window
+    window.close()
+
+
+def test_whoever_finds_all_as_it_was_goes_on_by_one_key(window: MainWindow) -> None:
+    QTest.keyClick(focused(), Key.Key_Return)
+
+    assert window.page().key == "camera"
+
+
+@pytest.mark.parametrize("name", ["Operator", "Station", "Ball diameter"])
+def test_the_keys_of_a_remote_lead_on_from_every_field(
+    window: MainWindow, workbench: Workbench, name: str
+) -> None:
+    before = workbench.preparation
+    for widget in window.page().findChildren(QWidget):
+        if widget.accessibleName() == name:
+            widget.setFocus()
+
+    QTest.keyClick(focused(), Key.Key_PageDown)
+
+    assert window.page().key == "camera"
+    assert workbench.preparation.names == before.names
+
+
+def test_enter_after_a_name_of_a_station_only_takes_it_over(
+    window: MainWindow, workbench: Workbench
+) -> None:
+    """The operator must see what came back with it before going on."""
+    QTest.keyClicks(focused(), "b")
+    QTest.keyClick(focused(), Key.Key_Return)
+    assert window.page().key == "start"
+    assert workbench.preparation.names.station != "Hall 2"
+
+    QTest.keyClick(focused(), Key.Key_Return)
+
+    assert window.page().key == "camera"
+
+
+def test_every_control_has_a_name_and_is_reached_by_tab(start: Opened) -> None:
+    seen: list[QWidget] = []
+    start.field("Station").setFocus()
+    while (widget := focused()) not in seen:
+        seen.append(widget)
+        QTest.keyClick(widget, Key.Key_Tab)
+
+    names = [w.accessibleName() or getattr(w, "text", str)() for w in seen]
+    assert names[:9] == [
+        *("Station", "Operator", "Pen, serial number", "Cone", "Probe tip"),
+        *("Ball diameter", "As in the LED file: 0.000  -90.000  -25.000 mm"),
+        *("U (k = 2) at most", "Images at least"),
+    ]
+    assert "Test the sounds" in names
+    assert all(names)
+
+
+def test_every_label_leads_to_its_field(start: Opened) -> None:
+    texts = {
+        label.text(): label.buddy()
+        for label in start.page.findChildren(QLabel)
+        if label.buddy() is not None
+    }
+
+    assert texts["Operator"] is start.field("Operator")
+    assert texts["Ball diameter"] is start.field("Ball diameter")
+
+
+class Loud(QTranslator):
+    """A language that is English, only louder."""
+
+    @override
+    def translate(
+        self,
+        context: str,
+        text: str,
+        disambiguation: str | None = None,
+        n: int = -1,
+    ) -> str:
+        return text.upper()
+
+    @override
+    def isEmpty(self) -> bool:
+        return False
+
+
+def test_every_word_changes_with_the_language(
+    show: Callable[[Workbench], Opened], workbench: Workbench, dressed: QApplication
+) -> None:
+    accepted(workbench, timedelta(days=40))
+    interrupted(workbench, "a")
+    start = show(workbench)
+    translator = Loud()
+    dressed.installTranslator(translator)
+    dressed.processEvents()
+    try:
+        texts = [start.page.title(), start.page.lead(), start.why_not]
+        texts += [w.text() for w in start.page.findChildren(QLabel)]
+        texts += [w.text() for w in start.page.findChildren(QPushButton)]
+        texts += [w.text() for w in start.page.findChildren(QCheckBox)]
+        texts += [w.title() for w in start.page.findChildren(QGroupBox)]
+        texts += [w.toolTip() for w in start.page.findChildren(QWidget)]
+        data = ("Ann", "x", "y", "z")
+        quiet = [text for text in texts if text != text.upper() and text not in data]
+    finally:
+        dressed.removeTranslator(translator)
+        dressed.sendPostedEvents(None, QEvent.Type.LanguageChange)
+
+    assert [text for text in quiet if "Ann" not in text and ":" not in text] == []

@@ -1,0 +1,740 @@
+"""The step Swing: hands-free from the seat to the verdict, whatever happens."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication
+from pytestqt.qtbot import QtBot
+from typing_extensions import override
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.worker import Connection
+from lightpen.live.preparation import (
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.live.sources import Surroundings
+from lightpen.model.limits import SwingLimits
+from lightpen.model.posture import Posture
+from lightpen.record.names import Names
+from lightpen.record.reading import DISCARDED, JOURNAL, Record, open_record
+from lightpen.record.unfinished import (
+    find_unfinished,
+)
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.hand import Operator
+from lightpen.simulator.scenes import Scene
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.state import (
+    Pause,
+    Phase,
+    SwingState,
+)
+from lightpen_app.look.phrases import grade_text, phrase
+from lightpen_app.look.sounds import Sound
+from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.services import Services
+from lightpen_app.steps.swing.leaning_dial import LeaningDial
+from lightpen_app.steps.swing.page import SwingPage
+from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Workbench
+
+Key = Qt.Key
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+SHORT = SwingLimits(
+    max_uncertainty=0.015, min_images=12, max_images=50, min_per_field=0
+)
+LONG = SwingLimits(max_uncertainty=1e-5, max_images=5000)
+VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
+UPRIGHT = Posture(0.0, 0.0, 0.0)
+PATIENCE_MS = 20_000  # on a machine that does other things besides
+
+
+class Blank(Page):
+    """A step before or after."""
+
+    def __init__(self, key: str) -> None:
+        super().__init__()
+        self.key = key
+
+    @override
+    def title(self) -> str:
+        return self.key
+
+    @override
+    def is_complete(self) -> bool:
+        return True
+
+    @override
+    def main_action(self) -> MainAction:
+        return MainAction("Next")
+
+
+class Recorder:
+    """Remembers what was played."""
+
+    def __init__(self) -> None:
+        self.played: list[tuple[Sound, float]] = []
+
+    def play(self, sound: Sound, progress: float = 0.0) -> None:
+        self.played.append((sound, progress))
+
+    def why_silent(self) -> str:
+        return ""
+
+    def sounds(self) -> list[Sound]:
+        return [sound for sound, _ in self.played]
+
+
+class Desk:
+    """The window with the step Swing between two blank ones."""
+
+    def __init__(self, workbench: Workbench, settings: Settings) -> None:
+        self.workbench, self.run = workbench, workbench.run
+        self.recorder = Recorder()
+        self.page = SwingPage(Services(workbench, self.recorder))
+        pages = (Blank("leds"), self.page, Blank("review"))
+        self.window = MainWindow(pages, settings, Preferences())
+        workbench.troubled.connect(self.window.show_notice)
+        self.window.resize(1280, 800)
+        self.window.show()
+        self.shown: list[OperatorValue] = []
+        self.page.operator_value_changed.connect(self.shown.append)
+
+    @property
+    def state(self) -> SwingState:
+        assert self.run.state is not None
+        return self.run.state
+
+    @property
+    def operator(self) -> Operator:
+        assert self.workbench.live.operator is not None
+        return self.workbench.live.operator
+
+    @property
+    def value(self) -> OperatorValue:
+        """What the operator sees now."""
+        return self.shown[-1]
+
+    @property
+    def posture(self) -> Posture | None:
+        """Where the dial draws the pen."""
+        return None if self.value.dial is None else self.value.dial.posture
+
+    @property
+    def main_button(self) -> QAbstractButton:
+        button = self.window.findChild(QAbstractButton, "main_button")
+        assert isinstance(button, QAbstractButton)
+        return button
+
+    def words(self) -> str:
+        return " ".join(self.window.words())
+
+    def offers(self, text: str) -> bool:
+        return any(each.text() == text for each in self._buttons())
+
+    def click(self, text: str) -> None:
+        (button,) = (each for each in self._buttons() if each.text() == text)
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def let_operator_swing(self) -> None:
+        text = "Let the simulated operator swing"
+        (button,) = (each for each in self._buttons() if each.text() == text)
+        if not button.isChecked():
+            QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def finish(self) -> None:
+        QTest.mouseClick(self.main_button, Qt.MouseButton.LeftButton)
+        self.click("Finish now")
+
+    def type(self, key: Key) -> None:
+        self.window.activateWindow()
+        QTest.keyClick(self.window.focusWidget() or self.window, key)
+
+    def has_told(self, instruction: str) -> bool:
+        return any(value.instruction == instruction for value in self.shown)
+
+    def close(self) -> None:
+        self.page.shut_down()
+        self.window.setParent(None)
+        self.window.deleteLater()
+        self.workbench.shut_down()
+        QApplication.sendPostedEvents()
+
+    def _buttons(self) -> list[QAbstractButton]:
+        found = self.window.findChildren(QAbstractButton)
+        return [each for each in found if each.isVisible()]
+
+
+def open_camera(qtbot: QtBot, workbench: Workbench) -> None:
+    workbench.open_camera()
+    qtbot.waitUntil(
+        lambda: not workbench.preparation.camera_lacks(), timeout=PATIENCE_MS
+    )
+
+
+def until_verdict(qtbot: QtBot, desk: Desk) -> None:
+    until(qtbot, lambda: desk.value.state.word in VERDICTS)
+
+
+def asked(desk: Desk) -> str:
+    """What the page asks now."""
+    bar = desk.page.findChild(QuestionBar)
+    assert isinstance(bar, QuestionBar)
+    return bar.words()
+
+
+def interrupted(desk: Desk) -> tuple[Record, ...]:
+    return find_unfinished(desk.run.records_folder).interrupted
+
+
+def until(qtbot: QtBot, happened: Callable[[], bool]) -> None:
+    qtbot.waitUntil(happened, timeout=PATIENCE_MS)
+
+
+@pytest.fixture
+def desk(qtbot: QtBot, workbench: Workbench, settings: Settings) -> Iterator[Desk]:
+    """The step before Swing is shown; images come, a short swing is enough."""
+    workbench.set_preparation(replace(workbench.preparation, limits=SHORT))
+    open_camera(qtbot, workbench)
+    desk = Desk(workbench, settings)
+    yield desk
+    desk.close()
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> Path:
+    """A folder with the images of a swing that somebody took."""
+    folder = tmp_path_factory.mktemp("recording")
+    clock = SkippingClock()
+    operator = Operator(clock, seated=True)
+    operator.swing()
+    camera = SimulatedCamera(small_scene, clock, operator)
+    camera.open()
+    camera.start()
+    for number in range(16):
+        cv2.imwrite(str(folder / f"{number:03}.png"), camera.read(1.0).image)
+    camera.close()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shared_desk(
+    tmp_path_factory: pytest.TempPathFactory,
+    around: Surroundings,
+    dressed: QApplication,
+) -> Iterator[Desk]:
+    """A desk at which one test goes on where the last has left off."""
+    folder = tmp_path_factory.mktemp("shared")
+    settings = Settings(folder / "lightpen.ini")
+    workbench = Workbench(settings, folder / "data", around)
+    workbench.set_preparation(replace(workbench.preparation, names=NAMES, limits=SHORT))
+    workbench.use_sample_files()
+    desk = Desk(workbench, settings)
+    yield desk
+    desk.close()
+
+
+@pytest.fixture
+def at_verdict(qtbot: QtBot, shared_desk: Desk) -> Desk:
+    """A short swing that was solved."""
+    desk = shared_desk
+    show(qtbot, desk)
+    desk.let_operator_swing()
+    until_verdict(qtbot, desk)
+    return desk
+
+
+@pytest.fixture
+def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
+    """A swing that goes on and on, captured without a disturbance."""
+    desk, workbench = shared_desk, shared_desk.workbench
+    if workbench.preparation.limits is SHORT:
+        workbench.set_preparation(replace(workbench.preparation, limits=LONG))
+        if desk.run.state is not None:
+            desk.run.set_aside()
+    show(qtbot, desk)
+    desk.let_operator_swing()
+    keep_on(qtbot, desk)
+    return desk
+
+
+def show(qtbot: QtBot, desk: Desk) -> None:
+    """Show the step Swing, with images coming."""
+    if not desk.workbench.live.is_open:
+        open_camera(qtbot, desk.workbench)
+    if desk.run.state is None:
+        desk.window.go_to(0)  # a swing begins when its step is entered
+    desk.window.go_to(1)
+    until(qtbot, lambda: desk.run.state is not None)
+
+
+def keep_on(qtbot: QtBot, desk: Desk, n_more: int = 3) -> None:
+    """Wait until some more images are kept."""
+    until(qtbot, lambda: desk.run.state is not None)
+    n_before = desk.state.n_kept
+    until(
+        qtbot,
+        lambda: (
+            desk.state.phase is Phase.CAPTURING
+            and desk.state.n_kept >= n_before + n_more
+        ),
+    )
+
+
+# Before there is a swing
+
+
+def test_the_step_is_closed_while_something_is_missing(desk: Desk) -> None:
+    desk.workbench.set_preparation(replace(desk.workbench.preparation, pen_file=None))
+
+    desk.window.go_to(1)
+
+    assert desk.window.page() is not desk.page
+    assert "Open the LED geometry file." in desk.words()
+
+
+def test_a_record_that_cannot_be_made_is_told_and_tried_again(
+    qtbot: QtBot, desk: Desk
+) -> None:
+    blocker = desk.run.records_folder
+    blocker.parent.mkdir(exist_ok=True)
+    blocker.write_text("not a folder")
+
+    desk.window.go_to(1)
+
+    assert desk.value.instruction == "No swing"
+    assert desk.value.hint in desk.words()
+    assert "No image is kept yet." in desk.words()
+
+    blocker.unlink()
+    desk.click("Try again")
+
+    until(qtbot, lambda: desk.value.instruction == "Show the pen")
+
+
+def test_the_newcomer_leads_the_pen_by_the_dial(qtbot: QtBot, desk: Desk) -> None:
+    desk.window.go_to(1)
+    assert "press Seat" in desk.value.hint
+    desk.click("Seat")
+    until(qtbot, lambda: desk.value.instruction == "Lean RIGHT")
+    dial = desk.page.findChild(LeaningDial)
+    assert isinstance(dial, LeaningDial)
+
+    dial.setFocus()
+    for _ in range(10):
+        QTest.keyClick(dial, Key.Key_Right)
+
+    until(qtbot, lambda: desk.state.heading == 0)
+    until(qtbot, lambda: (desk.posture or UPRIGHT).tilt > 0.2)
+
+
+def test_a_recording_ends_when_a_whole_pass_brought_nothing_new(
+    qtbot: QtBot, desk: Desk, recording: Path
+) -> None:
+    choice = SourceChoice(SourceKind.RECORDED, str(recording))
+    desk.workbench.set_preparation(
+        replace(desk.workbench.preparation, limits=LONG, source=choice)
+    )
+    until(qtbot, lambda: not desk.workbench.preparation.camera_lacks())
+
+    desk.window.go_to(1)
+
+    until_verdict(qtbot, desk)
+    assert not desk.offers("Seat")  # nobody is there to be told
+    assert desk.value.state.word in {"CHECK", "REPEAT", "NO TIP"}
+
+
+# A short swing, from beginning to end
+
+
+def test_no_key_is_needed_from_the_seat_to_the_verdict(at_verdict: Desk) -> None:
+    desk = at_verdict
+
+    for instruction in (
+        *("Show the pen", "Seat the tip", "Seated", "Starts in 3", "Lean RIGHT"),
+        *("Captured",),
+    ):
+        assert desk.has_told(instruction), instruction
+    verdict = desk.run.verdict
+    assert verdict is not None
+    assert desk.value.state.word == grade_text(verdict.grade)
+    assert desk.value.state.detail == phrase(verdict.reason, desk.state.heading).hint
+    assert desk.main_button.text() == "Review"
+    assert desk.main_button.isEnabled()
+    sounds = desk.recorder.sounds()
+    assert sounds[0] is Sound.SEATED
+    assert sounds[-2:] == [Sound.CAPTURED, Sound.DONE]
+    rises = [progress for sound, progress in desk.recorder.played if sound == "kept"]
+    assert len(rises) == desk.state.n_kept
+    assert rises[-1] > rises[0]
+
+
+def test_a_pen_that_leans_after_the_verdict_waits(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.operator.lean(0.4, 0.0, 0.0)
+    until(qtbot, lambda: desk.value.state.fraction is None)
+    qtbot.wait(1000)  # four seconds of the operator's
+
+    assert desk.window.page() is desk.page
+
+
+def test_holding_the_pen_upright_and_still_after_the_verdict_shows_the_review(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.click("Hold")
+    desk.operator.lean(0.0, 0.0, 0.0)
+
+    until(qtbot, lambda: desk.window.page().key == "review")
+    filled = [value.state.fraction for value in desk.shown if value.state.fraction]
+    assert filled[-1] > 0.5  # the ring was seen to fill
+
+
+def test_after_the_verdict_more_can_be_captured(qtbot: QtBot, at_verdict: Desk) -> None:
+    desk = at_verdict
+    n_before = desk.state.n_kept
+
+    desk.click("Capture more")
+
+    assert desk.page.main_action().why_not == "The swing goes on."
+    until(qtbot, lambda: desk.state.n_kept > n_before + 5)
+    desk.finish()
+    until_verdict(qtbot, desk)
+    assert desk.run.solution is not None
+    assert len(desk.run.solution.numbers) == desk.state.n_kept
+
+
+def test_computing_can_be_stopped_and_begun_again(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.let_operator_swing()
+    desk.click("Capture more")
+    until(qtbot, lambda: desk.value.state.word == "CAPTURING")
+    desk.finish()
+    until(qtbot, lambda: desk.run.is_solving)
+    until(qtbot, lambda: desk.offers("Stop computing"))
+
+    desk.click("Stop computing")
+
+    until(qtbot, lambda: desk.value.instruction == "Not computed")
+    assert desk.value.state.word == "STOPPED"
+    assert "The tip is not computed yet." in desk.words()
+    assert "is offered again" in desk.page.unsaved()
+
+    desk.click("Compute again")
+
+    until_verdict(qtbot, desk)
+
+
+def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    folder = desk.run.record_folder
+    desk.window.go_to(2)
+    desk.run.accept()
+    until(qtbot, lambda: desk.value.state.word == "IN FORCE")
+    assert desk.value.instruction == "Accepted"
+    assert folder is not None
+    journal = (folder / JOURNAL).read_bytes()
+
+    desk.window.go_to(1)
+
+    assert desk.run.result is None
+    assert desk.run.record_folder not in (None, folder)
+    desk.let_operator_swing()
+    until_verdict(qtbot, desk)
+    assert (folder / JOURNAL).read_bytes() == journal
+
+
+def test_a_swing_that_begins_behind_another_step_waits_for_its_own(
+    qtbot: QtBot, at_verdict: Desk
+) -> None:
+    desk = at_verdict
+    desk.let_operator_swing()
+    desk.click("Capture more")
+    desk.window.go_to(0)
+    until(qtbot, lambda: desk.run.is_capturing)
+    until(qtbot, lambda: desk.state.pause is Pause.BY_USER)
+
+    desk.window.go_to(1)
+    keep_on(qtbot, desk)
+
+
+# A long swing, disturbed
+
+
+def test_a_covered_pen_is_told_and_the_swing_goes_on_by_itself(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    capturing.click("Cover")
+
+    until(qtbot, lambda: capturing.value.state.word == "PEN LOST")
+    assert capturing.value.instruction == "Pen not seen"
+    assert capturing.recorder.sounds()[-1] is Sound.LOST
+    keep_on(qtbot, capturing)
+
+
+def test_a_lifted_pen_pauses_the_swing_until_it_is_back(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    n_before = capturing.state.n_kept
+
+    capturing.click("Lift")
+    until(qtbot, lambda: capturing.value.state.word == "LIFTED")
+    assert capturing.value.dial is not None
+    assert capturing.value.dial.target is None
+
+    capturing.click("Seat")
+    keep_on(qtbot, capturing)
+    assert capturing.state.n_kept > n_before
+
+
+def test_a_slip_costs_only_the_images_that_slipped(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    keep_on(qtbot, capturing, 5)
+    n_before = capturing.state.n_kept
+    n_told = len(capturing.shown)
+
+    capturing.click("Slip")
+
+    until(
+        qtbot,
+        lambda: any(v.instruction == "Tip slipped" for v in capturing.shown[n_told:]),
+    )
+    assert Sound.LOST in capturing.recorder.sounds()
+    keep_on(qtbot, capturing)
+    assert capturing.state.n_kept > n_before - 5
+
+
+def test_space_pauses_and_goes_on(qtbot: QtBot, capturing: Desk) -> None:
+    capturing.type(Key.Key_Space)
+    until(qtbot, lambda: capturing.value.state.word == "PAUSED")
+    assert capturing.value.hint == "Press Space to go on."
+    assert capturing.offers("Go on (Space)")
+
+    capturing.type(Key.Key_Space)
+    keep_on(qtbot, capturing)
+
+
+def test_leaving_the_step_pauses_and_coming_back_goes_on(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    capturing.type(Key.Key_PageUp)
+    assert capturing.window.page().key == "leds"
+    until(qtbot, lambda: capturing.state.pause is Pause.BY_USER)
+
+    capturing.window.go_to(1)
+    keep_on(qtbot, capturing)
+
+
+def test_a_swing_that_its_user_paused_stays_paused_when_he_comes_back(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    capturing.type(Key.Key_Space)
+    until(qtbot, lambda: capturing.state.pause is Pause.BY_USER)
+
+    capturing.window.go_to(0)
+    capturing.window.go_to(1)
+    qtbot.wait(200)
+
+    assert capturing.state.pause is Pause.BY_USER
+    capturing.type(Key.Key_Space)
+
+
+def test_a_full_disk_pauses_with_its_sentence_and_space_goes_on(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4000, before[1]))
+    try:
+        until(qtbot, lambda: "could not be recorded" in capturing.value.hint)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert capturing.value.instruction == "Paused"
+    assert "cannot be written" in capturing.words()
+    n_before = capturing.state.n_kept
+
+    capturing.type(Key.Key_Space)
+    keep_on(qtbot, capturing)
+
+    folder = capturing.run.record_folder
+    assert folder is not None
+    assert len(open_record(folder).used_images) >= n_before + 3
+
+
+def test_a_camera_that_is_unplugged_and_back_costs_nothing(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    around = capturing.workbench.around
+    camera = SimulatedCamera(around.scene, around.clock)
+    capturing.workbench.live.open(camera, CameraSettings(), around.clock)
+    keep_on(qtbot, capturing)  # on another camera, from the record
+    n_before = capturing.state.n_kept
+
+    camera.faults.unplug()
+    until(qtbot, lambda: capturing.value.state.word == "NO IMAGES")
+    assert "goes on by itself" in capturing.value.hint
+    assert capturing.recorder.sounds()[-1] is Sound.LOST
+
+    camera.faults.plug_in()
+    until(qtbot, lambda: capturing.workbench.live.connection is Connection.STREAMING)
+    keep_on(qtbot, capturing)
+    assert capturing.state.n_kept > n_before
+
+
+def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    camera = SimulatedCamera(
+        capturing.workbench.around.scene, capturing.workbench.around.clock
+    )
+    capturing.workbench.live.open(
+        camera, CameraSettings(), capturing.workbench.around.clock
+    )
+    keep_on(qtbot, capturing, 1)
+    capturing.type(Key.Key_Space)
+    until(qtbot, lambda: capturing.value.state.word == "PAUSED")
+
+    camera.faults.spoil_frames(1)
+
+    until(qtbot, lambda: "arrived incomplete" in capturing.words())
+    assert capturing.value.hint == "Press Space to go on."
+    capturing.type(Key.Key_Space)
+
+
+def test_a_camera_that_was_closed_can_be_opened_here(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    n_before = capturing.state.n_kept
+    folder = capturing.run.record_folder
+    capturing.workbench.live.close()
+    until(qtbot, lambda: capturing.offers("Open the camera"))
+
+    capturing.click("Open the camera")
+    keep_on(qtbot, capturing)
+
+    assert capturing.run.record_folder == folder
+    assert capturing.state.n_kept > n_before
+
+
+def test_finishing_early_says_what_is_missing_and_can_be_declined(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    QTest.mouseClick(capturing.main_button, Qt.MouseButton.LeftButton)
+
+    question = asked(capturing)
+    assert "U (k = 2) of the tip is" in question
+    assert capturing.state.phase is not Phase.SOLVING
+
+    capturing.click("Go on swinging")
+
+    assert asked(capturing) == ""
+    keep_on(qtbot, capturing)
+
+
+def test_closing_the_window_asks_and_names_the_images(capturing: Desk) -> None:
+    assert (
+        f"kept so far ({capturing.state.n_kept}) are safe" in capturing.page.unsaved()
+    )
+
+
+def test_other_choices_do_not_change_a_swing_that_is_under_way(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    workbench, setup = capturing.workbench, capturing.run.setup
+    capturing.window.go_to(0)
+    workbench.set_preparation(
+        replace(workbench.preparation, names=replace(NAMES, operator="Bob"))
+    )
+    capturing.window.go_to(1)
+
+    assert "goes on with the files, names and limits" in asked(capturing)
+    capturing.click("Go on with this swing")
+
+    keep_on(qtbot, capturing)
+    capturing.window.go_to(0)
+    capturing.window.go_to(1)
+    assert asked(capturing) == ""  # it was told once
+    assert capturing.run.setup is setup
+    assert capturing.run.names.operator == "Ann"
+
+
+def test_enter_presses_the_main_button_unless_another_was_chosen(
+    capturing: Desk,
+) -> None:
+    capturing.window.go_to(0)
+    capturing.window.go_to(1)
+
+    focused = capturing.window.focusWidget()
+
+    assert focused is not None
+    assert not isinstance(focused, QAbstractButton)
+    capturing.type(Key.Key_Return)
+    assert asked(capturing)
+    capturing.click("Go on swinging")
+
+
+def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    old = capturing.run.record_folder
+    assert old is not None
+    n_before = capturing.state.n_kept
+
+    capturing.click("Start over")
+    assert f"The images of this swing ({n_before})" in asked(capturing)
+    assert capturing.run.record_folder == old
+    capturing.click("Begin anew")
+
+    until(qtbot, lambda: capturing.run.record_folder not in (None, old))
+    until(qtbot, lambda: open_record(old).verdict == DISCARDED)
+    assert len(open_record(old).used_images) >= n_before
+    keep_on(qtbot, capturing)
+    assert old not in {each.folder for each in interrupted(capturing)}
+
+
+def test_an_interrupted_swing_goes_on_with_all_its_images(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    folder = capturing.run.record_folder
+    assert folder is not None
+    capturing.run.abandon()
+    capturing.workbench.live.close()
+    capturing.workbench.live.await_closed()
+    n_recorded = len(open_record(folder).used_images)
+    capturing.window.go_to(0)
+    open_camera(qtbot, capturing.workbench)
+
+    capturing.run.go_on(read_resumable(folder))
+    capturing.window.go_to(1)
+
+    assert capturing.state.n_kept == n_recorded
+    keep_on(qtbot, capturing)
+
+
+def test_finishing_early_gives_a_verdict_that_says_why(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    keep_on(qtbot, capturing, 8)
+    capturing.finish()
+
+    until(qtbot, lambda: capturing.run.state is not None)
+    until(qtbot, lambda: capturing.state.phase is Phase.VERDICT)
+    until(qtbot, lambda: capturing.value.state.word in {"REPEAT", "NO TIP"})
+    assert capturing.recorder.sounds()[-1] is Sound.FAILED

@@ -1,0 +1,361 @@
+"""Plots show new data without being made anew, and save themselves."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QImage
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen_app.look.theme import DARK, LIGHT, apply_theme
+from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
+from lightpen_app.steps.review.residual_plots import (
+    ArrowPlot,
+    DotPlot,
+    Histogram,
+    MisfitPlot,
+    arrow_scale,
+)
+from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.plots import Axes, Curve, Plot, TracePlot
+
+IMAGES = np.arange(1.0, 6.0)
+VALUES = np.array([0.06, 0.05, np.nan, 0.07, 0.06])
+
+
+def numbers(plot: Plot, column: str) -> FloatArray:
+    """Return a column of numbers behind a plot."""
+    return np.array(plot.columns()[column], dtype=np.float64)
+
+
+def show(qtbot: QtBot, plot: Plot) -> None:
+    qtbot.addWidget(plot)
+    plot.resize(360, 240)
+    plot.show()
+    QApplication.processEvents()
+
+
+def shown_colors(plot: Plot) -> set[str]:
+    QApplication.processEvents()
+    image = plot.grab().toImage()
+    return {
+        image.pixelColor(x, y).name()
+        for x in range(image.width())
+        for y in range(image.height())
+    }
+
+
+@pytest.fixture
+def trace(qtbot: QtBot) -> TracePlot:
+    plot = TracePlot(Axes("Misfit / px", "image"), [Curve("misfit_px")], y_zero=True)
+    show(qtbot, plot)
+    plot.set_data(IMAGES, VALUES)
+    return plot
+
+
+def test_the_range_holds_all_data_the_zero_and_the_limit(trace: TracePlot) -> None:
+    trace.set_limit(0.2, "limit 0.2")
+    trace.set_data(IMAGES, VALUES)
+
+    (left, right), (bottom, top) = trace.ranges()
+
+    assert left <= 1
+    assert right >= 5
+    assert bottom <= 0
+    assert top >= 0.2
+
+
+def test_new_data_draws_on_the_same_curve(trace: TracePlot) -> None:
+    n_items = trace.n_items()
+
+    for n in range(1, 50):
+        trace.set_data(np.arange(n, dtype=float), np.ones(n))
+
+    assert trace.n_items() == n_items
+
+
+def test_one_value_or_none_is_no_trouble(trace: TracePlot) -> None:
+    trace.set_data(np.array([]), np.array([]))
+    trace.set_data(np.array([1.0]), np.array([0.0]))
+    trace.set_data(np.array([1.0]), np.array([np.nan]))
+
+    assert trace.grab().width() == 360
+
+
+def test_a_change_of_theme_colours_plots_that_are_there(
+    trace: TracePlot, qapp: QApplication
+) -> None:
+    dark = shown_colors(trace)
+    apply_theme(qapp, LIGHT)
+    light = shown_colors(trace)
+
+    assert {DARK.panel, DARK.accent} <= dark
+    assert {LIGHT.panel, LIGHT.accent} <= light
+    assert DARK.panel not in light
+
+
+def test_the_numbers_are_saved_as_they_are(trace: TracePlot, tmp_path: Path) -> None:
+    path = tmp_path / "misfit.csv"
+
+    trace.save_csv(path)
+
+    assert path.read_text().splitlines() == [
+        "image,misfit_px",
+        "1,0.06",
+        "2,0.05",
+        "3,nan",
+        "4,0.07",
+        "5,0.06",
+    ]
+
+
+def test_the_picture_is_saved_at_twice_its_size(
+    trace: TracePlot, tmp_path: Path
+) -> None:
+    path = tmp_path / "misfit.png"
+
+    trace.save_png(path)
+
+    saved = QImage(str(path))
+    assert (saved.width(), saved.height()) == (720, 480)
+    colors = {
+        saved.pixelColor(x, y).name() for x in range(720) for y in range(100, 400)
+    }
+    assert DARK.accent in colors
+
+
+@pytest.mark.parametrize("save", ["save_png", "save_csv"])
+def test_a_file_that_cannot_be_written_is_told(
+    trace: TracePlot, tmp_path: Path, save: str
+) -> None:
+    with pytest.raises(FileError, match="cannot be written"):
+        getattr(trace, save)(tmp_path)
+
+
+def test_arrows_point_along_the_residuals_with_v_downwards(qtbot: QtBot) -> None:
+    plot = ArrowPlot(Axes("Residuals"))
+    show(qtbot, plot)
+    points = np.array([[1000.0, 500.0], [600.0, 1500.0]])
+    residuals = np.array([[0.05, 0.0], [0.0, -0.1]])
+
+    plot.set_data((2448, 2048), points, residuals)
+
+    x, y = plot.lines()
+    scale = plot.scale()
+    assert (x[0], y[0], x[1], y[1]) == (1000, 500, 1000 + 0.05 * scale, 500)
+    assert (x[6], y[6], x[7], y[7]) == (600, 1500, 600, 1500 - 0.1 * scale)
+    assert sorted(plot.columns()) == [
+        "residual_x_px",
+        "residual_y_px",
+        "x_px",
+        "y_px",
+    ]
+
+
+def test_the_place_of_the_leds_stays_in_sight_when_the_plot_is_resized(
+    qtbot: QtBot,
+) -> None:
+    plot = ArrowPlot(Axes("Residuals"))
+    show(qtbot, plot)
+    points = np.array([[1000.0, 500.0], [600.0, 1500.0]])
+    plot.set_data((2448, 2048), points, np.ones((2, 2)))
+
+    plot.resize(700, 300)
+    QApplication.processEvents()
+
+    (left, right), (top, bottom) = plot.ranges()
+    assert left <= 600
+    assert right >= 1000
+    assert top <= 500
+    assert bottom >= 1500
+
+
+def test_of_many_arrows_the_means_are_drawn_and_all_are_saved(qtbot: QtBot) -> None:
+    plot = ArrowPlot(Axes("Residuals"))
+    show(qtbot, plot)
+    rng = np.random.default_rng(1)
+    points = rng.uniform(0, 2000, (3000, 2))
+    pattern = np.array([0.02, -0.01])
+
+    plot.set_data((2448, 2048), points, pattern + rng.normal(0, 0.05, (3000, 2)))
+
+    x, y = plot.lines()
+    assert 300 < len(x) / 6 <= 21 * 21
+    shafts = np.column_stack([x[1::6] - x[0::6], y[1::6] - y[0::6]]) / plot.scale()
+    np.testing.assert_allclose(shafts.mean(axis=0), pattern, atol=0.005)
+    assert len(numbers(plot, "x_px")) == 3000
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"), [(0.05, 1000), (0.04, 2000), (3.0, 20), (0.0, 1)]
+)
+def test_arrows_are_enlarged_by_a_round_factor(size: float, scale: float) -> None:
+    residuals = size * np.array([[1.0, 0.0], [0.0, -1.0]])
+
+    assert arrow_scale(residuals, 2448) == pytest.approx(scale)
+
+
+def test_a_histogram_counts_every_residual(qtbot: QtBot) -> None:
+    plot = Histogram(Axes("Residuals / px"), "residual_px")
+    show(qtbot, plot)
+    values = np.random.default_rng(1).normal(0, 0.05, 4000)
+
+    plot.set_data(values)
+
+    assert numbers(plot, "count").sum() == 4000
+    middles = numbers(plot, "residual_px")
+    np.testing.assert_allclose(middles, -middles[::-1], atol=1e-12)
+    plot.set_data(np.zeros(0))
+    plot.set_data(np.zeros(3))
+    assert numbers(plot, "count").sum() == 3
+
+
+def test_dots_keep_their_numbers(qtbot: QtBot) -> None:
+    plot = DotPlot(Axes("Residuals / px", "x", "y"), ("x_px", "y_px"))
+    show(qtbot, plot)
+
+    plot.set_data(np.array([1.0, 2.0]), np.array([3.0, -5.0]))
+
+    np.testing.assert_array_equal(numbers(plot, "y_px"), [3, -5])
+    (left, right), (bottom, top) = plot.ranges()
+    assert left <= -5  # a unit of x is as long as one of y, zero in the middle
+    assert right >= 5
+    assert bottom <= -5
+    assert top >= 5
+
+
+@pytest.fixture
+def misfits(qtbot: QtBot) -> MisfitPlot:
+    plot = MisfitPlot(Axes("Misfit / px", "image"))
+    show(qtbot, plot)
+    numbers = np.array([1, 2, 4, 5])
+    values = np.array([0.05, 0.06, 3.0, np.nan])
+    plot.set_data(numbers, values, np.array([True, True, False, False]))
+    return plot
+
+
+def test_images_far_off_leave_the_others_apart(misfits: MisfitPlot) -> None:
+    (_, _), (bottom, top) = misfits.ranges()
+
+    assert bottom == pytest.approx(0, abs=0.01)
+    assert top < 0.2
+    assert misfits.place_of(2) == (2, 0.06)
+    assert misfits.place_of(4)[1] < top
+    assert numbers(misfits, "misfit_px")[2] == 3.0  # saved as it is
+
+
+def test_the_marked_image_stays_marked_over_new_data(misfits: MisfitPlot) -> None:
+    misfits.set_number(2)
+
+    misfits.set_data(np.array([1, 2]), np.array([0.1, 0.2]), np.array([True, False]))
+
+    assert misfits.number() == 2
+    misfits.set_number(None)
+    assert misfits.number() is None
+
+
+def test_a_click_on_a_dot_chooses_its_image(misfits: MisfitPlot, qtbot: QtBot) -> None:
+    place = misfits.pixel_of(2)
+
+    with qtbot.waitSignal(misfits.number_chosen) as chosen:
+        QTest.mouseClick(
+            misfits.canvas(),
+            Qt.MouseButton.LeftButton,
+            Qt.KeyboardModifier.NoModifier,
+            place,
+        )
+
+    assert chosen.args == [2]
+
+
+def test_bars_stand_at_their_labels_and_are_saved_with_them(
+    qtbot: QtBot, tmp_path: Path
+) -> None:
+    plot = BarPlot(Axes("LEDs"), [Curve("rms", "rms"), Curve("mean", "mean")], "led")
+    show(qtbot, plot)
+
+    plot.set_data(["1", "2"], np.array([0.05, np.nan]), np.array([-0.01, 0.01]))
+
+    (left, right), (bottom, top) = plot.ranges()
+    assert left <= -0.4
+    assert right >= 1.4
+    assert bottom <= -0.01
+    assert top >= 0.05
+    plot.save_csv(tmp_path / "leds.csv")
+    assert (tmp_path / "leds.csv").read_text().splitlines() == [
+        "led,rms,mean",
+        "1,0.05,-0.01",
+        "2,nan,0.01",
+    ]
+
+
+def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
+    plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")], "iteration")
+    show(qtbot, plot)
+    bars = BarPlot(Axes("U"), [Curve("x_um", "x"), Curve("y_um", "y")], "part")
+    show(qtbot, bars)
+
+    for each in (plot, bars):
+        each.set_names(["a", "b"])
+        assert each.names() == ("a", "b")
+
+
+def test_later_steps_are_saved_but_not_shown(qtbot: QtBot) -> None:
+    plot = LinePlot(Axes("Objective"), [Curve("objective")], "iteration")
+    show(qtbot, plot)
+    steps = np.arange(60.0)
+
+    plot.set_data(steps, 1 / (1 + steps), until=10)
+
+    (_, right), _ = plot.ranges()
+    assert 10 <= right < 12
+    assert len(numbers(plot, "objective")) == 60
+
+
+def test_postures_lie_where_the_pen_leant_as_the_camera_sees_it(qtbot: QtBot) -> None:
+    plot = PosturePlot(Axes("Postures"))
+    show(qtbot, plot)
+
+    plot.set_data(np.radians([10.0, 20.0]), np.radians([0.0, 90.0]))
+
+    np.testing.assert_allclose(numbers(plot, "right_deg"), [10, 0], atol=1e-9)
+    np.testing.assert_allclose(numbers(plot, "away_deg"), [0, 20], atol=1e-9)
+    (left, right), (bottom, top) = plot.ranges()
+    assert left <= -36
+    assert right >= 36
+    assert bottom <= -36
+    assert top >= 36
+
+
+def test_new_data_makes_no_new_items(qtbot: QtBot) -> None:
+    bars = BarPlot(Axes("LEDs"), [Curve("rms")], "led")
+    lines = LinePlot(Axes("Tip"), [Curve("x_um")], "iteration")
+    for plot in (bars, lines):
+        show(qtbot, plot)
+    before = bars.n_items(), lines.n_items()
+
+    for n in range(2, 30):
+        bars.set_data([str(i) for i in range(n)], np.ones(n))
+        lines.set_data(np.arange(float(n)), np.ones(n))
+
+    assert (bars.n_items(), lines.n_items()) == before
+
+
+def test_one_plot_is_enlarged_over_its_neighbours(qtbot: QtBot) -> None:
+    cards = [PlotCard(DotPlot(Axes(name), ("x", "y")), name) for name in "abc"]
+    grid = PlotGrid(cards)
+    qtbot.addWidget(grid)
+    grid.resize(600, 400)
+    grid.show()
+
+    enlarge, *_ = cards[1].actions_offered()
+    enlarge.trigger()
+    assert [card.isVisible() for card in cards] == [False, True, False]
+
+    QTest.mouseDClick(cards[1], Qt.MouseButton.LeftButton)
+    assert [card.isVisible() for card in cards] == [True, True, True]

@@ -1,0 +1,132 @@
+"""Traces over the number of the image: decades, a limit, and the newest values."""
+
+from itertools import pairwise
+
+import numpy as np
+import pyqtgraph as pg
+import pytest
+from PySide6.QtGui import QImage, QPainter
+from pytestqt.qtbot import QtBot
+
+from lightpen_app.look.theme import TextSize, font
+from lightpen_app.widgets.plots import Axes, Curve, TracePlot
+
+
+def shown(qtbot: QtBot, plot: TracePlot) -> TracePlot:
+    qtbot.addWidget(plot)
+    plot.resize(280, 130)
+    plot.show()
+    return plot
+
+
+@pytest.fixture
+def decades(qtbot: QtBot) -> TracePlot:
+    return shown(qtbot, TracePlot(Axes("U / um"), [Curve("u_um")], y_log=True))
+
+
+def test_decades_are_drawn_by_their_logarithm_and_saved_as_they_are(
+    decades: TracePlot,
+) -> None:
+    values = np.array([np.nan, 0.0, 1000.0, 10.0, 1.0])
+    decades.set_data(np.arange(1.0, 6.0), values)
+
+    (_, _), (low, high) = decades.ranges()
+
+    assert -0.5 < low <= 0
+    assert 3 <= high < 3.5
+    np.testing.assert_array_equal(decades.columns()["u_um"], values)
+
+
+def test_a_limit_has_room_for_its_words_above_it(decades: TracePlot) -> None:
+    decades.set_limit(5.0, "limit 5")
+    decades.set_data(np.arange(1.0, 4.0), np.array([4.0, 2.0, 1.0]))
+
+    (_, _), (_, high) = decades.ranges()
+
+    assert high > np.log10(5.0) + 0.3
+
+
+def test_the_first_values_do_not_hide_the_newest(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Tip / um"), [Curve("x_um")], tail=0.75))
+    values = np.where(np.arange(40) < 8, 5000.0, 0.5)
+    plot.set_data(np.arange(1.0, 41.0), values)
+
+    (left, _), (_, high) = plot.ranges()
+
+    assert left <= 1
+    assert high < 2
+
+
+def test_few_images_are_not_drawn_as_fractions(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Misfit / px"), [Curve("misfit_px")]))
+    (left, right), _ = plot.ranges()
+    assert right - left >= 9
+
+    plot.set_data(np.array([1.0, 2.0]), np.array([0.1, 0.2]))
+
+    (left, right), _ = plot.ranges()
+    assert left <= 1
+    assert right >= 10
+
+
+def numbers_of(plot: TracePlot) -> list[tuple[float, float, str]]:
+    """Return top, bottom and words of the numbers along y."""
+    graphics = plot.findChild(pg.PlotWidget)
+    assert graphics is not None
+    image = QImage(400, 400, QImage.Format.Format_RGB32)
+    painter = QPainter(image)
+    painter.setFont(font(TextSize.SMALL))
+    specs = graphics.getPlotItem().getAxis("left").generateDrawSpecs(painter)
+    painter.end()
+    assert specs is not None
+    return [(rect.top(), rect.bottom(), text) for rect, _, text in specs[2]]
+
+
+@pytest.mark.parametrize("y_log", [False, True])
+@pytest.mark.parametrize("height", [72, 80, 96, 130, 300])
+def test_the_numbers_of_a_low_plot_do_not_overlap(
+    qtbot: QtBot, y_log: bool, height: int
+) -> None:
+    plot = shown(qtbot, TracePlot(Axes("U / um"), [Curve("u_um")], y_log=y_log))
+    plot.resize(280, height)
+    plot.set_data(np.arange(1.0, 61.0), np.geomspace(30.0, 0.5, 60))
+    plot.grab()
+
+    numbers = sorted(numbers_of(plot))
+
+    assert numbers
+    assert all(text for _, _, text in numbers)
+    assert all(upper[1] <= lower[0] for upper, lower in pairwise(numbers))
+
+
+def test_decades_are_numbered_before_what_is_between_them(decades: TracePlot) -> None:
+    decades.resize(280, 84)
+    decades.set_data(np.arange(1.0, 61.0), np.geomspace(120.0, 0.8, 60))
+    decades.grab()
+
+    assert {"1", "100"} <= {text for _, _, text in numbers_of(decades)}
+
+
+@pytest.mark.parametrize("height", [90, 130])
+@pytest.mark.parametrize("last", [3.0, 5.0, 20.0])
+def test_the_words_of_a_limit_cover_no_curve(
+    decades: TracePlot, height: int, last: float
+) -> None:
+    decades.resize(400, height)
+    decades.set_limit(5.0, "limit 5")
+    n = np.arange(1.0, 61.0)
+    decades.set_data(n, last + 60.0 / n**1.5)
+    decades.grab()
+
+    assert decades.words_cover() == 0
+
+
+def test_without_images_the_axes_are_as_at_the_beginning(qtbot: QtBot) -> None:
+    plot = shown(qtbot, TracePlot(Axes("Misfit / px"), [Curve("misfit_px")]))
+    before = plot.ranges()
+    plot.set_data(np.arange(20.0, 80.0), np.linspace(3.0, 9.0, 60))
+    assert plot.ranges() != before
+
+    plot.set_data(np.empty(0), np.empty(0))
+
+    assert plot.ranges() == before

@@ -1,0 +1,258 @@
+"""What the smaller widgets say, by word and sign as well as by colour."""
+
+import pytest
+from PySide6.QtCore import QLocale, QRectF
+from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
+from pytestqt.qtbot import QtBot
+
+from lightpen.detection.inspection import Exposure
+from lightpen_app.look.signs import Sign, draw_sign
+from lightpen_app.look.theme import DARK, TextSize, Tone
+from lightpen_app.look.words import BREAK, breakable, unbroken
+from lightpen_app.shell.notice_bar import NoticeBar
+from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.widgets.fitted_text import FittedText
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.operator_view import (
+    DISTANCES_M,
+    LEAST_SHARE,
+    OperatorValue,
+    OperatorView,
+    other_screen,
+)
+from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.state_banner import State, StateBanner
+
+
+@pytest.mark.parametrize(
+    ("peaks", "words"),
+    [
+        ((), "No LED is seen"),
+        ((0.5, 0.7, 0.9), "Good: 3 LEDs"),
+        ((0.5, 0.2, 0.1), "Too dark: 2 of 3 LEDs"),
+        ((0.1, 1.0, 0.5), "Saturated: 1 of 3 LEDs"),
+    ],
+)
+def test_the_exposure_is_judged_in_words(
+    qtbot: QtBot, peaks: tuple[float, ...], words: str
+) -> None:
+    bar = ExposureBar()
+    qtbot.addWidget(bar)
+
+    bar.set_value(Exposure(peaks))
+
+    assert bar.verdict() == words
+    assert bar.accessibleDescription() == words
+
+
+def test_what_may_be_no_led_is_not_called_one(qtbot: QtBot) -> None:
+    bar = ExposureBar()
+    qtbot.addWidget(bar)
+
+    bar.set_value(Exposure((0.5, 0.2), are_leds=False))
+
+    assert bar.verdict() == "Too dark: 1 of 2 spots"
+
+
+def test_each_led_has_a_tick_on_the_exposure_bar(qtbot: QtBot) -> None:
+    bar = ExposureBar()
+    qtbot.addWidget(bar)
+    bar.resize(402, 72)
+    bar.set_value(Exposure((0.25, 0.5, 0.75)))
+    bar.show()
+
+    image = bar.grab().toImage()
+    ticks = [x for x in range(402) if image.pixelColor(x, 30).name() == DARK.text]
+
+    assert len(ticks) == 6  # three ticks, two pixels wide
+    assert ticks[2] == pytest.approx(201, abs=1)
+
+
+def draw(sign: Sign) -> bytes:
+    image = QImage(48, 48, QImage.Format.Format_Grayscale8)
+    image.fill(0)
+    painter = QPainter(image)
+    draw_sign(painter, QRectF(0, 0, 48, 48), sign, QColor("white"))
+    painter.end()
+    return bytes(image.constBits())
+
+
+def test_no_two_signs_look_alike() -> None:
+    drawn = {sign: draw(sign) for sign in Sign}
+
+    assert len(set(drawn.values())) == len(Sign)
+    assert [sign for sign, data in drawn.items() if not any(data)] == [Sign.NONE]
+
+
+def test_a_state_has_word_sign_and_colour(qtbot: QtBot) -> None:
+    banner = StateBanner(TextSize.DISPLAY)
+    qtbot.addWidget(banner)
+    banner.resize(600, banner.sizeHint().height())
+    banner.show()
+
+    banner.set_value(State("PAUSED", "The pen was lifted.", Sign.PAUSE, Tone.WARN))
+    image = banner.grab().toImage()
+
+    assert banner.accessibleName() == "PAUSED"
+    assert banner.accessibleDescription() == "The pen was lifted."
+    assert image.pixelColor(300, 4).name() == DARK.warn
+    sign = {image.pixelColor(x, banner.height() // 2).name() for x in range(16, 64)}
+    assert {DARK.warn, DARK.on_warn} <= sign
+
+
+def test_long_words_shrink_until_they_fit(qtbot: QtBot) -> None:
+    text = FittedText(86)
+    qtbot.addWidget(text)
+    text.resize(600, 120)
+
+    text.set_text("Lean right")
+    short = text.size_px()
+    text.set_text("Lean the pen much further towards the camera and to your right")
+    long = text.size_px()
+
+    assert short == 86
+    assert 20 < long < 60
+
+
+def test_a_notice_hides_once_it_is_read(qtbot: QtBot) -> None:
+    notice = NoticeBar()
+    qtbot.addWidget(notice)
+
+    notice.show_text("The file holds no LED.")
+    assert notice.isVisible()
+    notice.clear()
+
+    assert notice.text() == ""
+    assert not notice.isVisible()
+
+
+def test_a_number_has_a_decimal_point_in_every_country(qtbot: QtBot) -> None:
+    QLocale.setDefault(QLocale(QLocale.Language.German))
+    field = NumberField("mm", (0, 50), 3)
+    qtbot.addWidget(field)
+
+    field.setValue(2.5)
+
+    assert field.text() == "2.500 mm"
+
+
+@pytest.fixture
+def view(qtbot: QtBot) -> OperatorView:
+    view = OperatorView()
+    qtbot.addWidget(view)
+    view.resize(1920, 1080)
+    return view
+
+
+def test_letters_of_the_operator_view_grow_with_the_distance(
+    view: OperatorView,
+) -> None:
+    sizes = []
+    for distance in DISTANCES_M:
+        view.set_distance_m(distance)
+        sizes.append(view.letters())
+
+    assert sizes == sorted(set(sizes))
+    assert sizes[-1] == pytest.approx(6 * sizes[0], rel=0.02)
+
+
+@pytest.mark.parametrize("distance", DISTANCES_M)
+def test_an_instruction_has_the_size_that_the_distance_asks_for(
+    view: OperatorView, distance: float
+) -> None:
+    view.set_distance_m(distance)
+    view.set_value(
+        OperatorValue(
+            instruction="Lean RIGHT",
+            hint="Further down.",
+            state=State("CAPTURING", "All 10 LEDs are seen.", Sign.RECORD, Tone.GOOD),
+            count="184 / 300",
+            fraction=0.6,
+            dial=DialValue(),
+        )
+    )
+    view.show()
+
+    assert view.instruction_px() >= view.letters()
+
+
+@pytest.mark.parametrize("dial", [DialValue(), None])
+@pytest.mark.parametrize("distance", DISTANCES_M)
+def test_the_count_is_read_on_a_small_screen_too(
+    view: OperatorView, distance: float, dial: DialValue | None
+) -> None:
+    view.resize(960, 540)
+    view.set_distance_m(distance)
+    view.set_value(
+        OperatorValue(
+            instruction="Lean right",
+            hint="Far. Keep the tip pressed in.",
+            state=State("CAPTURING", "10 of 10 LEDs.", Sign.RECORD, Tone.GOOD),
+            count="60 of about 300",
+            fraction=0.2,
+            dial=dial,
+        )
+    )
+    view.show()
+
+    assert view.count_px() >= LEAST_SHARE * view.height()
+
+
+def test_the_operator_view_fits_every_screen_at_every_distance(
+    view: OperatorView,
+) -> None:
+    view.set_value(OperatorValue(instruction="Lean right", dial=DialValue()))
+
+    for distance in DISTANCES_M:
+        view.set_distance_m(distance)
+        view.resize(1280, 720)
+        least = view.minimumSizeHint()
+        assert least.width() <= 1280
+        assert least.height() <= 720
+
+
+def test_what_there_is_no_value_for_is_not_drawn(view: OperatorView) -> None:
+    view.set_value(OperatorValue(instruction="Show the pen"))
+    view.show()
+    before = view.grab().toImage()
+
+    view.set_value(OperatorValue(instruction="Show the pen", fraction=0.5))
+
+    assert view.grab().toImage() != before
+
+
+def test_the_operator_view_takes_another_screen_only_if_there_is_one() -> None:
+    (screen,) = QGuiApplication.screens()
+
+    assert other_screen(screen, [screen]) is screen
+    second = object()
+    assert other_screen(screen, [screen, second]) is second  # type: ignore[list-item]
+
+
+LONG_WORDS = (
+    'It begins with "led,x_mm,y_mm,z_mm\\n1,0.00023,-0.00035,-3.1,0.0021,-12.5".',
+    "/home/operator/calibration/stations/hall_2/camera_left_intrinsics.yaml",
+    "x" * 200,
+)
+
+
+@pytest.mark.parametrize("text", LONG_WORDS)
+def test_a_remark_with_a_long_word_needs_no_wide_place(qtbot: QtBot, text: str) -> None:
+    label = SignLabel()
+    qtbot.addWidget(label)
+
+    label.set_value(Remark(text))
+
+    assert label.minimumSizeHint().width() < 280
+    assert label.value().text == label.accessibleName() == text
+
+
+@pytest.mark.parametrize("text", LONG_WORDS)
+def test_a_text_that_may_be_parted_is_the_same_text(text: str) -> None:
+    assert breakable(text) != text
+    assert unbroken(breakable(text)) == text
+
+
+def test_words_of_a_usual_length_are_not_parted() -> None:
+    assert BREAK not in breakable("Open the intrinsics file camera.yaml, 0.25 px.")

@@ -1,0 +1,114 @@
+"""A job ends with one outcome, stops when cancelled, and outlives no window."""
+
+import time
+from threading import Event
+
+import pytest
+from PySide6.QtCore import QThread, QThreadPool
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from lightpen.errors import CalibrationError
+from lightpen_app.work.job import Job, Report
+
+
+def endless(report: Report) -> None:
+    """Report until cancelled."""
+    while True:
+        time.sleep(0.001)
+        report(0.5)
+
+
+def test_the_result_arrives_on_the_gui_thread(qtbot: QtBot) -> None:
+    job = Job(lambda report: 42)
+    seen: list[tuple[object, bool]] = []
+    job.succeeded.connect(
+        lambda value: seen.append((value, QThread.currentThread().isMainThread()))
+    )
+
+    with qtbot.waitSignal(job.succeeded):
+        job.start()
+
+    assert seen == [(42, True)]
+
+
+def test_a_failure_carries_the_text_for_the_user(qtbot: QtBot) -> None:
+    def refuse(report: Report) -> None:
+        raise CalibrationError("Tilt the pen further.")
+
+    job = Job(refuse)
+    with qtbot.waitSignal(job.failed) as blocker:
+        job.start()
+
+    assert blocker.args == ["Tilt the pen further."]
+
+
+def test_a_cancelled_job_stops_and_tells_only_that_it_ended(qtbot: QtBot) -> None:
+    job = Job(endless)
+    with qtbot.waitSignal(job.progressed):
+        job.start()
+
+    with (
+        qtbot.assertNotEmitted(job.succeeded),
+        qtbot.assertNotEmitted(job.failed),
+        qtbot.waitSignal(job.ended),
+    ):
+        job.cancel()
+
+    assert QThreadPool.globalInstance().waitForDone(2000)
+
+
+def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
+    done = Event()
+
+    def finish(report: Report) -> int:
+        done.set()
+        return 42
+
+    job = Job(finish)
+    with qtbot.assertNotEmitted(job.succeeded):
+        job.start()
+        assert done.wait(2)
+        assert QThreadPool.globalInstance().waitForDone(2000)
+        job.cancel()  # the result waits in the event queue of this thread
+        QApplication.processEvents()
+
+
+def test_a_job_that_is_cancelled_before_its_turn_does_nothing(qtbot: QtBot) -> None:
+    n_threads = QThreadPool.globalInstance().maxThreadCount()
+    may_end, done = Event(), Event()
+    others = [Job(lambda report: may_end.wait(10)) for _ in range(n_threads)]
+    for other in others:
+        other.start()
+    job = Job(lambda report: done.set())
+    job.start()
+    job.cancel()
+    with qtbot.waitSignal(job.ended):
+        may_end.set()
+
+    assert not done.is_set()
+
+
+def test_a_job_that_ended_deletes_itself(qtbot: QtBot) -> None:
+    job = Job(lambda report: 42)
+    with qtbot.waitSignal(job.destroyed):
+        job.start()
+
+
+def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr(
+        "sys.excepthook", lambda kind, error, trace: caught.append(error)
+    )
+    job = Job(lambda report: 1 / 0)
+    seen: list[bool] = []
+    job.crashed.connect(lambda: seen.append(QThread.currentThread().isMainThread()))
+
+    with qtbot.assertNotEmitted(job.succeeded), qtbot.waitSignal(job.ended):
+        job.start()
+
+    assert seen == [True]
+    assert QThreadPool.globalInstance().waitForDone(2000)
+    assert isinstance(caught[0], ZeroDivisionError)

@@ -1,0 +1,416 @@
+"""What is chosen at a station is in force at once, and there again the next time."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from lightpen.arrays import FloatArray
+from lightpen.cameras.worker import Connection
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
+from lightpen.live.preparation import (
+    CameraFile,
+    Lack,
+    PenFile,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.writing import encode_png
+from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.workbench import SAMPLES, Workbench
+
+OTHER = Names("Hall 3", "Bo", "LP-05", "T-11", "C-2", 6.0)
+MASK = np.array([[101.25, 0.1, 12.0], [1e-3, 700.0, 1 / 3]])
+
+
+class Stage:
+    """A workbench that can be left and taken up again, as by another start."""
+
+    def __init__(
+        self, settings: Settings, folder: Path, workbench: Workbench, qtbot: QtBot
+    ) -> None:
+        self.settings, self.folder, self.workbench = settings, folder, workbench
+        self.qtbot = qtbot
+        self.sentences: list[str] = []
+
+    def choose(self, **choices: object) -> None:
+        """Choose something in place of what is chosen."""
+        self.workbench.set_preparation(
+            replace(self.workbench.preparation, **choices)  # type: ignore[arg-type]
+        )
+
+    def start_again(self) -> Preparation:
+        """Start the program anew and return what is chosen then."""
+        self.workbench.shut_down()
+        again = Settings(self.settings.file)
+        self.workbench = Workbench(again, self.folder, self.workbench.around)
+        self.workbench.troubled.connect(self.sentences.append)
+        self.workbench.start()
+        return self.workbench.preparation
+
+    def wait_for_size(self, size: tuple[int, int]) -> None:
+        self.qtbot.waitUntil(lambda: self.workbench.preparation.image_size == size)
+
+
+@pytest.fixture
+def stage(
+    settings: Settings, tmp_path: Path, workbench: Workbench, qtbot: QtBot
+) -> Iterator[Stage]:
+    stage = Stage(settings, tmp_path / "data", workbench, qtbot)
+    workbench.troubled.connect(stage.sentences.append)
+    yield stage
+    stage.workbench.shut_down()
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """A folder with an image of 80 x 60 px."""
+    folder = tmp_path / "recorded, on a Monday"
+    folder.mkdir()
+    image = np.zeros((60, 80), np.uint8)
+    (folder / "1.png").write_bytes(encode_png(image))
+    return folder
+
+
+# What is remembered
+
+
+def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) -> None:
+    before = stage.workbench.preparation
+    stage.choose(
+        nominal_tip=np.array([0.1, -90.0, 1 / 3]),
+        mask=MASK,
+        limits=SwingLimits(max_uncertainty=0.007, min_images=11, max_images=99),
+    )
+    now = stage.start_again()
+
+    assert now.names == before.names
+    assert now.source == before.source
+    assert now.nominal_tip is not None
+    assert now.nominal_tip.tolist() == [0.1, -90.0, 1 / 3]
+    np.testing.assert_array_equal(now.mask, MASK)
+    assert now.limits == SwingLimits(0.007, 11, 99)
+    assert now.camera_file is not None
+    assert before.camera_file is not None
+    assert now.camera_file.path == before.camera_file.path
+    assert now.pen_file is not None
+    assert before.pen_file is not None
+    assert now.pen_file.path == before.pen_file.path
+    assert now.start_lacks() == now.leds_lacks() == ()
+    assert stage.sentences == []
+
+
+@pytest.mark.parametrize(
+    "mask",
+    [np.zeros((0, 3)), MASK[:1], MASK, MASK / 3],
+    ids=["none", "one", "two", "odd numbers"],
+)
+def test_a_mask_comes_back_to_the_last_digit(stage: Stage, mask: FloatArray) -> None:
+    stage.choose(mask=mask)
+    np.testing.assert_array_equal(stage.start_again().mask, mask)
+
+
+def test_the_units_of_a_pen_file_that_does_not_say_are_remembered(
+    stage: Stage, tmp_path: Path
+) -> None:
+    pen = stage.workbench.preparation.pen
+    assert pen is not None
+    path = tmp_path / "leds.csv"
+    rows = [f"{i + 1},{x},{y},{z}" for i, (x, y, z) in enumerate(pen.leds / 10)]
+    path.write_text("\n".join(["led,x,y,z", *rows]))
+    stage.choose(pen_file=PenFile.read(path, "cm"))
+    now = stage.start_again()
+
+    assert now.pen_file is not None
+    assert now.pen_file.units == "cm"
+    assert now.pen is not None
+    np.testing.assert_allclose(now.pen.leds, pen.leds, atol=1e-9)
+
+
+def test_each_station_has_choices_of_its_own(stage: Stage) -> None:
+    first = stage.workbench.preparation
+    stage.choose(names=OTHER, mask=MASK)
+    stage.workbench.choose_station(first.names.station)
+    assert stage.workbench.preparation.names == first.names
+    assert len(stage.workbench.preparation.mask) == 0
+
+    stage.workbench.choose_station(OTHER.station)
+    assert stage.workbench.preparation.names == OTHER
+    np.testing.assert_array_equal(stage.workbench.preparation.mask, MASK)
+    assert set(stage.workbench.stations()) == {first.names.station, OTHER.station}
+    assert stage.start_again().names == OTHER
+
+
+def test_without_a_station_nothing_is_remembered(stage: Stage) -> None:
+    stage.choose(names=replace(OTHER, station=""))
+
+    assert stage.workbench.stations() == ("Hall 2",)
+
+
+def test_a_first_start_has_the_files_of_the_simulated_pen(
+    tmp_path: Path, workbench: Workbench, qtbot: QtBot
+) -> None:
+    settings = Settings(tmp_path / "new" / "lightpen.ini")
+    first = Workbench(settings, tmp_path / "new data", workbench.around)
+    first.start()
+    now = first.preparation
+
+    assert now.names == Names()
+    assert now.camera is not None
+    assert (now.camera.width, now.camera.height) == (1224, 1024)
+    assert now.leds_lacks() == ()
+    assert (tmp_path / "new data" / SAMPLES).is_dir()
+    qtbot.waitUntil(lambda: first.preparation.camera_lacks() == ())
+    first.shut_down()
+
+
+# Files
+
+
+def test_a_file_that_cannot_be_read_is_told_and_must_be_chosen_again(
+    stage: Stage,
+) -> None:
+    pen_file = stage.workbench.preparation.pen_file
+    assert pen_file is not None
+    pen_file.path.write_text("led 1 is here")
+    now = stage.start_again()
+
+    assert now.pen_file is None
+    assert now.camera_file is not None
+    assert now.leds_lacks() == (Lack.PEN_FILE,)
+    assert len(stage.sentences) == 1
+    assert "pen.json" in stage.sentences[0]
+
+
+def test_files_that_are_gone_are_told_one_by_one(
+    stage: Stage, tmp_path: Path, recording: Path
+) -> None:
+    source = SourceChoice(SourceKind.RECORDED, str(recording))
+    stage.choose(source=source)
+    shutil.rmtree(stage.folder / SAMPLES)
+    now = stage.start_again()
+
+    assert (now.camera_file, now.pen_file) == (None, None)
+    assert ["does not exist" in sentence for sentence in stage.sentences] == [True] * 2
+
+
+def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> None:
+    now = stage.workbench.preparation
+    assert now.camera_file is not None
+    assert now.pen_file is not None
+    scene = stage.workbench.around.scene
+    camera = read_camera(now.camera_file.path)
+
+    assert camera.fx == pytest.approx(scene.camera.fx)
+    np.testing.assert_allclose(read_pen(now.pen_file.path).leds, scene.pen.leds)
+
+
+def test_sample_files_that_cannot_be_written_are_told(
+    tmp_path: Path, workbench: Workbench
+) -> None:
+    (tmp_path / "a file").write_text("")
+    settings = Settings(tmp_path / "new.ini")
+    first = Workbench(settings, tmp_path / "a file", workbench.around)
+    sentences: list[str] = []
+    first.troubled.connect(sentences.append)
+    first.start()
+    first.shut_down()
+
+    assert first.preparation.camera_file is None
+    assert "a file" in sentences[0]
+
+
+def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
+    stage: Stage,
+) -> None:
+    shutil.rmtree(stage.settings.file.parent)
+    stage.settings.file.parent.write_text("not a folder")
+    stage.choose(names=OTHER)
+
+    assert stage.workbench.preparation.names == OTHER
+    assert "The settings cannot be saved" in stage.sentences[0]
+
+
+@pytest.mark.parametrize(
+    "station",
+    [
+        Station(source="a camera of a later version"),
+        Station(mask="1 2; x y z; 1 2 3 4; ; 5 6 inf"),
+        Station(nominal_tip="1 2"),
+        Station(camera_file="", pen_file=""),
+        Station(min_images=-5, max_images=0),
+        Station(max_uncertainty=-1.0),
+    ],
+)
+def test_settings_that_make_no_sense_are_passed_over(
+    stage: Stage, station: Station
+) -> None:
+    stage.settings.set_station("Hall 4", station)
+    stage.workbench.choose_station("Hall 4")
+    now = stage.workbench.preparation
+
+    assert now.source == SourceChoice()
+    assert now.limits == SwingLimits()
+    assert now.mask.shape == (0, 3)
+    assert now.nominal_tip is None
+    assert (now.camera_file, now.pen_file) == (None, None)
+
+
+# The camera
+
+
+def test_the_size_of_the_images_is_known_as_soon_as_they_come(stage: Stage) -> None:
+    assert stage.workbench.preparation.camera_lacks() == (Lack.IMAGES,)
+    stage.workbench.open_camera()
+    with stage.qtbot.waitSignal(stage.workbench.changed):
+        pass
+
+    assert stage.workbench.preparation.image_size == (1224, 1024)
+    assert stage.workbench.preparation.lacks() == ()
+
+
+def test_choosing_before_the_start_opens_no_camera(
+    stage: Stage, recording: Path
+) -> None:
+    stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
+
+    assert not stage.workbench.live.is_open
+
+
+def test_another_source_is_opened_at_once(stage: Stage, recording: Path) -> None:
+    stage.workbench.open_camera()
+    stage.wait_for_size((1224, 1024))
+    stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
+    assert stage.workbench.preparation.image_size is None
+    stage.wait_for_size((80, 60))
+    assert stage.workbench.preparation.camera_lacks() == (Lack.IMAGE_SIZE,)
+
+    stage.choose(source=SourceChoice())
+    stage.wait_for_size((1224, 1024))
+    assert stage.workbench.preparation.camera_lacks() == ()
+
+
+def test_a_recording_is_opened_when_its_place_is_named(
+    stage: Stage, recording: Path
+) -> None:
+    stage.workbench.open_camera()
+    stage.choose(source=SourceChoice(SourceKind.RECORDED))
+    assert not stage.workbench.live.is_open
+    assert stage.workbench.preparation.camera_lacks() == (Lack.SOURCE_PLACE,)
+    stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
+
+    stage.wait_for_size((80, 60))
+
+
+def test_the_same_source_stays_open(stage: Stage) -> None:
+    stage.workbench.open_camera()
+    stage.wait_for_size((1224, 1024))
+    before = stage.workbench.live.stats.delivered
+    stage.choose(names=OTHER, mask=MASK)
+
+    assert stage.workbench.live.connection is Connection.STREAMING
+    assert stage.workbench.live.stats.delivered >= before > 0
+    assert stage.workbench.preparation.image_size == (1224, 1024)
+
+
+def test_a_source_that_is_not_there_is_told_and_can_be_tried_again(
+    stage: Stage, recording: Path
+) -> None:
+    moved = recording.rename(recording.with_name("moved"))
+    stage.workbench.open_camera()
+    stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
+    stage.qtbot.waitUntil(lambda: len(stage.sentences) == 1)
+    assert "There is no folder, video or image at" in stage.sentences[0]
+    moved.rename(recording)
+    stage.workbench.open_camera()
+
+    stage.wait_for_size((80, 60))
+
+
+def test_what_is_chosen_is_looked_for_in_the_images(stage: Stage) -> None:
+    stage.workbench.open_camera()
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.image_shown,
+        check_params_cb=lambda shown: shown.seen.sighting is not None,
+    ):
+        pass
+    stage.choose(pen_file=None)
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.image_shown,
+        check_params_cb=lambda shown: shown.seen.sighting is None,
+    ):
+        pass
+
+
+def test_exposure_and_gain_come_back_with_their_station(stage: Stage) -> None:
+    stage.workbench.open_camera()
+    set_camera(stage, 500.0, 6.0)
+    stage.choose(names=OTHER)
+    set_camera(stage, 800.0, 0.0)
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.settings_applied,
+        check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (500.0, 6.0),
+    ):
+        stage.workbench.choose_station("Hall 2")
+    stage.start_again()
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.settings_applied,
+        check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (500.0, 6.0),
+    ):
+        pass
+
+
+def set_camera(stage: Stage, exposure_us: float, gain_db: float) -> None:
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.settings_applied,
+        check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (exposure_us, gain_db),
+    ):
+        stage.workbench.live.set_exposure(exposure_us)
+        stage.workbench.live.set_gain(gain_db)
+
+
+def test_a_recording_does_not_forget_the_exposure(
+    stage: Stage, recording: Path
+) -> None:
+    stage.workbench.open_camera()
+    set_camera(stage, 500.0, 6.0)
+    stage.choose(source=SourceChoice(SourceKind.RECORDED, str(recording)))
+    stage.wait_for_size((80, 60))
+    with stage.qtbot.waitSignal(
+        stage.workbench.live.settings_applied,
+        check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (500.0, 6.0),
+    ):
+        stage.choose(source=SourceChoice())
+
+
+# Results and records
+
+
+def test_a_swing_of_a_recorded_source_finds_its_images(
+    stage: Stage, swung: Callable[..., Path]
+) -> None:
+    stage.choose(
+        source=SourceChoice(SourceKind.RECORDED, str(swung())),
+        camera_file=CameraFile.read(swung() / "camera.yaml"),
+    )
+    stage.workbench.open_camera()
+    stage.wait_for_size((1224, 1024))
+    stage.workbench.run.begin(stage.workbench.preparation)
+    run = stage.workbench.run
+    stage.qtbot.waitUntil(lambda: run.state is not None and run.state.n_kept >= 3)
+
+
+def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:
+    stage.workbench.open_camera()
+    stage.workbench.shut_down()
+    stage.workbench.shut_down()
+
+    assert not stage.workbench.live.is_open

@@ -1,0 +1,304 @@
+"""What every source of images promises, tried on each of them."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import (
+    Backend,
+    CameraSettings,
+    ConfigError,
+    FrameTimeout,
+    ImageCamera,
+)
+from lightpen.cameras.replay import ReplayBackend, ReplayCamera
+from lightpen.cameras.worker import (
+    CameraWorker,
+    Connection,
+    ConnectionChanged,
+    WorkerEvent,
+)
+from lightpen.model.camera import Camera
+from lightpen.simulator.camera import SimulatedBackend, SimulatedCamera
+from lightpen.simulator.scenes import Scene
+
+SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)
+N_RECORDED = 12
+TIMEOUT = 5.0  # s, far above the period of every source
+SLACK = 2.0  # s that a busy machine may add
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of images under test, and how to make one of it."""
+
+    name: str
+    make: Callable[[Path], ImageCamera]
+
+
+def simulated(_: Path) -> ImageCamera:
+    return SimulatedCamera(Scene(camera=SMALL))
+
+
+def simulated_without_waiting(_: Path) -> ImageCamera:
+    return SimulatedCamera(Scene(camera=SMALL), SkippingClock())
+
+
+def replayed_folder(folder: Path) -> ImageCamera:
+    for i in range(N_RECORDED):
+        image = np.full((SMALL.height, SMALL.width), i, np.uint8)
+        cv2.imwrite(str(folder / f"frame_{i}.png"), image)
+    return ReplayCamera(str(folder), frame_rate=200)
+
+
+def replayed_video(folder: Path) -> ImageCamera:
+    path = folder / "swing.avi"
+    fourcc = cv2.VideoWriter.fourcc(*"MJPG")
+    video = cv2.VideoWriter(str(path), fourcc, 20, (SMALL.width, SMALL.height))
+    for i in range(N_RECORDED):
+        video.write(np.full((SMALL.height, SMALL.width, 3), 20 * i, np.uint8))
+    video.release()
+    return ReplayCamera(str(path), frame_rate=200)
+
+
+SOURCES = (
+    Source("simulated", simulated),
+    Source("simulated, without waiting", simulated_without_waiting),
+    Source("replayed folder", replayed_folder),
+    Source("replayed video", replayed_video),
+)
+BACKENDS: tuple[Backend, ...] = (SimulatedBackend(), ReplayBackend())
+
+
+@pytest.fixture(params=SOURCES, ids=lambda source: source.name)
+def camera(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ImageCamera]:
+    source: Source = request.param
+    camera = source.make(tmp_path)
+    yield camera
+    camera.close()
+
+
+@pytest.fixture
+def streaming(camera: ImageCamera) -> ImageCamera:
+    camera.open()
+    camera.start()
+    return camera
+
+
+def read_two(camera: ImageCamera, timeout_s: float) -> None:
+    for _ in range(2):
+        camera.read(timeout_s)
+
+
+def test_opening_and_closing_twice_is_as_once(camera: ImageCamera) -> None:
+    camera.close()
+    camera.open()
+    camera.open()
+    camera.start()
+    camera.close()
+    camera.close()
+
+
+def test_starting_and_stopping_twice_is_as_once(streaming: ImageCamera) -> None:
+    streaming.start()
+    streaming.read(TIMEOUT)
+    streaming.stop()
+    streaming.stop()
+    with pytest.raises(ValueError, match="start"):
+        streaming.read(TIMEOUT)
+
+
+def test_a_closed_camera_refuses_to_work(camera: ImageCamera) -> None:
+    for call in (camera.start, camera.probe, lambda: camera.caps):
+        with pytest.raises(ValueError, match="open"):
+            call()
+    with pytest.raises(ValueError, match=r"open|start"):
+        camera.read(TIMEOUT)
+
+
+def test_each_frame_is_memory_of_its_own_that_nobody_can_change(
+    streaming: ImageCamera,
+) -> None:
+    one, other = streaming.read(TIMEOUT), streaming.read(TIMEOUT)
+
+    assert not np.shares_memory(one.image, other.image)
+    with pytest.raises(ValueError, match="read-only"):
+        one.image[0, 0] = 1
+
+
+def test_frames_are_as_the_camera_says(streaming: ImageCamera) -> None:
+    caps, frame = streaming.caps, streaming.read(TIMEOUT)
+
+    assert frame.image.shape == (caps.height, caps.width)
+    assert frame.pixel_format in caps.pixel_formats
+    assert frame.image.itemsize == (1 if frame.bits == 8 else 2)
+    assert (frame.device_ts_ns is not None) == caps.has_timestamps
+    assert (frame.exposure_us is not None) == (caps.exposure_us is not None)
+
+
+def test_numbers_and_times_ascend_also_after_a_new_start(
+    streaming: ImageCamera,
+) -> None:
+    frames = [streaming.read(TIMEOUT) for _ in range(3)]
+    streaming.close()
+    streaming.open()
+    streaming.start()
+    frames += [streaming.read(TIMEOUT) for _ in range(3)]
+
+    assert (np.diff([frame.seq for frame in frames]) > 0).all()
+    assert (np.diff([frame.host_ts_ns for frame in frames]) >= 0).all()
+
+
+def test_every_frame_is_counted(streaming: ImageCamera) -> None:
+    before = streaming.stats()
+    frames = [streaming.read(TIMEOUT) for _ in range(4)]
+    since = streaming.stats().since(before)
+
+    assert since.delivered == 4
+    assert since.incomplete == since.skipped == since.timeouts == 0
+    assert since.missed >= frames[-1].seq - frames[0].seq - 3
+
+
+def test_waiting_for_a_frame_ends_when_it_should_and_is_counted(
+    camera: ImageCamera,
+) -> None:
+    camera.open()
+    if camera.caps.frame_rate is None:
+        pytest.skip("The rate of this camera cannot be set.")
+    camera.configure(CameraSettings(frame_rate=camera.caps.frame_rate.low))
+    camera.start()
+    began = time.monotonic()
+    with pytest.raises(FrameTimeout, match=r"[A-Z].*\."):
+        read_two(camera, 0.05)  # the first may come at once
+
+    assert time.monotonic() - began < 2 * 0.05 + SLACK
+    assert camera.stats().timeouts == 1
+
+
+def test_the_answer_to_settings_is_what_is_in_force(camera: ImageCamera) -> None:
+    camera.open()
+    caps = camera.caps
+    wanted = CameraSettings(
+        exposure_us=caps.exposure_us.high if caps.exposure_us else None,
+        gain_db=caps.gain_db.high if caps.gain_db else None,
+        frame_rate=caps.frame_rate.nearest(50) if caps.frame_rate else None,
+        pixel_format=caps.pixel_formats[-1],
+    )
+    assert camera.configure(wanted) == wanted
+    assert camera.configure(CameraSettings()) == wanted  # None leaves it
+    camera.start()
+    assert camera.read(TIMEOUT).pixel_format == wanted.pixel_format
+
+
+def test_settings_out_of_range_are_brought_into_it(camera: ImageCamera) -> None:
+    camera.open()
+    caps = camera.caps
+    highest = camera.configure(CameraSettings(1e12, 1e12, 1e12))
+    lowest = camera.configure(CameraSettings(-1e12, -1e12, -1e12))
+
+    for name in ("exposure_us", "gain_db", "frame_rate"):
+        offered = getattr(caps, name)
+        if offered is None:
+            assert getattr(highest, name) is None
+        else:
+            assert getattr(highest, name) == min(offered.high, 1e12)
+            assert getattr(lowest, name) == offered.low
+
+
+def test_a_pixel_format_that_is_not_offered_is_refused(camera: ImageCamera) -> None:
+    camera.open()
+    with pytest.raises(ConfigError, match="BayerRG8"):
+        camera.configure(CameraSettings(pixel_format="BayerRG8"))
+
+
+def test_exposure_changes_while_images_come_or_is_refused(
+    streaming: ImageCamera,
+) -> None:
+    streaming.read(TIMEOUT)
+    if streaming.caps.exposure_us is None:
+        with pytest.raises(ConfigError, match="exposure"):
+            streaming.set_exposure(500)
+        return
+    applied = streaming.set_exposure(500)
+
+    limit = time.monotonic() + TIMEOUT
+    while streaming.read(TIMEOUT).exposure_us != applied:
+        assert time.monotonic() < limit
+    assert streaming.set_exposure(1e12) == streaming.caps.exposure_us.high
+
+
+def test_gain_changes_while_images_come_or_is_refused(streaming: ImageCamera) -> None:
+    if streaming.caps.gain_db is None:
+        with pytest.raises(ConfigError, match="gain"):
+            streaming.set_gain(6)
+        return
+    assert streaming.set_gain(1e12) == streaming.caps.gain_db.high
+    streaming.read(TIMEOUT)
+
+
+def test_a_triggered_camera_sends_one_image_a_trigger(camera: ImageCamera) -> None:
+    camera.open()
+    if not camera.caps.has_trigger:
+        with pytest.raises(ConfigError, match="trigger"):
+            camera.configure(CameraSettings(triggered=True))
+        with pytest.raises(ConfigError, match="trigger"):
+            camera.trigger()
+        return
+    assert camera.configure(CameraSettings(triggered=True)).triggered
+    camera.start()
+    with pytest.raises(FrameTimeout):
+        camera.read(0.2)
+    camera.trigger()
+    camera.read(TIMEOUT)
+    with pytest.raises(FrameTimeout):
+        camera.read(0.2)
+
+
+def test_a_free_running_camera_refuses_the_trigger(streaming: ImageCamera) -> None:
+    with pytest.raises(ConfigError, match="trigger"):
+        streaming.trigger()
+
+
+def test_a_sound_camera_answers_the_probe(streaming: ImageCamera) -> None:
+    streaming.probe()
+    streaming.read(TIMEOUT)
+    streaming.probe()
+
+
+def test_a_worker_runs_the_camera_and_closes_it(camera: ImageCamera) -> None:
+    events: list[WorkerEvent] = []
+    closed = Event()
+
+    def note(event: WorkerEvent) -> None:
+        events.append(event)
+        if event == ConnectionChanged(Connection.CLOSED):
+            closed.set()
+
+    worker = CameraWorker(camera, CameraSettings(), note)
+    worker.measure(True)
+    worker.start()
+    frames = [worker.next_frame(TIMEOUT) for _ in range(5)]
+    worker.stop()
+
+    assert closed.is_set()
+    assert (np.diff([frame.seq for frame in frames]) > 0).all()
+    with pytest.raises(ValueError, match="open"):
+        camera.probe()
+
+
+@pytest.mark.parametrize("backend", BACKENDS, ids=lambda backend: backend.name)
+def test_a_backend_opens_what_it_discovers(backend: Backend) -> None:
+    assert backend.available() is None
+    for device in backend.discover():
+        assert device.backend == backend.name
+        camera = backend.camera(device.serial)
+        assert camera.serial == device.serial
+        camera.open()
+        camera.close()

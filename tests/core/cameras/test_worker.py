@@ -1,0 +1,703 @@
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from typing_extensions import override
+
+from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
+from lightpen.cameras.frame_box import FrameBox, FrameQueue
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    ConfigError,
+    DeviceBusy,
+    DeviceLost,
+    DeviceNotFound,
+    EndOfImages,
+    Frame,
+    FrameIncomplete,
+    FramesSkipped,
+    FrameTimeout,
+    ImageCamera,
+    Stats,
+    own_image,
+)
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.cameras.worker import (
+    CameraWorker,
+    Connection,
+    ConnectionChanged,
+    Ended,
+    Failed,
+    FrameReady,
+    SettingsApplied,
+    Troubled,
+    WorkerEvent,
+    is_too_slow,
+)
+from lightpen.model.camera import Camera
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.hand import Operator
+from lightpen.simulator.scenes import Scene
+
+SCENE = Scene(camera=Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43))
+TIMEOUT = 20.0  # s until a test gives up
+N_IMAGES = 40
+
+
+class Events:
+    """Takes the events of a worker and lets a test wait for one."""
+
+    def __init__(self) -> None:
+        self.all: list[WorkerEvent] = []
+        self._changed = threading.Condition()
+
+    def __call__(self, event: WorkerEvent) -> None:
+        with self._changed:
+            self.all.append(event)
+            self._changed.notify_all()
+
+    def wait_for(self, is_wanted: Callable[[WorkerEvent], bool], after: int = 0) -> int:
+        """Return the index of the first such event from ``after`` on."""
+
+        def index() -> int | None:
+            events = list(enumerate(self.all))[after:]
+            return next((i for i, event in events if is_wanted(event)), None)
+
+        with self._changed:
+            assert self._changed.wait_for(lambda: index() is not None, TIMEOUT), (
+                f"Only {self.all[after:]} came."
+            )
+            found = index()
+            assert found is not None
+            return found
+
+    def connections(self) -> list[Connection]:
+        with self._changed:
+            changes = [e for e in self.all if isinstance(e, ConnectionChanged)]
+        return [change.connection for change in changes]
+
+    def troubles(self, kind: type[Exception]) -> list[str]:
+        with self._changed:
+            troubles = [e for e in self.all if isinstance(e, Troubled | Failed)]
+        return [str(e.error) for e in troubles if isinstance(e.error, kind)]
+
+
+class SpiedCamera(SimulatedCamera):
+    """Notes who calls it, and when it is opened."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__(SCENE, clock, Operator(clock, seated=True))
+        self.clock = clock
+        self.threads: set[int] = set()
+        self.opened_at: list[float] = []
+        self.n_opened = threading.Semaphore(0)
+
+    def note(self) -> None:
+        self.threads.add(threading.get_ident())
+
+    @override
+    def open(self) -> None:
+        self.note()
+        self.opened_at.append(self.clock.now_ns() * 1e-9)
+        self.n_opened.release()
+        super().open()
+
+    @override
+    def close(self) -> None:
+        self.note()
+        super().close()
+
+    @override
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        self.note()
+        return super().configure(settings)
+
+    @override
+    def set_exposure(self, exposure_us: float) -> float:
+        self.note()
+        return super().set_exposure(exposure_us)
+
+    @override
+    def set_gain(self, gain_db: float) -> float:
+        self.note()
+        return super().set_gain(gain_db)
+
+    @override
+    def start(self) -> None:
+        self.note()
+        super().start()
+
+    @override
+    def stop(self) -> None:
+        self.note()
+        super().stop()
+
+    @override
+    def read(self, timeout_s: float) -> Frame:
+        self.note()
+        return super().read(timeout_s)
+
+    @override
+    def trigger(self) -> None:
+        self.note()
+        super().trigger()
+
+    @override
+    def probe(self) -> None:
+        self.note()
+        super().probe()
+
+    @override
+    def stats(self) -> Stats:
+        self.note()
+        return super().stats()
+
+
+class HungCamera(SimulatedCamera):
+    """Does not come back from a read until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__(SCENE)
+        self.reads = threading.Event()
+        self.let_go = threading.Event()
+
+    @override
+    def read(self, timeout_s: float) -> Frame:
+        self.reads.set()
+        self.let_go.wait(TIMEOUT)
+        return super().read(timeout_s)
+
+
+class Workbench:
+    """A worker that runs a camera, with what it tells."""
+
+    def __init__(
+        self,
+        camera: ImageCamera,
+        clock: Clock,
+        settings: CameraSettings,
+        n_queued: int,
+    ) -> None:
+        self.camera = camera
+        self.events = Events()
+        self.worker = CameraWorker(
+            camera, settings, self.events, clock=clock, n_queued=n_queued
+        )
+
+    def wait_until(self, connection: Connection, after: int = 0) -> int:
+        return self.events.wait_for(
+            lambda event: event == ConnectionChanged(connection), after
+        )
+
+    def wait_for(self, kind: type[WorkerEvent], after: int = 0) -> int:
+        return self.events.wait_for(lambda event: isinstance(event, kind), after)
+
+    def wait_for_trouble(self, kind: type[Exception]) -> int:
+        return self.events.wait_for(
+            lambda e: isinstance(e, Troubled | Failed) and isinstance(e.error, kind)
+        )
+
+    def wait_for_frames(self, n_frames: int) -> None:
+        goal = self.worker.stats.delivered + n_frames
+        enough = threading.Event()
+        for _ in range(round(TIMEOUT / 0.005)):
+            if self.worker.stats.delivered >= goal:
+                return
+            enough.wait(0.005)
+        pytest.fail(f"Only {self.worker.stats} came.")
+
+
+class Benches:
+    """Makes benches and stops their workers."""
+
+    def __init__(self) -> None:
+        self._made: list[Workbench] = []
+
+    def make(
+        self,
+        camera: ImageCamera,
+        clock: Clock | None = None,
+        settings: CameraSettings | None = None,
+        n_queued: int = 16,
+    ) -> Workbench:
+        workbench = Workbench(
+            camera, clock or MachineClock(), settings or CameraSettings(), n_queued
+        )
+        self._made.append(workbench)
+        return workbench
+
+    def spied(
+        self, settings: CameraSettings | None = None
+    ) -> tuple[Workbench, SpiedCamera]:
+        """Return a workbench with a camera whose waits take no time."""
+        clock = SkippingClock()
+        camera = SpiedCamera(clock)
+        return self.make(camera, clock, settings), camera
+
+    def live(self, frame_rate: float = 100, n_queued: int = 16) -> Workbench:
+        settings = CameraSettings(frame_rate=frame_rate)
+        return self.make(SimulatedCamera(SCENE), settings=settings, n_queued=n_queued)
+
+    def stop(self) -> None:
+        for workbench in self._made:
+            workbench.worker.stop()
+
+
+@pytest.fixture
+def benches() -> Iterator[Benches]:
+    benches = Benches()
+    yield benches
+    benches.stop()
+
+
+def frame(seq: int) -> Frame:
+    return Frame(own_image(np.zeros((2, 2), np.uint8)), seq, host_ts_ns=0)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    for i in range(N_IMAGES):
+        cv2.imwrite(str(tmp_path / f"{i}.png"), np.full((4, 4), i, np.uint8))
+    return tmp_path
+
+
+def drain(worker: CameraWorker, seconds_per_frame: float) -> list[Frame]:
+    frames = []
+    busy = threading.Event()
+    while True:
+        try:
+            frames.append(worker.next_frame(TIMEOUT))
+        except EndOfImages:
+            return frames
+        busy.wait(seconds_per_frame)
+
+
+def test_all_calls_of_the_camera_come_from_one_thread(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    workbench.worker.start()
+    workbench.worker.set_exposure(500)
+    workbench.worker.set_gain(6)
+    workbench.worker.configure(CameraSettings(triggered=True))
+    workbench.worker.trigger()
+    workbench.wait_for_frames(1)
+    camera.faults.unplug()
+    workbench.wait_until(Connection.LOST)
+    camera.faults.plug_in()
+    workbench.wait_until(
+        Connection.STREAMING, after=workbench.wait_until(Connection.LOST)
+    )
+    workbench.worker.stop()
+
+    assert len(camera.threads) == 1
+    assert threading.get_ident() not in camera.threads
+
+
+def test_the_newest_frame_waits_and_is_announced_once(benches: Benches) -> None:
+    workbench = benches.live()
+    workbench.worker.start()
+    workbench.wait_for_frames(10)
+    announced = sum(isinstance(event, FrameReady) for event in workbench.events.all)
+    newest = workbench.worker.latest()
+
+    assert announced == 1
+    assert newest is not None
+    assert newest.seq >= 9
+    workbench.wait_for(FrameReady, after=workbench.wait_for(FrameReady) + 1)
+
+
+def test_no_frame_is_shown_twice(benches: Benches, recording: Path) -> None:
+    workbench = benches.make(ReplayCamera(str(recording), frame_rate=1000))
+    workbench.worker.start()
+    workbench.wait_for(Ended)
+
+    assert workbench.worker.latest() is not None
+    assert workbench.worker.latest() is None
+
+
+def test_a_recording_waits_for_a_slow_reader_and_then_ends(
+    benches: Benches, recording: Path
+) -> None:
+    workbench = benches.make(ReplayCamera(str(recording), frame_rate=1000), n_queued=2)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    frames = drain(workbench.worker, seconds_per_frame=0.003)
+
+    assert [int(frame.image[0, 0]) for frame in frames] == list(range(N_IMAGES))
+    workbench.wait_until(Connection.CLOSED)
+    assert Ended() in workbench.events.all
+    assert workbench.worker.stats == Stats(delivered=N_IMAGES)
+
+
+def test_frames_of_a_live_camera_that_nobody_takes_in_time_are_reported(
+    benches: Benches,
+) -> None:
+    workbench = benches.live(n_queued=3)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_trouble(FramesSkipped)
+    n_skipped = workbench.worker.stats.skipped
+    workbench.wait_for_frames(5)
+    n_reported = len(workbench.events.troubles(FramesSkipped))
+    kept = [workbench.worker.next_frame(TIMEOUT).seq for _ in range(3)]
+
+    assert n_reported == 1  # not once an image
+    assert "too slow: 20 of 23 images" in workbench.events.troubles(FramesSkipped)[0]
+    assert kept == [0, 1, 2]
+    assert workbench.worker.stats.skipped >= n_skipped + 5
+
+
+def test_a_reader_that_was_held_up_once_is_not_called_slow(benches: Benches) -> None:
+    workbench = benches.live(frame_rate=30, n_queued=3)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_frames(5)
+    assert workbench.worker.stats.skipped > 0
+    for _ in range(30):
+        workbench.worker.next_frame(TIMEOUT)
+
+    assert workbench.events.troubles(FramesSkipped) == []
+
+
+@pytest.mark.parametrize(
+    ("n_missed", "n_offered", "is_slow"),
+    [(19, 20, False), (20, 36, True), (20, 400, True), (20, 401, False)],
+)
+def test_a_computer_is_slow_when_many_images_and_a_good_share_are_missed(
+    n_missed: int, n_offered: int, is_slow: bool
+) -> None:
+    assert is_too_slow(n_missed, n_offered) is is_slow
+
+
+def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
+    benches: Benches,
+) -> None:
+    workbench = benches.live(n_queued=1)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    for _ in range(3):
+        workbench.wait_for_frames(30)
+        workbench.worker.next_frame(TIMEOUT)
+    assert len(workbench.events.troubles(FramesSkipped)) == 1
+    workbench.worker.measure(False)
+    workbench.worker.measure(True)
+    workbench.wait_for_frames(30)
+
+    assert len(workbench.events.troubles(FramesSkipped)) == 2
+
+
+def test_a_recording_that_waits_for_its_reader_goes_on_when_nobody_measures(
+    benches: Benches, recording: Path
+) -> None:
+    camera = ReplayCamera(str(recording), frame_rate=1000, loops=True)
+    workbench = benches.make(camera, n_queued=2)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for(FrameReady)
+    workbench.worker.measure(False)
+    workbench.wait_for_frames(N_IMAGES)
+
+    assert len(waiting(workbench.worker)) <= 1  # one may have been on its way
+
+
+def waiting(worker: CameraWorker) -> list[Frame]:
+    frames = []
+    while True:
+        try:
+            frames.append(worker.next_frame(0.05))
+        except FrameTimeout:
+            return frames
+
+
+def test_frames_are_queued_only_while_measuring(benches: Benches) -> None:
+    workbench = benches.live(n_queued=3)
+    workbench.worker.start()
+    workbench.wait_for_frames(5)
+    with pytest.raises(FrameTimeout):
+        workbench.worker.next_frame(0.05)
+    before = workbench.worker.stats.delivered
+    workbench.worker.measure(True)
+
+    assert workbench.worker.next_frame(TIMEOUT).seq >= before
+    assert workbench.worker.stats.skipped == 0
+
+
+def test_measuring_anew_forgets_what_was_left(benches: Benches) -> None:
+    workbench = benches.live(n_queued=3)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_frames(5)
+    workbench.worker.measure(False)
+    workbench.wait_for_frames(2)
+    before = workbench.worker.stats.delivered
+    workbench.worker.measure(True)
+
+    assert workbench.worker.next_frame(TIMEOUT).seq >= before
+
+
+def test_settings_are_applied_and_told(benches: Benches) -> None:
+    workbench, _ = benches.spied(CameraSettings(exposure_us=1e9, gain_db=3))
+    workbench.worker.start()
+    first = workbench.events.all[workbench.wait_for(SettingsApplied)]
+    workbench.worker.set_gain(1e9)
+    workbench.events.wait_for(
+        lambda e: isinstance(e, SettingsApplied) and e.settings.gain_db == 24
+    )
+
+    assert isinstance(first, SettingsApplied)
+    assert first.settings.exposure_us == 50_000
+    assert first.settings.gain_db == 3
+
+
+def test_a_lost_camera_comes_back_with_its_settings(benches: Benches) -> None:
+    workbench, camera = benches.spied(CameraSettings(gain_db=3, pixel_format="Mono12"))
+    workbench.worker.start()
+    workbench.worker.set_exposure(444)
+    workbench.wait_for_frames(2)
+    camera.faults.unplug()
+    lost = workbench.wait_until(Connection.LOST)
+    before = workbench.worker.stats.delivered
+    camera.faults.plug_in()
+    workbench.wait_until(Connection.STREAMING, after=lost)
+    applied = workbench.events.all[workbench.wait_for(SettingsApplied, after=lost)]
+    workbench.wait_for_frames(2)
+
+    assert isinstance(applied, SettingsApplied)
+    assert applied.settings == CameraSettings(444, 3, 20, "Mono12")
+    assert "cable" in workbench.events.troubles(DeviceLost)[0]
+    assert workbench.worker.stats.delivered > before
+
+
+def test_attempts_to_reconnect_back_off(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    camera.faults.unplug()
+    for _ in range(7):
+        assert camera.n_opened.acquire(timeout=TIMEOUT)
+    attempts = camera.opened_at[1:7]
+
+    np.testing.assert_allclose(np.diff(attempts), [1, 2, 4, 4, 4], atol=1e-6)
+
+
+def test_a_silent_camera_that_answers_is_given_up_after_six_seconds(
+    benches: Benches,
+) -> None:
+    workbench, camera = benches.spied()
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    camera.faults.stall(1e6)
+    silent = workbench.wait_until(Connection.SILENT)
+    lost = workbench.wait_until(Connection.LOST)
+
+    assert silent < lost
+    assert "sent no image for 6 s" in workbench.events.troubles(DeviceLost)[0]
+
+
+def test_a_short_silence_is_waited_for(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    camera.faults.stall(4.0)
+    silent = workbench.wait_until(Connection.SILENT)
+    workbench.wait_until(Connection.STREAMING, after=silent)
+
+    assert Connection.LOST not in workbench.events.connections()
+    assert workbench.worker.stats.timeouts >= 3
+
+
+def test_a_slow_camera_is_not_taken_for_silent(benches: Benches) -> None:
+    workbench, _ = benches.spied(CameraSettings(frame_rate=0.1))
+    workbench.worker.start()
+    workbench.wait_for_frames(3)
+
+    changes = workbench.events.connections()
+    assert changes == [Connection.OPENING, Connection.STREAMING]
+
+
+def test_a_busy_camera_is_waited_for(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    camera.faults.occupy(3.0)
+    workbench.worker.start()
+    workbench.wait_until(Connection.STREAMING)
+
+    assert camera.opened_at[-1] == pytest.approx(3.0)
+
+
+def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    camera.faults.occupy(3600)
+    workbench.worker.start()
+    workbench.wait_until(Connection.CLOSED)
+
+    assert "Another program" in workbench.events.troubles(DeviceBusy)[0]
+    assert camera.opened_at[-1] == pytest.approx(4.0)
+
+
+def test_a_missing_camera_ends_the_worker(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    camera.faults.unplug()
+    workbench.worker.start()
+    failed = workbench.wait_for(Failed)
+    closed = workbench.wait_until(Connection.CLOSED)
+
+    assert failed < closed
+    assert "not plugged in" in workbench.events.troubles(DeviceNotFound)[0]
+    with pytest.raises(EndOfImages):
+        workbench.worker.next_frame(TIMEOUT)
+
+
+def test_impossible_settings_at_first_end_the_worker(benches: Benches) -> None:
+    workbench, _ = benches.spied(CameraSettings(pixel_format="BayerRG8"))
+    workbench.worker.start()
+    workbench.wait_until(Connection.CLOSED)
+
+    assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
+
+
+def test_impossible_settings_later_leave_those_in_force(benches: Benches) -> None:
+    workbench, _ = benches.spied(CameraSettings(gain_db=3))
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    workbench.worker.configure(CameraSettings(gain_db=6, pixel_format="BayerRG8"))
+    trouble = workbench.wait_for_trouble(ConfigError)
+    applied = workbench.events.all[workbench.wait_for(SettingsApplied, after=trouble)]
+    workbench.wait_for_frames(2)
+
+    assert isinstance(applied, SettingsApplied)
+    assert applied.settings.gain_db == 3
+
+
+def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> None:
+    workbench, camera = benches.spied()
+    camera.faults.spoil_frames(1)
+    workbench.worker.start()
+    workbench.wait_for_trouble(FrameIncomplete)
+    workbench.wait_for_frames(2)
+
+    assert workbench.worker.stats.incomplete == 1
+    assert Connection.LOST not in workbench.events.connections()
+
+
+def test_a_triggered_camera_sends_images_only_when_asked(benches: Benches) -> None:
+    workbench, _ = benches.spied(CameraSettings(triggered=True))
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_until(Connection.STREAMING)
+    with pytest.raises(FrameTimeout):
+        workbench.worker.next_frame(0.3)
+    workbench.worker.trigger()
+    workbench.worker.trigger()
+    seqs = [workbench.worker.next_frame(TIMEOUT).seq for _ in range(2)]
+    with pytest.raises(FrameTimeout):
+        workbench.worker.next_frame(0.3)
+
+    assert seqs == [0, 1]
+    assert workbench.events.connections() == [Connection.OPENING, Connection.STREAMING]
+
+
+def test_a_triggered_camera_that_is_unplugged_is_found_lost(benches: Benches) -> None:
+    camera = SimulatedCamera(SCENE)
+    workbench = benches.make(camera, settings=CameraSettings(triggered=True))
+    workbench.worker.start()
+    workbench.wait_until(Connection.STREAMING)
+    camera.faults.unplug()
+    workbench.wait_until(Connection.LOST)
+
+
+def test_new_settings_let_a_recording_begin_anew(
+    benches: Benches, recording: Path
+) -> None:
+    workbench = benches.make(
+        ReplayCamera(str(recording)), settings=CameraSettings(frame_rate=50)
+    )
+    workbench.worker.start()
+    workbench.wait_for_frames(3)
+    workbench.worker.configure(CameraSettings(frame_rate=1000))
+    workbench.wait_for(SettingsApplied, after=workbench.wait_for(SettingsApplied) + 1)
+    workbench.wait_for(Ended)
+
+    assert workbench.worker.stats.delivered > N_IMAGES
+
+
+def test_stopping_ends_a_worker_whose_reader_is_gone(
+    benches: Benches, recording: Path
+) -> None:
+    workbench = benches.make(ReplayCamera(str(recording), frame_rate=1000), n_queued=1)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for(FrameReady)
+    workbench.worker.stop(TIMEOUT)
+
+    assert workbench.events.connections()[-1] is Connection.CLOSED
+
+
+def test_stopping_ends_a_worker_that_seeks_its_camera(benches: Benches) -> None:
+    camera = SimulatedCamera(SCENE)
+    workbench = benches.make(camera, settings=CameraSettings(frame_rate=100))
+    workbench.worker.start()
+    workbench.wait_for_frames(1)
+    camera.faults.unplug()
+    workbench.wait_until(Connection.LOST)
+    workbench.worker.stop()
+
+    assert workbench.events.connections()[-1] is Connection.CLOSED
+
+
+def test_stopping_twice_or_before_the_start_does_no_harm(benches: Benches) -> None:
+    workbench = benches.live()
+    workbench.worker.stop()
+    assert workbench.events.all == []
+
+    workbench = benches.live()
+    workbench.worker.start()
+    workbench.worker.stop()
+    workbench.worker.stop()
+
+
+def test_a_camera_that_hangs_does_not_hang_the_program(benches: Benches) -> None:
+    camera = HungCamera()
+    workbench = benches.make(camera)
+    workbench.worker.start()
+    assert camera.reads.wait(TIMEOUT)
+    try:
+        with pytest.raises(DeviceLost, match="did not stop"):
+            workbench.worker.stop(timeout_s=0.1)
+    finally:
+        camera.let_go.set()
+
+
+def test_a_mailbox_tells_only_news() -> None:
+    box = FrameBox()
+    assert box.put(frame(1))
+    assert not box.put(frame(2))
+    taken = box.take()
+    assert taken is not None
+    assert taken.seq == 2
+    assert box.take() is None
+    assert box.put(frame(3))
+
+
+def test_a_queue_keeps_the_order_and_refuses_what_does_not_fit() -> None:
+    queue = FrameQueue(2)
+    assert [queue.offer(frame(seq)) for seq in range(3)] == [True, True, False]
+    assert [queue.take(0).seq for _ in range(2)] == [0, 1]
+    with pytest.raises(FrameTimeout):
+        queue.take(0)
+
+
+def test_an_ended_queue_gives_out_what_it_holds() -> None:
+    queue = FrameQueue(2)
+    queue.offer(frame(1))
+    queue.end()
+    assert not queue.offer(frame(2))
+    assert queue.take(0).seq == 1
+    with pytest.raises(EndOfImages):
+        queue.take(0)
+
+
+def test_a_queue_without_room_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least 1"):
+        FrameQueue(0)

@@ -1,0 +1,141 @@
+"""From images to observations: what is found, what is dropped and why."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.observations import (
+    Observations,
+    observe_centers,
+    observe_images,
+)
+from lightpen.detection.reasons import Reason
+from lightpen.errors import FileError
+from lightpen.formats.images import ImageSource
+from lightpen.formats.observation_files import Centers
+from lightpen.model.ellipse import ellipse_centers
+from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import leds_in_camera, paper_camera, paper_pen
+
+CAMERA = paper_camera()
+PEN = paper_pen()
+SCENE = Scene(n_images=6, seed=3)
+
+
+@pytest.fixture(scope="module")
+def plan() -> ScenePlan:
+    return plan_scene(SCENE)
+
+
+@pytest.fixture(scope="module")
+def images(plan: ScenePlan) -> list[Image]:
+    return [render_plan(SCENE, shot) for shot in plan.shots]
+
+
+def damaged() -> Image:
+    raise FileError("frame_2.png is cut off. Capture or copy it again.")
+
+
+def observe(loaders: list[Callable[[], Image]]) -> Observations:
+    def open_all() -> Iterator[Callable[[], Image]]:
+        return iter(loaders)
+
+    names = tuple(f"frame_{i}.png" for i in range(len(loaders)))
+    return observe_images(ImageSource(names, (), open_all), CAMERA, PEN)
+
+
+def loader(image: Image) -> Callable[[], Image]:
+    return lambda: image
+
+
+def true_centers(plan: ScenePlan) -> FloatArray:
+    swing = plan.swing
+    return ellipse_centers(
+        CAMERA,
+        *leds_in_camera(PEN, swing.rotations, swing.translations),
+        PEN.diameter / 2,
+    )
+
+
+def test_all_leds_of_clean_images_are_found_where_they_are(
+    plan: ScenePlan, images: list[Image]
+) -> None:
+    found = observe([loader(image) for image in images])
+    errors = found.pixels - true_centers(plan)
+
+    assert found.reasons == (Reason.NONE,) * 6
+    assert np.sqrt(np.mean(np.sum(errors**2, axis=2))) < 0.006
+    assert found.advice == ""
+
+
+def test_images_that_cannot_be_used_are_named_with_their_reason(
+    images: list[Image],
+) -> None:
+    dark = np.zeros((2048, 2448), dtype=np.uint8)
+    small = images[0][:1000]
+    smeared = np.asarray(cv2.blur(images[0], (1, 401)), dtype=np.uint8)
+    loaders = [loader(image) for image in (*images, dark, small, smeared)]
+    loaders.insert(2, damaged)
+
+    found = observe(loaders)
+
+    assert found.reasons[2] is Reason.UNREADABLE
+    assert "cut off" in found.details[2]
+    assert found.reasons[7] is Reason.EMPTY
+    assert found.reasons[8] is Reason.WRONG_SIZE
+    assert "2448 x 1000" in found.details[8]
+    assert found.reasons[9] is Reason.BLURRED
+    assert found.reasons.count(Reason.NONE) == 6
+    assert np.isnan(found.pixels[[2, 7, 8, 9]]).all()
+
+
+def test_images_of_another_camera_are_refused(images: list[Image]) -> None:
+    half = images[0][::2, ::2]
+
+    with pytest.raises(FileError, match=r"1224 x 1024.*made for 2448 x 2048"):
+        observe([loader(half)] * 3)
+
+
+def test_a_bug_in_a_thread_is_not_swallowed() -> None:
+    def broken() -> Image:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        observe([broken])
+
+
+def test_progress_ends_at_one(images: list[Image]) -> None:
+    fractions: list[float] = []
+    source = ImageSource(
+        ("a", "b"), (), lambda: iter([loader(images[0]), loader(images[1])])
+    )
+    observe_images(source, CAMERA, PEN, fractions.append, n_threads=2)
+
+    assert fractions == [0.5, 1.0]
+
+
+def test_given_centres_pass_through_and_few_leds_are_said_so(plan: ScenePlan) -> None:
+    pixels = true_centers(plan)
+    pixels[1, 3:] = np.nan
+    found = observe_centers(
+        Centers(np.arange(6) + 1, pixels, Path("centers.csv")), CAMERA, PEN
+    )
+
+    np.testing.assert_array_equal(found.pixels, pixels)
+    assert found.names[0] == "frame 1"
+    assert found.reasons[1] is Reason.TOO_FEW_LEDS
+    np.testing.assert_allclose(
+        found.translations[0], plan.swing.translations[0], atol=1.0
+    )
+
+
+def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:
+    centers = Centers(np.arange(6) + 1, 3 * true_centers(plan), Path("centers.csv"))
+
+    with pytest.raises(FileError, match="made for 2448 x 2048"):
+        observe_centers(centers, CAMERA, PEN)

@@ -1,0 +1,63 @@
+"""Each LED's fit: a displaced one is named, a good one is not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.estimation.geometry import fit_geometry
+from lightpen.estimation.joint import fit_joint
+from lightpen.estimation.led_quality import LedQuality, measure_leds
+from lightpen.model.pen import Pen
+from lightpen.simulator.swings import (
+    drop_centers,
+    paper_camera,
+    paper_pen,
+    perturbed_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = paper_pen()
+SWING = swing_poses(80, np.random.default_rng(0))
+
+
+def quality(measured: Pen, n_missing: int = 0) -> LedQuality:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels = drop_centers(pixels, n_missing, rng)
+    joint = fit_joint(
+        CAMERA, measured, pixels, SWING.rotations, SWING.tip_pen, SWING.cone_cam
+    )
+    return measure_leds(
+        CAMERA, measured, pixels, fit_geometry(CAMERA, measured, pixels, joint)
+    )
+
+
+@pytest.mark.parametrize("led", [1, 4, 7, 10])
+def test_a_displaced_led_is_named_with_its_displacement(led: int) -> None:
+    shift = np.array([0.0, 0.08, 0.04])
+    leds = perturbed_pen(PEN, 0.002, np.random.default_rng(2)).leds
+    leds[led - 1] -= shift
+
+    found = quality(replace(PEN, leds=leds))
+
+    assert found.displaced == (led,)
+    np.testing.assert_allclose(found.displacement[led - 1], shift, atol=0.02)
+
+
+def test_a_good_pen_has_no_displaced_led() -> None:
+    assert quality(perturbed_pen(PEN, 0.01, np.random.default_rng(3))).displaced == ()
+
+
+def test_residuals_and_counts_are_those_of_the_led() -> None:
+    found = quality(PEN, n_missing=3)
+
+    assert found.n_seen.sum() == 80 * 7
+    np.testing.assert_array_equal(found.n_seen, found.n_used)
+    # sigma 0.02 px an axis, less the freedom the fit takes.
+    assert ((found.rms > 0.018) & (found.rms < 0.03)).all()
+    assert np.abs(found.mean).max() < 5 * 0.02 / np.sqrt(50)

@@ -1,0 +1,161 @@
+"""The record and the text of a calibration hold all of it, and nothing unreadable."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.report import (
+    calibration_json,
+    calibration_text,
+    pivot_json,
+    pivot_text,
+    warnings_of,
+)
+from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.observation_files import Centers
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA = paper_camera()
+PEN = paper_pen()
+FILE = InputFile(Path("folder/file.csv"), 64 * "0")
+INPUTS = Inputs(FILE, FILE, (FILE,), PEN.nominal_tip)
+
+
+@cache
+def calibration() -> Calibration:
+    """Return a calibration with an image of too few LEDs and one of another tip."""
+    rng = np.random.default_rng(0)
+    swing = swing_poses(40, rng)
+    translations = swing.translations.copy()
+    translations[5] += [0.5, 0, 0]
+    pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.02, rng)
+    pixels[3, 2:] = np.nan
+    pixels[:, 9] = np.nan
+    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
+    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+
+def record(method: str = "joint") -> dict[str, Any]:
+    text = calibration_json(calibration(), INPUTS, method)
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    parsed: dict[str, Any] = json.loads(text, parse_constant=refuse)
+    return parsed
+
+
+def test_the_record_holds_the_tip_and_its_uncertainty() -> None:
+    found = record()
+    joint = calibration().joint
+
+    np.testing.assert_array_equal(found["tip_pen_mm"], joint.tip_pen)
+    np.testing.assert_array_equal(found["cone_cam_mm"], joint.cone_cam)
+    assert np.shape(found["covariance"]) == (6, 6)
+    np.testing.assert_allclose(
+        found["expanded_uncertainty_mm"],
+        2 * np.sqrt(np.diag(found["covariance"]))[:3],
+    )
+    np.testing.assert_allclose(
+        found["change_from_nominal_mm"], joint.tip_pen - [0, -90, -25]
+    )
+
+
+def test_the_method_decides_which_result_is_given_and_both_are_there() -> None:
+    found = record("two-stage")
+
+    assert found["method"] == "two-stage"
+    assert found["tip_pen_mm"] == found["methods"]["two-stage"]["tip_pen_mm"]
+    assert found["tip_pen_mm"] != found["methods"]["joint"]["tip_pen_mm"]
+    assert len(found["methods"]["two-stage"]["convergence"]["x_mm"][0]) == 6
+
+
+def test_every_image_is_in_the_record_with_its_fate() -> None:
+    frames = record()["frames"]
+
+    assert [frame["used"] for frame in frames].count(False) == 2
+    assert frames[3]["reason"] == "too few LEDs"
+    assert frames[3]["rms_px"] is None
+    assert frames[3]["tip_cam_mm"] == [None, None, None]
+    assert frames[5]["reason"] == "tip slipped"
+    assert [led["led"] for led in frames[0]["leds"]] == list(range(1, 10))
+    assert all(led["used"] for led in frames[0]["leds"])
+    assert not any(led["used"] for led in frames[5]["leds"])
+
+
+def test_an_led_that_was_never_seen_has_no_figures() -> None:
+    led = record()["leds"][9]
+
+    assert led["seen"] == led["used"] == 0
+    assert led["rms_px"] is None
+    assert not led["displaced"]
+
+
+def test_the_record_names_program_and_inputs() -> None:
+    found = record()
+
+    assert found["program"]["name"] == "lightpen"
+    assert found["inputs"]["camera"] == {"file": "file.csv", "sha256": 64 * "0"}
+    assert found["images"]["dropped"] == {"too few LEDs": 1, "tip slipped": 1}
+
+
+@pytest.mark.parametrize("method", ["joint", "two-stage"])
+def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> None:
+    text = calibration_text(calibration(), method, PEN.nominal_tip)
+    rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
+
+    assert f"{calibration().joint.tip_pen[1]:.4f}" in text
+    assert f"{calibration().two_stage.tip_pen[1]:.4f}" in text
+    assert text.index(method) <= min(text.index("joint"), text.index("two-stage"))
+    assert "38 of 40 used" in rows["Images"]
+    assert "1 too few LEDs: frame 4" in text
+    assert "1 tip slipped: frame 6" in text
+    assert "px rms" in rows["Residuals"]
+    assert "mm rms" in rows["Residuals"]
+    assert "U =" in rows["Weakest"]
+
+
+def test_an_led_that_was_never_found_is_warned_of() -> None:
+    (sentence,) = record()["warnings"]
+
+    assert sentence.startswith("LED 10 was found in no image.")
+    assert sentence in calibration_text(calibration(), "joint", None)
+
+
+def test_large_residuals_are_warned_of() -> None:
+    rng = np.random.default_rng(2)
+    swing = swing_poses(20, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.3, rng
+    )
+    centers = Centers(np.arange(20) + 1, pixels, Path("centers.csv"))
+    noisy = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+    (sentence,) = warnings_of(noisy)
+
+    assert "residuals are large" in sentence
+    assert "camera file" in sentence
+
+
+def test_a_pivot_calibration_is_recorded_and_shown() -> None:
+    swing = swing_poses(30, np.random.default_rng(1))
+    fit = fit_pivot(swing.rotations, swing.translations)
+
+    found = json.loads(pivot_json(fit, FILE, least_squares=False))
+
+    np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=1e-6)
+    assert found["poses"] == {"total": 30, "used": 30}
+    assert len(found["frames"]) == 30
+    assert "30 of 30 used" in pivot_text(fit)

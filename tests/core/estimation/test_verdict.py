@@ -1,0 +1,241 @@
+"""The verdict: good, to be looked at, or to be repeated, with the reason."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.uncertainty import Halves
+from lightpen.estimation.verdict import (
+    Change,
+    Grade,
+    NextStep,
+    Verdict,
+    change_since,
+    distance_from_nominal,
+    halves_agree,
+    judge,
+)
+from lightpen.formats.observation_files import Centers
+from lightpen.messages import Code, Message
+from lightpen.model.limits import SwingLimits
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+
+
+def calibrated(swing: Swing, sigma: float = 0.05) -> Calibration:
+    rng = np.random.default_rng(1)
+    pixels: FloatArray = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, sigma, rng
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+
+@pytest.fixture(scope="module")
+def good() -> Calibration:
+    return calibrated(swing_poses(150, np.random.default_rng(0)))
+
+
+def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
+    verdict = judge(good, SwingLimits(max_uncertainty=0.01))
+    assert verdict.grade is Grade.PASS
+    assert verdict.reason.code is Code.GOOD
+    assert verdict.reason.arguments == (good.budget.weakest_uncertainty,)
+
+
+@pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
+def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
+    good: Calibration, share: float, grade: Grade
+) -> None:
+    limit = share * good.budget.weakest_uncertainty
+    verdict = judge(good, SwingLimits(max_uncertainty=limit))
+    assert verdict.grade is grade
+    assert verdict.reason.code is Code.UNCERTAIN
+
+
+def test_halves_that_differ_are_checked(good: Calibration) -> None:
+    uncertainty = good.halves.expanded_uncertainty
+    halves = Halves(np.array([0.0, -1.6, 1.0]) * uncertainty, uncertainty)
+    verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.01))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code is Code.HALVES_DIFFER
+    assert verdict.reason.arguments == (1.6 * uncertainty[1], uncertainty[1])
+
+
+def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
+    good: Calibration,
+) -> None:
+    """The axis that differs most certainly is not the one that differs most."""
+    uncertainty = np.array([0.0005, 0.005, 0.005])
+    halves = Halves(np.array([0.004, 0.020, 0.0]), uncertainty)
+    limits = SwingLimits(max_uncertainty=0.01)
+    assert judge(replace(good, halves=halves), limits).reason.arguments == (0.02, 0.005)
+
+    small = Halves(np.array([0.004, 0.006, 0.0]), uncertainty)
+    assert judge(replace(good, halves=small), limits).grade is Grade.PASS
+
+
+def test_what_must_be_repeated_cannot_be_accepted() -> None:
+    good = Message(Code.GOOD)
+    assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
+        *(True, True, False)
+    ]
+
+
+def test_leds_that_do_not_fit_are_checked() -> None:
+    noisy = calibrated(swing_poses(300, np.random.default_rng(0)), sigma=0.15)
+    verdict = judge(noisy, SwingLimits(max_uncertainty=0.05))
+    assert verdict.reason.code is Code.LEDS_MISFIT
+    assert verdict.reason.arguments[0] == noisy.joint.sigma
+
+
+def test_an_uncertainty_by_the_led_file_is_told_as_such(good: Calibration) -> None:
+    budget = replace(good.budget, leds=np.diag([0.0, 0.01**2, 0.0, 0.0, 0.0, 0.0]))
+    off = replace(good, budget=budget, geometry=replace(good.geometry, led_sigma=0.1))
+    assert budget.led_uncertainty == pytest.approx(0.02)
+
+    verdict = judge(off, SwingLimits(max_uncertainty=0.015))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == Message(Code.LEDS_OFF, (0.1, budget.led_uncertainty))
+    assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
+    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code is Code.GOOD
+
+    exact = replace(off, geometry=replace(good.geometry, led_sigma=0.01))
+    verdict = judge(exact, SwingLimits(max_uncertainty=0.015))
+    assert verdict.reason.code is Code.UNCERTAIN
+
+
+def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
+    leds = PEN.leds.copy()
+    leds[8, 1] += 3.0
+    wrong = replace(PEN, leds=leds)
+    swing = swing_poses(150, np.random.default_rng(0))
+    pixels: FloatArray = simulate_centers(
+        *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
+        np.random.default_rng(1),
+    )
+    centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
+    calibration = calibrate(CAMERA, wrong, observe_centers(centers, CAMERA, wrong))
+
+    verdict = judge(calibration, SwingLimits(max_uncertainty=0.05))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code is Code.LED_DISPLACED
+    led, length = verdict.reason.arguments
+    assert led == 9
+    assert length == pytest.approx(3.0, abs=0.05)
+
+
+def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
+    tip = np.array([0.0, 140.0, 2.0])
+    assert distance_from_nominal(tip, None) is None
+    assert distance_from_nominal(tip + np.array([0.0, 2.9, 0.0]), tip) is None
+    assert distance_from_nominal(tip, tip - [3.0, 4.0, 0.0]) == pytest.approx(5.0)
+
+
+def test_many_dropped_images_are_checked(good: Calibration) -> None:
+    used = good.used.copy()
+    used[::4] = False
+    verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.01))
+    assert verdict.reason.code is Code.MANY_DROPPED
+    assert verdict.reason.arguments == (38, 150)
+
+
+def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
+    good: Calibration,
+) -> None:
+    limits = SwingLimits(max_uncertainty=0.01, min_images=150)
+    assert judge(good, limits).grade is Grade.PASS
+
+    verdict = judge(good, replace(limits, min_images=151))
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason == Message(Code.TOO_FEW_IMAGES, (150, 151))
+
+
+def test_sides_that_the_pen_never_leant_to_are_named() -> None:
+    rng = np.random.default_rng(0)
+    postures = Postures(
+        np.radians(rng.uniform(10, 30, 150)),
+        np.radians(rng.uniform(-20, 155, 150)),
+        np.radians(rng.uniform(-30, 30, 150)),
+    )
+    verdict = judge(
+        calibrated(swing_from_postures(postures)), SwingLimits(max_uncertainty=0.05)
+    )
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code is Code.TOO_LITTLE_TILT
+    assert verdict.reason.arguments == (8, 4, 5, 6, 7)
+
+
+@pytest.mark.parametrize(
+    ("code", "step"),
+    [
+        (Code.GOOD, NextStep.ACCEPT),
+        (Code.UNCERTAIN, NextStep.CAPTURE_MORE),
+        (Code.TOO_LITTLE_TILT, NextStep.CAPTURE_MORE),
+        (Code.TOO_FEW_IMAGES, NextStep.CAPTURE_MORE),
+        (Code.HALVES_DIFFER, NextStep.REPEAT),
+        (Code.MANY_DROPPED, NextStep.REPEAT),
+        (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
+        (Code.LEDS_OFF, NextStep.CHECK_FILES),
+        (Code.LED_DISPLACED, NextStep.CHECK_FILES),
+    ],
+)
+def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:
+    assert Verdict(Grade.CHECK, Message(code)).next_step is step
+
+
+def test_halves_may_differ_by_what_chance_leaves() -> None:
+    uncertainty = np.array([0.001, 0.002, 0.001])
+    assert halves_agree(Halves(np.array([1.4, -1.4, 0.0]) * uncertainty, uncertainty))
+    assert not halves_agree(
+        Halves(np.array([0.0, 0.0, -1.6]) * uncertainty, uncertainty)
+    )
+
+
+U_NOW, U_THEN = np.array([0.003, 0.003, 0.003]), np.array([0.004, 0.004, 0.004])
+
+
+def change(difference: list[float]) -> Change:
+    tip_then = np.array([1.0, -90.0, -24.0])
+    return change_since(tip_then + difference, U_NOW, tip_then, U_THEN)
+
+
+def test_a_change_is_uncertain_by_both_calibrations() -> None:
+    found = change([0.03, 0.0, 0.04])
+
+    np.testing.assert_allclose(found.expanded_uncertainty, 0.005)
+    assert found.distance == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("difference", "unusual"),
+    [
+        ([0.0, 0.0, 0.0], False),
+        ([0.019, 0.0, 0.0], False),  # beyond U, but no more than is usual
+        ([0.0, -0.021, 0.0], True),
+        ([0.3, 0.2, 0.1], True),
+    ],
+)
+def test_a_change_beyond_the_usual_is_unusual(
+    difference: list[float], unusual: bool
+) -> None:
+    assert change(difference).is_unusual is unusual
+
+
+def test_a_large_change_that_uncertainty_explains_is_not_unusual() -> None:
+    tip, wide = np.zeros(3), np.full(3, 0.5)
+    assert not change_since(tip + 0.3, wide, tip, wide).is_unusual

@@ -1,0 +1,313 @@
+"""Tests of reading files whole and writing them whole or not at all."""
+
+import errno
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpen.errors import FileError
+from lightpen.formats.files import (
+    printable,
+    quoted,
+    read_bytes,
+    read_text,
+    sha256,
+    write_whole,
+)
+
+LIMIT = 1000
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="needs POSIX limits")
+
+
+def file(folder: Path, data: bytes, name: str = "cam.yaml") -> Path:
+    path = folder / name
+    path.write_bytes(data)
+    return path
+
+
+def names_in(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()]
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """Return a folder where everyone may write; those of pytest are private."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o777)
+        yield folder
+
+
+def test_a_file_is_read_whole(tmp_path: Path) -> None:
+    data = bytes(range(256))
+    assert read_bytes(file(tmp_path, data), "camera file", 256) == data
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"The camera file .*none\.yaml does not exist"):
+        read_bytes(tmp_path / "none.yaml", "camera file", LIMIT)
+
+
+def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path) -> None:
+    path = file(tmp_path, b"x")
+    with pytest.raises(FileError, match="does not exist"):
+        read_bytes(path / "cam.yaml", "camera file", LIMIT)
+
+
+def test_a_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="is a folder"):
+        read_bytes(tmp_path, "camera file", LIMIT)
+
+
+def test_an_empty_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="is empty"):
+        read_bytes(file(tmp_path, b""), "camera file", LIMIT)
+
+
+def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.yaml"
+    with path.open("wb") as stream:
+        stream.truncate(10**12)  # sparse: a terabyte to whoever tries to read it
+    with pytest.raises(FileError, match=r"1000000\.0 MB, more than the 0\.001 MB"):
+        read_bytes(path, "camera file", LIMIT)
+
+
+def test_a_name_too_long_for_the_disk_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="cannot be read"):
+        read_bytes(tmp_path / ("n" * 5000), "camera file", LIMIT)
+
+
+@posix_only
+def test_a_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(FileError, match="pipe or a device"):
+        read_bytes(path, "camera file", LIMIT)
+
+
+@posix_only
+def test_a_file_of_somebody_else_is_refused(open_folder: Path) -> None:
+    path = file(open_folder, b"secret")
+    path.chmod(0)
+    result = as_nobody(f"read_bytes(Path({str(path)!r}), 'camera file', 99)")
+    assert "cannot be read: Permission denied" in result
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le with mark", "cp1252"]
+)
+def test_text_is_read_in_the_encodings_of_instruments(
+    tmp_path: Path, encoding: str
+) -> None:
+    text = "# gemessen für µm\n1,2\n"
+    data = (
+        b"\xff\xfe" + text.encode("utf-16-le")
+        if encoding.endswith("mark")
+        else text.encode(encoding)
+    )
+    assert read_text(file(tmp_path, data), "pen file", LIMIT) == text
+
+
+def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
+    path = file(tmp_path, b"a\r\nb\rc\n")
+    assert read_text(path, "pen file", LIMIT) == "a\nb\nc\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [
+        (b"led,x\n1,\x002", "line 2 holds the control character 0"),
+        ("1,2".encode("utf-16-le"), "line 1 holds the control character 0"),
+        (b"\x89PNG\r\n\x1a\n", "control character 26"),
+        (b"\x81\x8d", "byte 1 fits no known encoding"),
+        (b"\xff\xfe1", "fits no known encoding"),
+        (b" \n\t\n", "nothing but blanks"),
+        (b"\xef\xbb\xbf", "nothing but blanks"),
+    ],
+)
+def test_what_is_not_text_is_refused(tmp_path: Path, data: bytes, what: str) -> None:
+    with pytest.raises(FileError, match=what):
+        read_text(file(tmp_path, data), "pen file", LIMIT)
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_text_or_are_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = file(tmp_path_factory.mktemp("any"), data)
+    try:
+        text = read_text(path, "pen file", LIMIT)
+    except FileError:
+        return
+    assert "\r" not in text
+    assert text.encode()
+
+
+def test_writing_replaces_the_old_file(tmp_path: Path) -> None:
+    path = file(tmp_path, b"old")
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new"
+    assert names_in(tmp_path) == ["cam.yaml"]
+
+
+@posix_only
+def test_a_new_file_has_the_usual_permissions(tmp_path: Path) -> None:
+    plain = file(tmp_path, b"plain", "plain")
+    write_whole(tmp_path / "new", b"new")
+    assert (tmp_path / "new").stat().st_mode == plain.stat().st_mode
+
+
+@posix_only
+def test_an_old_file_keeps_its_permissions(tmp_path: Path) -> None:
+    path = file(tmp_path, b"old")
+    path.chmod(0o640)
+    write_whole(path, b"new")
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
+@posix_only
+def test_writing_through_a_link_keeps_the_link(tmp_path: Path) -> None:
+    target = file(tmp_path, b"old", "target")
+    link = tmp_path / "link"
+    link.symlink_to(target)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+@posix_only
+def test_a_device_is_written_to_and_not_replaced() -> None:
+    write_whole(Path(os.devnull), b"new")
+    assert Path(os.devnull).is_char_device()
+
+
+def test_a_missing_folder_is_named_as_the_reason(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="its folder does not exist"):
+        write_whole(tmp_path / "none" / "cam.yaml", b"new")
+
+
+def test_a_folder_is_not_written_over(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="it is a folder"):
+        write_whole(tmp_path, b"new")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_device_is_named_as_the_reason() -> None:
+    with pytest.raises(FileError, match="the disk is full"):
+        write_whole(Path("/dev/full"), b"new")
+
+
+@posix_only
+def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path) -> None:
+    """A file size limit stops the write halfway, as a full disk does."""
+    path = file(tmp_path, b"old")
+    result = in_other_process(
+        "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))",
+        f"write_whole(Path({str(path)!r}), bytes(10_000))",
+    )
+    assert "the file would be larger than allowed" in result
+    assert "What was there before is unchanged" in result
+    assert path.read_bytes() == b"old"
+    assert names_in(tmp_path) == ["cam.yaml"]
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="mounting needs root"
+)
+def test_a_full_file_system_leaves_the_old_file_whole(tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)],
+        capture_output=True,
+        check=False,
+    )
+    if mounted.returncode:
+        pytest.skip("this system does not allow mounting")
+    try:
+        path = file(disk, b"old")
+        with pytest.raises(FileError, match=r"the disk is full\. Free some space"):
+            write_whole(path, bytes(200_000))
+        assert path.read_bytes() == b"old"
+        assert names_in(disk) == ["cam.yaml"]
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@posix_only
+def test_a_write_protected_file_is_not_replaced(open_folder: Path) -> None:
+    path = file(open_folder, b"old")
+    path.chmod(0o444)
+    result = as_nobody(f"write_whole(Path({str(path)!r}), b'new')")
+    assert "permission is denied" in result
+    assert path.read_bytes() == b"old"
+
+
+@posix_only
+def test_a_file_open_to_all_is_replaced_by_anyone(open_folder: Path) -> None:
+    path = file(open_folder, b"old")
+    path.chmod(0o666)
+    assert as_nobody(f"write_whole(Path({str(path)!r}), b'new')") == ""
+    assert path.read_bytes() == b"new"
+
+
+def test_an_unforeseen_reason_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(os, "fsync", fail)
+    path = file(tmp_path, b"old")
+    with pytest.raises(FileError, match=os.strerror(errno.EIO)):
+        write_whole(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert names_in(tmp_path) == ["cam.yaml"]
+
+
+def test_the_digest_is_that_of_the_content(tmp_path: Path) -> None:
+    digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert sha256(file(tmp_path, b"abc")) == digest  # FIPS 180-2, example B.1
+
+
+def test_the_digest_of_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="cannot be read"):
+        sha256(tmp_path / "none")
+
+
+@given(st.text())
+def test_what_is_shown_can_be_printed_anywhere(text: str) -> None:
+    assert printable(text).isprintable()
+    assert len(quoted(text)) < 500
+
+
+def test_a_long_excerpt_is_cut() -> None:
+    assert quoted("a" * 100) == f'"{"a" * 40}..."'
+
+
+def in_other_process(preparation: str, call: str) -> str:
+    """Return the text of the FileError of a call in another process."""
+    program = (
+        "import os\n"
+        "from pathlib import Path\n"
+        "from lightpen.errors import FileError\n"
+        "from lightpen.formats.files import read_bytes, write_whole\n"
+        f"{preparation}\n"
+        f"try:\n    {call}\nexcept FileError as error:\n    print(error)\n"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout
+
+
+def as_nobody(call: str) -> str:
+    """Return the text of the FileError of a call without the rights of root."""
+    return in_other_process("os.setuid(65534)" if os.geteuid() == 0 else "", call)

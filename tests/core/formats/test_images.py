@@ -1,0 +1,184 @@
+"""Images from folders, patterns and videos; what is damaged is named."""
+
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.arrays import Image
+from lightpen.errors import FileError
+from lightpen.formats.images import decode_image, find_images, read_image
+
+RNG = np.random.default_rng(0)
+GREY = RNG.integers(0, 255, (48, 64), dtype=np.uint8)
+
+
+def png(image: Image) -> bytes:
+    return bytes(cv2.imencode(".png", image)[1])
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder of three images, whose names sort otherwise as text."""
+    folder = tmp_path / "Schwünge 摇摆"
+    folder.mkdir()
+    for name in ("frame_10.png", "frame_2.png", "frame_1.png"):
+        (folder / name).write_bytes(png(GREY))
+    (folder / "notes.txt").write_text("no image")
+    return folder
+
+
+def test_a_folder_gives_its_images_in_natural_order(folder: Path) -> None:
+    source = find_images(str(folder))
+
+    assert source.names == ("frame_1.png", "frame_2.png", "frame_10.png")
+    for load in source.open():
+        np.testing.assert_array_equal(load(), GREY)
+
+
+def test_a_folder_without_images_has_them_in_its_subfolder_images(
+    folder: Path, tmp_path: Path
+) -> None:
+    swing = tmp_path / "swing-1"
+    swing.mkdir()
+    folder.rename(swing / "images")
+
+    assert len(find_images(str(swing)).names) == 3
+
+
+def test_a_pattern_gives_the_matching_images(folder: Path) -> None:
+    source = find_images(str(folder / "frame_1*.png"))
+
+    assert source.names == ("frame_1.png", "frame_10.png")
+
+
+def test_sixteen_bits_are_kept() -> None:
+    deep = RNG.integers(0, 65535, (20, 30), dtype=np.uint16)
+
+    np.testing.assert_array_equal(decode_image(png(deep), "deep"), deep)
+
+
+@pytest.mark.parametrize("channels", [3, 4])
+def test_colour_becomes_grey(channels: int) -> None:
+    colour = np.repeat(GREY[..., None], channels, axis=2)
+
+    np.testing.assert_array_equal(decode_image(png(colour), "colour"), GREY)
+
+
+def test_a_video_gives_its_frames(tmp_path: Path) -> None:
+    path = tmp_path / "swing.avi"
+    writer = cv2.VideoWriter(
+        str(path), cv2.VideoWriter.fourcc(*"FFV1"), 20.0, (64, 48), isColor=False
+    )
+    frames = [np.roll(GREY, k, axis=1) for k in range(4)]
+    for frame in frames:
+        writer.write(frame)
+    writer.release()
+
+    source = find_images(str(path))
+
+    assert source.names == ("frame 1", "frame 2", "frame 3", "frame 4")
+    for load, frame in zip(source.open(), frames, strict=True):
+        assert np.abs(load().astype(int) - frame).max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda data: data[: len(data) // 2], "cut off"),
+        (lambda data: data[:-4], "cut off"),
+        (lambda data: data[:100] + bytes([data[100] ^ 255]) + data[101:], "checksum"),
+        (lambda data: data[:8], "cut off"),
+        (lambda data: b"not an image at all", "no image"),
+    ],
+)
+def test_a_damaged_image_is_named(
+    damage: Callable[[bytes], bytes], message: str
+) -> None:
+    with pytest.raises(FileError, match=message) as caught:
+        decode_image(damage(png(GREY)), "frame_0007.png")
+
+    assert "frame_0007.png" in str(caught.value)
+
+
+def test_a_huge_image_is_refused_before_it_is_decoded() -> None:
+    small = png(GREY)
+    header = b"IHDR" + (60_000).to_bytes(4, "big") * 2 + small[24:29]
+    checksum = zlib.crc32(header).to_bytes(4, "big")
+    huge = small[:12] + header + checksum + small[33:]
+
+    with pytest.raises(FileError, match="60000 x 60000"):
+        decode_image(huge, "huge.png")
+
+
+def test_floating_point_images_are_refused() -> None:
+    data = bytes(cv2.imencode(".tiff", GREY.astype(np.float32))[1])
+
+    with pytest.raises(FileError, match="float32"):
+        decode_image(data, "deep.tiff")
+
+
+def test_a_folder_without_images_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="no images"):
+        find_images(str(tmp_path))
+
+
+def test_nothing_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="Check the name"):
+        find_images(str(tmp_path / "missing"))
+
+
+TOLD = """
+import sys
+from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.errors import FileError
+from lightpen.formats.images import find_images
+try:
+    find_images(sys.argv[1])
+except FileError as error:
+    print(error)
+try:
+    ReplayCamera(sys.argv[1]).open()
+except DeviceNotFound as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("place", ["", "inner"])
+def test_a_folder_that_may_not_be_looked_into_is_refused(
+    folder: Path, obedient: Sequence[str], place: str
+) -> None:
+    folder.chmod(0)
+    python = [sys.executable, "-X", "utf8", "-c", TOLD, str(folder / place)]
+    told = subprocess.run(
+        [*obedient, *python], capture_output=True, encoding="utf-8", check=True
+    )
+    folder.chmod(0o700)
+
+    sentence = (
+        f"The source of images {folder / place} cannot be read: Permission denied. "
+        "Check that it is yours to read and that its disk is connected."
+    )
+    assert told.stdout.splitlines() == [sentence, sentence]
+
+
+def test_a_video_that_is_none_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "swing.avi"
+    path.write_bytes(b"RIFF nothing")
+
+    with pytest.raises(FileError, match="cannot be opened"):
+        find_images(str(path))
+
+
+def test_an_empty_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "empty.png"
+    path.touch()
+
+    with pytest.raises(FileError, match="empty"):
+        read_image(path)

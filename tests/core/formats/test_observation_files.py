@@ -1,0 +1,307 @@
+"""Tests of reading LED centres and poses."""
+
+import contextlib
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError, LightpenError
+from lightpen.formats.observation_files import (
+    Centers,
+    read_centers,
+    read_poses,
+    write_centers,
+)
+from lightpen.model.rigid import rotation_from_vector
+
+HEADER = "frame,led,x_px,y_px"
+POSE_HEADER = "pose,r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm"
+COVARIANCE_HEADER = ",".join(f"c{i}{j}" for i in range(1, 7) for j in range(1, 7))
+
+
+def saved(folder: Path, *lines: str) -> Path:
+    path = folder / "obs.csv"
+    path.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    return path
+
+
+def rotations(n: int) -> FloatArray:
+    return rotation_from_vector(np.random.default_rng(n).normal(size=(n, 3)))
+
+
+def cells(*arrays: FloatArray) -> str:
+    return ",".join(repr(x) for array in arrays for x in array.ravel().tolist())
+
+
+def pose_lines(n: int) -> list[str]:
+    return [
+        f"{i},{cells(R, np.array([1.5, -2.0, 900.0]))}"
+        for i, R in enumerate(rotations(n), 1)
+    ]
+
+
+def refusal_of_centers(folder: Path, *lines: str) -> str:
+    with pytest.raises(FileError) as info:
+        read_centers(saved(folder, *lines), 3)
+    return str(info.value)
+
+
+def refusal_of_poses(folder: Path, *lines: str) -> str:
+    with pytest.raises(FileError) as info:
+        read_poses(saved(folder, *lines))
+    return str(info.value)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        (HEADER, "7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
+        ("7,1,1.5,2.5", "2,1,3,4", "7,3,5,6"),
+        ("y;led;x;frame", "2,5;1;1,5;7", "4;1;3;2", "6;3;5;7"),
+        (HEADER + ",sigma", "7,1,1.5,2.5,a", "2,1,3,4,b", "7,3,5,6,c"),
+    ],
+    ids=["header", "no header", "other order", "more columns"],
+)
+def test_centres_are_sorted_by_frame_and_led(
+    tmp_path: Path, lines: tuple[str, ...]
+) -> None:
+    path = saved(tmp_path, *lines)
+    found = read_centers(path, 3)
+    nan = [np.nan, np.nan]
+    np.testing.assert_array_equal(found.frames, [2, 7])
+    np.testing.assert_array_equal(
+        found.pixels, [[[3, 4], nan, nan], [[1.5, 2.5], nan, [5, 6]]]
+    )
+    assert found.path == path
+
+
+@pytest.mark.parametrize(
+    ("lines", "sentence"),
+    [
+        (
+            (HEADER, "1,1,2,3", "1,2,2,3", "1,1,5,5"),
+            "Line 4 of obs.csv: LED 1 of frame",
+        ),
+        ((HEADER, "1,4,2,3"), "Line 2 of obs.csv: there is no LED 4; the pen has LEDs"),
+        ((HEADER, "1,0,2,3"), "there is no LED 0"),
+        ((HEADER, "1,1,2,3", "1.5,1,2,3"), 'Line 3 of obs.csv: "1.5" is not a whole'),
+        ((HEADER, "1,1,2,3", "1,2,2,3O"), "Line 3 of obs.csv: .* (letter O)"),
+        ((HEADER, "1,1,2,nan"), 'Line 2 of obs.csv: "nan" is not a finite number'),
+        ((HEADER, "1,1,2,3", "1,2,2"), "Line 3 of obs.csv has 3 cells"),
+        ((HEADER, "1,1,2,3", "1,2,"), "Line 3 of obs.csv has 3 cells"),
+        ((HEADER, "1,1,2,"), "Line 2 of obs.csv: a cell is empty"),
+        ((HEADER, "1,1,1e7,3"), "Line 2 of obs.csv: (1e+07, 3) px lies outside"),
+        (("frame,led,u,v", "1,1,2,3"), "no column x_px; LED centres need the columns"),
+        (("1,1,2", "1,2,2"), "no header and 3 columns"),
+        ((HEADER,), "no rows below"),
+    ],
+)
+def test_a_flaw_of_centres_is_named(
+    tmp_path: Path, lines: tuple[str, ...], sentence: str
+) -> None:
+    found = refusal_of_centers(tmp_path, *lines)
+    for part in sentence.split(".*"):
+        assert part in found
+
+
+def test_the_first_led_given_twice_is_named_with_both_lines(tmp_path: Path) -> None:
+    text = refusal_of_centers(
+        tmp_path, "9,1,0,0", "1,3,0,0", "9,1,0,0", "1,3,0,0", "9,1,0,0"
+    )
+    assert text.startswith(
+        "Line 3 of obs.csv: LED 1 of frame 9 stands already on line 1"
+    )
+
+
+def test_a_file_that_ends_within_a_number_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "obs.csv"
+    lines = [f"{n},1,100.12345,200.12345" for n in range(40)]
+    path.write_text("\n".join([HEADER, *lines])[:-3])
+    with pytest.raises(FileError, match=r"^Line 41 .* ends within the number"):
+        read_centers(path, 3)
+
+
+def test_more_frames_than_any_swing_has_are_refused(tmp_path: Path) -> None:
+    lines = [f"{n},1,2,3" for n in range(30_001)]
+    assert "has 30001 frames; at most 30000" in refusal_of_centers(tmp_path, *lines)
+
+
+def test_a_huge_file_of_centres_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "obs.csv"
+    with path.open("wb") as stream:
+        stream.truncate(10**11)
+    with pytest.raises(FileError, match="more than the 16 MB"):
+        read_centers(path, 3)
+
+
+@given(st.integers(0, 10_000))
+def test_any_centres_are_read_back_to_the_last_digit(
+    tmp_path_factory: pytest.TempPathFactory, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    n_frames = rng.integers(1, 6)
+    pixels = rng.uniform(-100, 4000, (n_frames, 3, 2))
+    pixels[rng.random((n_frames, 3)) < 0.3] = np.nan
+    pixels[:, 1] = rng.normal(size=2)  # a frame without any LED leaves no trace
+    frames = np.sort(rng.choice(1000, n_frames, replace=False)).astype(np.int64)
+    path = tmp_path_factory.getbasetemp() / "round_trip.csv"
+    write_centers(Centers(frames, pixels, path), path)
+    found = read_centers(path, 3)
+    np.testing.assert_array_equal(found.frames, frames)
+    np.testing.assert_array_equal(found.pixels, pixels)
+
+
+@pytest.mark.parametrize("with_number", [True, False])
+@pytest.mark.parametrize("with_header", [True, False])
+def test_poses_are_read(tmp_path: Path, with_number: bool, with_header: bool) -> None:
+    lines = ([POSE_HEADER] if with_header else []) + pose_lines(4)
+    if not with_number:
+        lines = [line.split(",", 1)[1] for line in lines]
+    found = read_poses(saved(tmp_path, *lines))
+    np.testing.assert_array_equal(found.rotations, rotations(4))
+    np.testing.assert_array_equal(found.translations, [[1.5, -2, 900]] * 4)
+    assert found.covariances is None
+
+
+@pytest.mark.parametrize("with_header", [True, False])
+def test_covariances_of_poses_are_read(tmp_path: Path, with_header: bool) -> None:
+    roots = np.random.default_rng(2).normal(size=(4, 6, 6))
+    roots *= [1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1]
+    covariances = np.swapaxes(roots, 1, 2) @ roots
+    covariances = (covariances + np.swapaxes(covariances, 1, 2)) / 2
+    rows = zip(pose_lines(4), covariances, strict=True)
+    lines = [f"{pose},{cells(covariance)}" for pose, covariance in rows]
+    if with_header:
+        lines.insert(0, f"{POSE_HEADER},{COVARIANCE_HEADER}")
+    found = read_poses(saved(tmp_path, *lines))
+    np.testing.assert_array_equal(found.covariances, covariances)
+
+
+def test_rotations_in_few_digits_are_made_rotations(tmp_path: Path) -> None:
+    exact = rotations(3)
+    lines = [cells(np.round(R, 4), np.zeros(3)) for R in exact]
+    found = read_poses(saved(tmp_path, *lines)).rotations
+    np.testing.assert_allclose(
+        found @ np.swapaxes(found, 1, 2), [np.eye(3)] * 3, atol=1e-14
+    )
+    np.testing.assert_allclose(found, exact, atol=1e-4)
+
+
+def test_rotations_in_many_digits_stay_as_they_are(tmp_path: Path) -> None:
+    rounded = np.round(rotations(3), 9)
+    lines = [cells(R, np.zeros(3)) for R in rounded]
+    np.testing.assert_array_equal(
+        read_poses(saved(tmp_path, *lines)).rotations, rounded
+    )
+
+
+@pytest.mark.parametrize(
+    ("matrix", "sentence"),
+    [
+        (np.diag([1.0, 1.0, -1.0]), "mirrored rotation (determinant -1)"),
+        (np.diag([1.0, 1.0, 1.01]), "are not a rotation"),
+        (np.zeros((3, 3)), "are not a rotation"),
+        (np.full((3, 3), 1e300), "are not a rotation"),
+    ],
+)
+def test_what_is_no_rotation_is_refused(
+    tmp_path: Path, matrix: FloatArray, sentence: str
+) -> None:
+    lines = [POSE_HEADER, *pose_lines(1), f"2,{cells(matrix, np.zeros(3))}"]
+    text = refusal_of_poses(tmp_path, *lines)
+    assert text.startswith("Line 3 of obs.csv: r11 to r33 are")
+    assert sentence in text
+
+
+def test_a_translation_of_kilometres_is_refused(tmp_path: Path) -> None:
+    text = refusal_of_poses(tmp_path, cells(np.eye(3), np.array([0, 0, 1e300])))
+    assert "Line 1 of obs.csv: the translation is more than 1000 m" in text
+
+
+@pytest.mark.parametrize(
+    "covariance",
+    [
+        -np.eye(6),
+        np.eye(6) + np.eye(6)[::-1] * 1.1,
+        np.eye(6) + np.triu(np.full((6, 6), 0.01), 1),
+        np.full((6, 6), 1e300),
+    ],
+)
+def test_what_is_no_covariance_is_refused(
+    tmp_path: Path, covariance: FloatArray
+) -> None:
+    first, second = pose_lines(2)
+    text = refusal_of_poses(
+        tmp_path,
+        f"{POSE_HEADER},{COVARIANCE_HEADER}",
+        f"{first},{cells(np.eye(6))}",
+        f"{second},{cells(covariance)}",
+    )
+    assert text.startswith("Line 3 of obs.csv: c11 to c66 are not a covariance")
+
+
+def test_a_covariance_that_is_not_whole_is_refused(tmp_path: Path) -> None:
+    header = f"{POSE_HEADER},{COVARIANCE_HEADER}".removesuffix(",c66")
+    row = f"{pose_lines(1)[0]},{cells(np.eye(6))}".removesuffix(",1.0")
+    assert "has no column c66" in refusal_of_poses(tmp_path, header, row)
+
+
+def test_a_wrong_number_of_pose_columns_is_refused(tmp_path: Path) -> None:
+    assert "no header and 4 columns; poses need the 12 columns" in refusal_of_poses(
+        tmp_path, "1,2,3,4"
+    )
+
+
+@given(
+    st.binary(max_size=300) | st.text("0123456789.,;-e\n", max_size=300).map(str.encode)
+)
+def test_any_content_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_bytes(data)
+    with contextlib.suppress(LightpenError):
+        read_centers(path, 10)
+    with contextlib.suppress(LightpenError):
+        read_poses(path)
+
+
+def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
+    chance = random.Random(11)
+    centers = [HEADER, *(f"{n // 3},{n % 3 + 1},{n}.5,7" for n in range(30))]
+    poses = [f"{POSE_HEADER},{COVARIANCE_HEADER}"]
+    poses += [f"{line},{cells(np.eye(6))}" for line in pose_lines(3)]
+    path = tmp_path / "obs.csv"
+    for _ in range(300):
+        for lines in (centers, poses):
+            data = bytearray("\n".join(lines).encode())
+            for _ in range(chance.randrange(1, 6)):
+                place = chance.randrange(len(data))
+                if chance.random() < 0.5:
+                    data[place] = chance.choice(b'0123456789.,;-e"\n#x\xff')
+                else:
+                    data[place:place] = chance.choice([b"9" * 200, b"e300", b",", b"-"])
+            path.write_bytes(data)
+            with contextlib.suppress(LightpenError):
+                assert read_centers(path, 3).pixels.shape[1:] == (3, 2)
+            with contextlib.suppress(LightpenError):
+                assert np.all(np.isfinite(read_poses(path).rotations))
+
+
+def test_the_shared_poses_are_kept_as_they_are(shared_data: Path) -> None:
+    found = read_poses(shared_data / "pivot-poses" / "optical-tracker.csv")
+    assert found.rotations.shape == (1151, 3, 3)
+    assert found.rotations[0, 0, 1] == -0.9449805021
+    assert found.translations[0, 2] == -2017.9345703125
+
+
+def test_the_shared_centres_are_read(shared_data: Path) -> None:
+    found = read_centers(shared_data / "repeat" / "calib_01.csv", 10)
+    assert found.pixels.shape == (300, 10, 2)
+    assert not np.any(np.isnan(found.pixels))
+    np.testing.assert_array_equal(found.pixels[0, 1], [1250.62072, 1401.27140])

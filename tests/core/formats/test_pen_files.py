@@ -1,0 +1,411 @@
+"""Tests of reading and writing pen files."""
+
+import contextlib
+import json
+import random
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError, LightpenError, UsageError
+from lightpen.formats.pen_files import (
+    read_pen,
+    read_raw_pen,
+    read_unchecked_pen,
+    write_pen,
+)
+from lightpen.model.pen import DISC_DIAMETER, Pen
+from lightpen.model.rigid import rotation_from_vector
+
+LEDS = np.array(
+    [
+        *([0.0, 0.0, -30.0], [-0.2, 60.1, -29.7], [0.3, 120.3, -30.2]),
+        [0.0, 180.0, -30.1],
+        *([-25.0, 20.0, 0.0], [-25.1, 90.0, 0.0], [-25.4, 160.0, 0.0]),
+        *([25.1, 35.0, 0.0], [25.2, 105.0, 0.0], [24.9, 170.0, 0.0]),
+    ]
+)
+FACING = np.tile([0.0, 0.0, 1.0], (10, 1))
+FLAT = np.array([[0.0, 0, 0], [100, 0, 0], [0, 80, 0], [100, 80, 5]])
+
+
+def table(leds: FloatArray = LEDS, header: str = "led,x_mm,y_mm,z_mm") -> str:
+    rows = [f"{n},{x!r},{y!r},{z!r}" for n, (x, y, z) in enumerate(leds.tolist(), 1)]
+    return "\n".join([*([header] if header else []), *rows, ""])
+
+
+def document(**changes: Any) -> str:
+    leds = [
+        {"led": n, "x": x, "y": y, "z": z}
+        for n, (x, y, z) in enumerate(LEDS.tolist(), 1)
+    ]
+    return json.dumps({"units": "mm", "leds": leds} | changes)
+
+
+def saved(folder: Path, text: str, name: str = "leds.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(folder: Path, text: str, **options: Any) -> str:
+    path = saved(folder, text)
+    with pytest.raises(LightpenError) as info:
+        read_pen(path, **options)
+    return str(info.value)
+
+
+def assert_same(found: Pen, expected: Pen) -> None:
+    np.testing.assert_array_equal(found.leds, expected.leds)
+    np.testing.assert_array_equal(found.normals, expected.normals)
+    assert found.diameter == expected.diameter
+    assert found.name == expected.name
+    if expected.nominal_tip is None:
+        assert found.nominal_tip is None
+    else:
+        np.testing.assert_array_equal(found.nominal_tip, expected.nominal_tip)
+
+
+@pytest.mark.parametrize(
+    "text", [table(), document(), table().replace(",", ";").replace(".", ",")]
+)
+def test_leds_alone_have_the_usual_normals_and_diameter(
+    tmp_path: Path, text: str
+) -> None:
+    assert_same(read_pen(saved(tmp_path, text)), Pen(LEDS, FACING, DISC_DIAMETER))
+
+
+@pytest.mark.parametrize(
+    ("header", "millimetres"),
+    [
+        ("led,x_mm,y_mm,z_mm", 1.0),
+        ("LED, X [mm], Y [mm], Z [mm]", 1.0),
+        ("nr,x (m),y (m),z (m)", 1000.0),
+        ("id,x/inch,y/inch,z/inch", 25.4),
+        ('No.,x in,y in,"z in"', 25.4),
+        ("led,x_um,y_µm,z (microns)", 0.001),
+        ("led,x[cm],y[cm],z", 10.0),
+    ],
+)
+def test_units_in_the_header_are_followed(
+    tmp_path: Path, header: str, millimetres: float
+) -> None:
+    found = read_pen(saved(tmp_path, table(LEDS / millimetres, header)))
+    np.testing.assert_array_equal(found.leds, LEDS / millimetres * millimetres)
+
+
+@pytest.mark.parametrize("header", ["", "led,x,y,z"])
+def test_units_that_are_not_stated_are_asked_for(tmp_path: Path, header: str) -> None:
+    text = table(LEDS / 1000, header)
+    assert "--units mm" in refusal(tmp_path, text)
+    found = read_pen(saved(tmp_path, text), units="m")
+    np.testing.assert_array_equal(found.leds, LEDS / 1000 * 1000)
+
+
+def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
+    assert "states its lengths in mm, but --units m" in refusal(
+        tmp_path, table(), units="m"
+    )
+    assert "states its lengths in mm, but --units m" in refusal(
+        tmp_path, document(), units="m"
+    )
+
+
+def test_units_nobody_knows_are_refused(tmp_path: Path) -> None:
+    assert '"parsec" is not a unit' in refusal(tmp_path, table(), units="parsec")
+    assert 'units "parsec"' in refusal(tmp_path, document(units="parsec"))
+
+
+def test_coordinates_in_different_units_are_refused(tmp_path: Path) -> None:
+    text = refusal(tmp_path, table(header="led,x_mm,y_mm,z_m"))
+    assert "coordinates in m and in mm" in text
+
+
+def test_a_json_file_in_other_units_is_in_mm_throughout(tmp_path: Path) -> None:
+    entries = json.loads(document(units="cm", diameter=0.8, nominal_tip=[0, -9, -2.5]))
+    for led in entries["leds"]:
+        led.update({axis: led[axis] / 10 for axis in "xyz"}, normal=[0, 0, 1])
+    pen = read_pen(saved(tmp_path, json.dumps(entries)))
+    np.testing.assert_allclose(pen.leds, LEDS, atol=1e-12)
+    np.testing.assert_array_equal(pen.normals, FACING)
+    assert pen.nominal_tip is not None
+    np.testing.assert_array_equal(pen.nominal_tip, [0, -90, -25])
+    assert pen.diameter == 8
+
+
+def test_options_take_the_place_of_what_the_file_says(tmp_path: Path) -> None:
+    path = saved(tmp_path, document(diameter=8, nominal_tip=[0, -9, -2]))
+    pen = read_pen(path, diameter=6.0, nominal_tip=np.array([1.0, 2.0, 3.0]))
+    assert pen.diameter == 6
+    assert pen.nominal_tip is not None
+    np.testing.assert_array_equal(pen.nominal_tip, [1, 2, 3])
+
+
+@pytest.mark.parametrize("diameter", [0.0, -1.0, float("nan"), 1e9])
+def test_discs_of_an_impossible_diameter_are_refused(
+    tmp_path: Path, diameter: float
+) -> None:
+    with pytest.raises(UsageError, match="LED discs cannot be"):
+        read_pen(saved(tmp_path, table()), diameter=diameter)
+
+
+def test_normals_and_diameter_of_a_table_are_read(tmp_path: Path) -> None:
+    lines = ["diameter_mm,nz,ny,nx,z_m,y_m,x_m,led"]
+    for n, (x, y, z) in enumerate((LEDS / 1000).tolist(), 1):
+        lines.append(f"8,0.8,0,-0.6,{z!r},{y!r},{x!r},{n}")
+    pen = read_pen(saved(tmp_path, "\n".join(lines)))
+    np.testing.assert_array_equal(pen.normals, np.tile([-0.6, 0, 0.8], (10, 1)))
+    assert pen.diameter == 8
+
+
+def test_seven_columns_without_header_hold_normals(tmp_path: Path) -> None:
+    text = "".join(f"{line},0,0.6,0.8\n" for line in table(header="").splitlines())
+    pen = read_pen(saved(tmp_path, text), units="mm")
+    np.testing.assert_array_equal(pen.normals, np.tile([0, 0.6, 0.8], (10, 1)))
+
+
+def test_normals_in_few_digits_get_unit_length(tmp_path: Path) -> None:
+    text = "".join(f"{line},0,.71,.71\n" for line in table(header="").splitlines())
+    pen = read_pen(saved(tmp_path, text), units="mm")
+    np.testing.assert_allclose(np.linalg.norm(pen.normals, axis=1), 1, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("2,-0.2", "3,-0.2", "Line 3 of leds.csv: LED 3 stands where LED 2 is needed"),
+        ("\n3,", "\n2,", "Line 4 of leds.csv: LED 2 is listed already on line 3"),
+        ("\n1,", "\n0,", "Line 2 of leds.csv: LED 0 stands where LED 1 is needed"),
+        ("\n3,", "\n2.5,", 'Line 4 of leds.csv: "2.5" is not a whole number'),
+        ("10,24.9", "11,24.9", "no line has LED 10. Number the LEDs from 1 without"),
+        ("60.1", "6O.1", 'Line 3 of leds.csv: "6O.1" is not a number (letter O)'),
+        ("60.1", "nan", 'Line 3 of leds.csv: "nan" is not a finite number'),
+        ("60.1", "1e400", 'Line 3 of leds.csv: "1e400" is too large a number'),
+        ("60.1", "", "Line 3 of leds.csv: a cell is empty"),
+        (",60.1", "", "Line 3 of leds.csv has 3 cells where line 1 has 4"),
+        ("x_mm", "w_mm", "leds.csv has no column x"),
+        ("led,", "name,", "leds.csv has no column led"),
+        ("y_mm", "x_mm", 'the header names "x_mm" twice'),
+        ("y_mm", "x [mm]", "Columns 2 and 3 of leds.csv both hold x"),
+    ],
+)
+def test_a_flaw_of_a_table_is_named(
+    tmp_path: Path, old: str, new: str, sentence: str
+) -> None:
+    assert old in table()
+    assert sentence in refusal(tmp_path, table().replace(old, new, 1))
+
+
+def test_rows_out_of_order_are_refused(tmp_path: Path) -> None:
+    lines = table().splitlines()
+    lines[2:4] = lines[3], lines[2]
+    text = refusal(tmp_path, "\n".join(lines))
+    assert "Line 3 of leds.csv: LED 3 stands where LED 2 is needed" in text
+    assert "in ascending order" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"leds": []}, "leds in leds.csv is no list of LEDs"),
+        ({"leds": {"x": 1}}, "leds in leds.csv is no list of LEDs"),
+        ({"leds": [5]}, "LED 1 of leds.csv is no mapping"),
+        ({"leds": [{"led": 1, "x": 0, "y": 0}]}, "LED 1 of leds.csv has no z"),
+        ({"leds": [{"led": 2}]}, "Entry 1 of leds in leds.csv is LED 2"),
+        ({"leds": [{"led": 1, "x": 0, "y": 0, "z": "far"}]}, '"far" is not a number'),
+        ({"leds": [{"led": 1, "x": 0, "y": 0, "z": True}]}, "z in LED 1 of leds.csv"),
+        ({"leds": [{"led": 1, "w": 0}]}, 'LED 1 of leds.csv has "w", which means'),
+        ({"diamter": 8}, 'leds.csv has "diamter", which means nothing here'),
+        ({"diameter": -8}, "leds.csv has LED discs -8 mm wide"),
+        ({"diameter": "wide"}, '"wide" is not a number'),
+        ({"nominal_tip": [1, 2]}, "nominal_tip in leds.csv has 2 numbers where 3"),
+        ({"units": None}, "does not say which units"),
+    ],
+)
+def test_a_flaw_of_a_json_file_is_named(
+    tmp_path: Path, changes: dict[str, Any], sentence: str
+) -> None:
+    assert sentence in refusal(tmp_path, document(**changes))
+
+
+def test_a_normal_for_some_leds_only_is_refused(tmp_path: Path) -> None:
+    entries = json.loads(document())
+    entries["leds"][0]["normal"] = [0, 0, 1]
+    assert "LED 2 of leds.csv has no normal" in refusal(tmp_path, json.dumps(entries))
+
+
+@pytest.mark.parametrize("normal", ["0,0,0", "0,0,2", "1,1,1", "0,0,1e200"])
+def test_a_normal_of_another_length_is_refused(tmp_path: Path, normal: str) -> None:
+    text = "".join(f"{line},{normal}\n" for line in table(header="").splitlines())
+    sentence = "Line 1 of leds.csv: the normal .* does not have the length 1"
+    with pytest.raises(FileError, match=sentence):
+        read_pen(saved(tmp_path, text), units="mm")
+
+
+def test_discs_of_different_width_are_refused(tmp_path: Path) -> None:
+    lines = table(header="led,x_mm,y_mm,z_mm,diameter_mm").splitlines()
+    rows = [f"{line},{9 if n == 4 else 10}" for n, line in enumerate(lines[1:])]
+    text = refusal(tmp_path, "\n".join([lines[0], *rows]))
+    assert "Line 6 of leds.csv: the diameter is 9 where the first LED has 10" in text
+
+
+@pytest.mark.parametrize(
+    ("leds", "sentence"),
+    [
+        (LEDS / 1000, "leds.csv: The LEDs span only 0.18 mm"),
+        (LEDS * [1, 1, -1], "leds.csv: The LEDs are mirrored in z"),
+        (LEDS[[0, 2, 1, *range(3, 10)]], "leds.csv: LEDs 2 and 3 are exchanged"),
+        (LEDS + np.array([0, 0, 500]), "lightpen pen RAW.csv OUT.csv"),
+    ],
+)
+def test_wrong_geometry_is_refused_with_the_name_of_the_file(
+    tmp_path: Path, leds: FloatArray, sentence: str
+) -> None:
+    assert sentence in refusal(tmp_path, table(leds))
+
+
+@pytest.mark.parametrize("units", ["mm", "m"])
+def test_raw_coordinates_are_put_into_the_pen_frame(tmp_path: Path, units: str) -> None:
+    R = rotation_from_vector(np.array([0.3, 2.0, -1.0]))
+    raw = LEDS @ R.T + [400, 300, -100]
+    scale = {"mm": 1, "m": 1000}[units]
+    path = saved(tmp_path, table(raw / scale, header=""))
+    pen = read_raw_pen(path, units, nominal_tip=np.array([0, -90.0, -24]))
+    np.testing.assert_allclose(pen.leds, LEDS, atol=1e-9)
+    np.testing.assert_array_equal(pen.normals, FACING)
+    assert pen.nominal_tip is not None
+    np.testing.assert_array_equal(pen.nominal_tip, [0, -90, -24])
+
+
+def test_normals_and_tip_in_raw_coordinates_are_turned_too(tmp_path: Path) -> None:
+    R = rotation_from_vector(np.array([0.3, 2.0, -1.0]))
+    tip = np.array([0.0, -90.0, -24.0])
+    leds = [
+        {"led": n, "x": p[0], "y": p[1], "z": p[2], "normal": R[:, 2].tolist()}
+        for n, p in enumerate((LEDS @ R.T).tolist(), 1)
+    ]
+    text = document(leds=leds, nominal_tip=(R @ tip).tolist())
+    pen = read_raw_pen(saved(tmp_path, text))
+    np.testing.assert_allclose(pen.normals, FACING, atol=1e-12)
+    assert pen.nominal_tip is not None
+    np.testing.assert_allclose(pen.nominal_tip, tip, atol=1e-9)
+
+
+def test_raw_coordinates_of_another_layout_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"leds\.csv: .* The file has 4 LEDs"):
+        read_raw_pen(saved(tmp_path, table(FLAT)))
+
+
+def test_a_pen_of_another_layout_is_read(tmp_path: Path) -> None:
+    np.testing.assert_array_equal(read_pen(saved(tmp_path, table(FLAT))).leds, FLAT)
+
+
+def test_a_pen_is_written_as_csv_or_json_only(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"pen\.xlsx ends in neither"):
+        write_pen(Pen(LEDS, FACING), tmp_path / "pen.xlsx")
+
+
+@pytest.mark.parametrize(
+    "pen",
+    [Pen(LEDS, FACING, name="LP04"), Pen(LEDS, FACING, nominal_tip=np.zeros(3))],
+)
+def test_what_a_table_has_no_place_for_is_not_dropped(tmp_path: Path, pen: Pen) -> None:
+    with pytest.raises(UsageError, match=r"no place for the name and the nominal tip"):
+        write_pen(pen, tmp_path / "pen.csv")
+
+
+@st.composite
+def pens(draw: st.DrawFn) -> Pen:
+    rng = np.random.default_rng(draw(st.integers(0, 10_000)))
+    if draw(st.booleans()):
+        leds = LEDS + rng.uniform(-0.2, 0.2, LEDS.shape)
+        leds -= [leds[0, 0], leds[0, 1], 0]
+    else:
+        corners = np.array([[0.0, 0, 0], [300, 0, 0], [0, 200, 0], [300, 200, 100]])
+        leds = corners + rng.normal(size=(4, 3))
+    normals = rng.normal(size=leds.shape)
+    normals[:, 2] = np.abs(normals[:, 2]) + 0.1
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Pen(leds, normals, float(rng.uniform(1, 20)))
+
+
+@given(pens(), st.sampled_from(["csv", "json"]))
+def test_any_pen_is_read_back_to_the_last_digit(
+    tmp_path_factory: pytest.TempPathFactory, pen: Pen, suffix: str
+) -> None:
+    path = tmp_path_factory.getbasetemp() / f"round_trip.{suffix}"
+    write_pen(pen, path)
+    assert_same(read_pen(path), pen)
+
+
+@given(
+    pens(),
+    st.lists(st.floats(-1e5, 1e5), min_size=3, max_size=3),
+    st.text(st.characters(categories=["L", "N", "P", "S"]), max_size=30),
+)
+def test_name_and_tip_are_read_back_from_json(
+    tmp_path_factory: pytest.TempPathFactory, pen: Pen, tip: list[float], name: str
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "round_trip.json"
+    pen = replace(pen, nominal_tip=np.array(tip), name=name)
+    write_pen(pen, path)
+    assert_same(read_pen(path), pen)
+
+
+@given(st.binary(max_size=300) | st.text(max_size=300).map(str.encode))
+def test_any_content_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_bytes(data)
+    with contextlib.suppress(LightpenError):
+        read_pen(path, units="mm")
+
+
+@pytest.mark.parametrize("text", [table(), document(diameter=8)], ids=["CSV", "JSON"])
+def test_damaged_files_are_read_or_refused(tmp_path: Path, text: str) -> None:
+    chance = random.Random(3)
+    path = tmp_path / "leds.csv"
+    for _ in range(300):
+        data = bytearray(text.encode())
+        for _ in range(chance.randrange(1, 6)):
+            place = chance.randrange(len(data))
+            if chance.random() < 0.5:
+                data[place] = chance.choice(b'0123456789.,;-e"\n{}[]:#x\xff')
+            else:
+                data[place:place] = chance.choice(
+                    [b"9" * 400, b"e300", b",", b"-", b"["]
+                )
+        path.write_bytes(data)
+        for read in (read_pen, read_raw_pen):
+            with contextlib.suppress(LightpenError):
+                assert np.all(np.isfinite(read(path).leds))
+
+
+def test_the_shared_pen_is_read(shared_data: Path) -> None:
+    pen = read_pen(shared_data / "swing-clean" / "leds.csv")
+    np.testing.assert_array_equal(pen.leds[1], [-0.04485, 60.13565, -29.86272])
+    assert pen.n_leds == 10
+
+
+def test_leds_that_stand_anywhere_can_be_read_to_be_mended(tmp_path: Path) -> None:
+    path = tmp_path / "leds.csv"
+    path.write_text("led,x_mm,y_mm,z_mm\n1,0,0,0\n2,1,0,0\n")
+
+    np.testing.assert_array_equal(
+        read_unchecked_pen(path).leds, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    )
+
+
+def test_what_is_no_number_cannot_be_read_to_be_mended_either(tmp_path: Path) -> None:
+    path = tmp_path / "leds.csv"
+    path.write_text("led,x_mm,y_mm,z_mm\n1,0,0,0\n2,12.4O,0,0\n")
+
+    with pytest.raises(FileError, match=r"Line 3 of leds\.csv"):
+        read_unchecked_pen(path)

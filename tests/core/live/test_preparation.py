@@ -1,0 +1,214 @@
+"""What a calibration needs before the swing, and how a record brings it back."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.errors import FileError
+from lightpen.live.preparation import (
+    CameraFile,
+    Lack,
+    PenFile,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.reading import Record, open_record, recorded_names
+from lightpen.record.writing import RecordWriter
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen.swing.resuming import recorded_setup
+
+NAMES = Names("Hall 2", "Zoë", "LP-04", "T-10", "C-1", 3.0005)
+ODD = 'Ä/\\ 王 "%" ' + 200 * "w"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
+    """A preparation that lacks nothing."""
+    scene = Scene()
+    files = write_sample_files(scene, tmp_path_factory.mktemp("files"))
+    return Preparation(
+        names=NAMES,
+        image_size=(scene.camera.width, scene.camera.height),
+        camera_file=CameraFile.read(files.camera),
+        pen_file=PenFile.read(files.pen),
+    )
+
+
+def recorded(preparation: Preparation, folder: Path) -> Record:
+    RecordWriter.create(folder, preparation.header()).close()
+    return open_record(folder)
+
+
+def test_a_whole_preparation_lacks_nothing(whole: Preparation) -> None:
+    assert whole.lacks() == ()
+
+
+def test_at_first_all_is_missing_in_the_order_of_the_steps() -> None:
+    assert Preparation().lacks() == (
+        *(Lack.STATION, Lack.OPERATOR, Lack.PEN, Lack.TIP, Lack.CONE),
+        *(Lack.IMAGES, Lack.CAMERA_FILE, Lack.PEN_FILE),
+    )
+
+
+@pytest.mark.parametrize("blank", ["", "  \t"])
+@pytest.mark.parametrize("lack", list(Lack)[:5])
+def test_each_name_must_be_given(whole: Preparation, lack: Lack, blank: str) -> None:
+    texts = {"station": "S", "operator": "O", "pen": "P", "tip": "T", "cone": "C"}
+    names = Names(**(texts | {str(lack): blank}), ball_diameter=3.0)
+
+    assert replace(whole, names=names).start_lacks() == (lack,)
+
+
+def test_a_ball_diameter_and_a_nominal_tip_need_not_be_known(
+    whole: Preparation,
+) -> None:
+    names = replace(NAMES, ball_diameter=None)
+
+    assert replace(whole, names=names, nominal_tip=None).lacks() == ()
+
+
+def test_a_camera_must_send_images(whole: Preparation) -> None:
+    assert replace(whole, image_size=None).lacks() == (Lack.IMAGES,)
+
+
+def test_a_recording_must_be_chosen_before_its_images_are_missed(
+    whole: Preparation,
+) -> None:
+    nowhere = replace(whole, source=SourceChoice(SourceKind.RECORDED), image_size=None)
+    chosen = replace(nowhere, source=SourceChoice(SourceKind.RECORDED, "/images"))
+
+    assert nowhere.camera_lacks() == (Lack.SOURCE_PLACE,)
+    assert chosen.camera_lacks() == (Lack.IMAGES,)
+
+
+def test_images_must_have_the_size_of_the_intrinsics(whole: Preparation) -> None:
+    assert replace(whole, image_size=(1224, 1024)).lacks() == (Lack.IMAGE_SIZE,)
+
+
+def test_a_size_that_is_not_known_yet_is_no_wrong_one(whole: Preparation) -> None:
+    assert Lack.IMAGE_SIZE not in replace(whole, image_size=None).lacks()
+
+
+def test_both_files_must_be_chosen(whole: Preparation) -> None:
+    assert replace(whole, camera_file=None).lacks() == (Lack.CAMERA_FILE,)
+    assert replace(whole, pen_file=None).lacks() == (Lack.PEN_FILE,)
+
+
+def test_edited_leds_must_be_saved_or_discarded_before_a_swing(
+    whole: Preparation,
+) -> None:
+    assert replace(whole, has_unsaved_leds=True).lacks() == (Lack.SAVED_LEDS,)
+
+
+def test_no_swing_begins_without_both_files(whole: Preparation) -> None:
+    for part in (replace(whole, camera_file=None), replace(whole, pen_file=None)):
+        with pytest.raises(ValueError, match="must be chosen"):
+            part.swing_setup()
+        with pytest.raises(ValueError, match="must be chosen"):
+            part.header()
+
+
+def test_a_nominal_tip_takes_the_place_of_that_of_the_file(whole: Preparation) -> None:
+    given = np.array([0.1, -90.0, -25.0])
+    assert whole.pen is not None
+    assert whole.pen_file is not None
+
+    changed = replace(whole, nominal_tip=given).pen
+
+    assert changed is not None
+    np.testing.assert_array_equal(changed.nominal_tip, given)
+    np.testing.assert_array_equal(whole.pen.nominal_tip, whole.pen_file.pen.nominal_tip)
+
+
+def test_a_swing_goes_by_names_files_limits_mask_and_nominal_tip(
+    whole: Preparation,
+) -> None:
+    tip = np.array([0.0, 140.0, 2.0])
+    assert whole.camera_file is not None
+    assert whole.pen_file is not None
+    assert whole.swings_like(replace(whole, image_size=None))
+    assert replace(whole, nominal_tip=tip).swings_like(
+        replace(whole, nominal_tip=tip.copy())
+    )
+    others = (
+        replace(whole, names=replace(NAMES, tip="T-11")),
+        replace(whole, camera_file=CameraFile.read(whole.camera_file.path)),
+        replace(whole, pen_file=PenFile.read(whole.pen_file.path)),
+        replace(whole, limits=SwingLimits(max_images=200)),
+        replace(whole, mask=np.array([[10.0, 20.0, 5.0]])),
+        replace(whole, nominal_tip=tip),
+    )
+    assert not any(whole.swings_like(other) for other in others)
+    assert not replace(whole, nominal_tip=tip).swings_like(whole)
+
+
+@pytest.mark.parametrize("name", [ODD, "", "王", "a\tb"])
+def test_a_record_brings_its_names_back(
+    whole: Preparation, tmp_path: Path, name: str
+) -> None:
+    names = Names(name, name, name, name, name, 3.0005)
+
+    record = recorded(replace(whole, names=names), tmp_path / "swing")
+
+    assert recorded_names(record) == names
+
+
+def test_a_record_brings_its_setup_back_to_the_last_digit(
+    whole: Preparation, tmp_path: Path
+) -> None:
+    limits = SwingLimits(1 / 300, 61, 299, 3, 0.1 / 3)
+    preparation = replace(
+        whole,
+        nominal_tip=np.array([0.1, -90.0, -25.0]) / 3,
+        mask=np.array([[10.0, 20.0, 5.5]]) / 3,
+        limits=limits,
+    )
+    given = preparation.swing_setup()
+
+    setup = recorded_setup(recorded(preparation, tmp_path / "swing"))
+
+    assert setup.limits == limits
+    np.testing.assert_array_equal(setup.mask, given.mask)
+    for each in fields(given.camera):
+        np.testing.assert_array_equal(
+            getattr(setup.camera, each.name), getattr(given.camera, each.name)
+        )
+    for name in ("leds", "nominal_tip"):
+        np.testing.assert_array_equal(
+            getattr(setup.pen, name), getattr(given.pen, name)
+        )
+
+
+def test_a_record_of_an_older_program_gets_the_usual_limits(
+    whole: Preparation, tmp_path: Path
+) -> None:
+    header = replace(whole.header(), settings={"min_images": "many"})
+    RecordWriter.create(tmp_path / "swing", header).close()
+    record = open_record(tmp_path / "swing")
+
+    assert recorded_setup(record).limits == SwingLimits()
+    assert recorded_names(record) == replace(NAMES, pen="", ball_diameter=None)
+
+
+def test_a_file_that_vanished_since_is_told_when_a_record_begins(
+    whole: Preparation, tmp_path: Path
+) -> None:
+    assert whole.pen_file is not None
+    gone = replace(whole.pen_file, path=tmp_path / "gone.csv")
+
+    with pytest.raises(FileError, match=r"pen file .*gone\.csv does not exist"):
+        replace(whole, pen_file=gone).header()
+
+
+def test_what_a_program_adds_is_kept_beside_the_choices(whole: Preparation) -> None:
+    header = whole.header({"exposure_us": 3000.0})
+
+    assert header.settings["exposure_us"] == 3000.0
+    assert header.settings["pen"] == "LP-04"
+    assert header.created.tzinfo is not None

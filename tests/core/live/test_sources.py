@@ -1,0 +1,74 @@
+"""Each choice of a source has its camera, which goes by the surroundings' clock."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from lightpen.cameras.clock import MachineClock, SkippingClock
+from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
+from lightpen.live.preparation import SourceChoice, SourceKind
+from lightpen.live.sources import Surroundings, camera_of
+from lightpen.record.reading import open_record
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.scenes import Scene
+
+
+@pytest.fixture
+def around() -> Surroundings:
+    return Surroundings(Scene(seed=7), SkippingClock())
+
+
+def test_usually_the_simulated_pen_is_seen_in_real_time() -> None:
+    around = Surroundings()
+
+    assert isinstance(around.clock, MachineClock)
+    assert camera_of(SourceChoice(), around).serial == "SIM-1"
+
+
+def test_the_simulated_camera_shows_the_scene_of_the_surroundings(
+    around: Surroundings,
+) -> None:
+    camera = camera_of(SourceChoice(SourceKind.SIMULATED), around)
+
+    assert isinstance(camera, SimulatedCamera)
+    assert camera.scene is around.scene
+
+
+def test_a_record_is_played_from_end_to_end_again_and_again(
+    around: Surroundings, swung: Callable[..., Path]
+) -> None:
+    n_images = len(open_record(swung()).images)
+    camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
+    camera.open()
+    camera.configure(CameraSettings(frame_rate=math.inf))
+    camera.start()
+    frames = [camera.read(1.0) for _ in range(n_images + 1)]
+
+    assert camera.caps.n_images == n_images
+    assert (frames[0].image == frames[-1].image).all()
+    assert around.clock.now_ns() == 0
+    camera.close()
+
+
+def test_a_recording_waits_by_the_clock_of_the_surroundings(
+    around: Surroundings, swung: Callable[..., Path]
+) -> None:
+    camera = camera_of(SourceChoice(SourceKind.RECORDED, str(swung())), around)
+    camera.open()
+    camera.start()
+    for _ in range(3):
+        camera.read(1.0)
+
+    assert around.clock.now_ns() == pytest.approx(2 * 0.05e9)
+    camera.close()
+
+
+def test_a_recording_that_is_not_there_is_found_missing_when_it_is_opened(
+    around: Surroundings, tmp_path: Path
+) -> None:
+    choice = SourceChoice(SourceKind.RECORDED, str(tmp_path / "gone"))
+    camera = camera_of(choice, around)
+    with pytest.raises(DeviceNotFound, match="no folder, video or image at"):
+        camera.open()

@@ -1,0 +1,66 @@
+"""Posture coverage: where the pen leant, and which direction hardly turned."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.model.coverage import DIRECTION_NAMES, measure_coverage, posture_spread
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.swings import swing_poses
+
+UPRIGHT = np.diag([1.0, -1.0, -1.0])  # pen's y up in the image, z to the camera
+
+
+def leaning(direction: float, tilt: float) -> FloatArray:
+    """Return the upright pen leant by ``tilt`` towards a direction of the camera."""
+    lean = np.array([np.cos(direction), 0.0, np.sin(direction)])
+    axis = np.cross([0.0, -1.0, 0.0], lean)
+    return rotation_from_vector(tilt * axis) @ UPRIGHT
+
+
+def test_each_direction_is_counted_under_its_name() -> None:
+    for k, name in enumerate(DIRECTION_NAMES):
+        one = measure_coverage(leaning(k * np.pi / 4, np.radians(15))[None])
+        far = measure_coverage(leaning(k * np.pi / 4, np.radians(30))[None])
+
+        assert one.counts[0, k] == 1
+        assert far.counts[1, k] == 1
+        assert name not in one.missing
+        assert len(one.missing) == 7
+
+
+def test_right_is_right_in_the_image_and_away_is_away_from_the_camera() -> None:
+    right = leaning(0.0, 0.5)[:, 1]
+    away = leaning(np.pi / 2, 0.5)[:, 1]
+
+    assert right[0] > 0.4
+    assert away[2] > 0.4
+
+
+def test_upright_is_upright() -> None:
+    coverage = measure_coverage(UPRIGHT[None])
+
+    assert coverage.n_upright == 1
+    assert coverage.tilts[0] < 1e-6
+
+
+def test_a_turn_about_the_pens_own_axis_is_measured() -> None:
+    turns = np.radians([-20.0, 0.0, 20.0])
+    R = UPRIGHT @ rotation_from_vector(turns[:, None] * [0.0, 1.0, 0.0])
+
+    np.testing.assert_allclose(measure_coverage(R).turns, turns, atol=1e-9)
+
+
+def test_the_axis_of_a_swing_has_no_spread() -> None:
+    axis = np.array([0.6, 0.0, 0.8])
+    R = rotation_from_vector(np.linspace(-0.5, 0.5, 50)[:, None] * axis)
+
+    spread, axes = posture_spread(R)
+
+    assert spread[0] < 1e-6
+    np.testing.assert_allclose(np.abs(axes[0] @ axis), 1.0, atol=1e-9)
+
+
+def test_a_good_swing_misses_no_direction() -> None:
+    swing = swing_poses(300, np.random.default_rng(0))
+
+    assert measure_coverage(swing.rotations).missing == []

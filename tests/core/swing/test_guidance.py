@@ -1,0 +1,156 @@
+"""Guidance: the next posture is the one that helps most."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.joint import fit_joint
+from lightpen.model.posture import Posture, angles_between, rotations_of
+from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.swing.guidance import (
+    TILTS,
+    TURNS,
+    Outlook,
+    image_information,
+    next_posture,
+    usable_leds,
+    visible_fields,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+SIGMA = 0.05
+SPACING = np.radians(2.5)
+PRIOR = np.diag([3.0**-2] * 3 + [1e-8] * 3)
+
+
+def rotation(tilt: float, direction: float, turn: float = 0.0) -> FloatArray:
+    """Return the rotation of a posture in degrees."""
+    angles = np.radians([[tilt], [direction], [turn]])
+    return np.asarray(rotations_of(PEN, *angles)[0])
+
+
+def outlook(rotations: FloatArray) -> Outlook:
+    """Return what images of these postures leave to be known."""
+    blind = Outlook(
+        CAMERA, PEN, PAPER_TIP, PAPER_CONE, PRIOR, SIGMA, rotations, SPACING
+    )
+    known = image_information(blind, rotations).sum(axis=0)
+    return replace(blind, information=PRIOR + known)
+
+
+def swung(*degrees: tuple[float, float, float]) -> Outlook:
+    return outlook(np.array([rotation(*posture) for posture in degrees]))
+
+
+def test_the_predicted_information_is_that_of_the_image_taken_there() -> None:
+    truth = swing_poses(40, np.random.default_rng(0))
+    pixels = simulate_centers(
+        *(CAMERA, PEN, truth.rotations, truth.translations),
+        SIGMA,
+        np.random.default_rng(1),
+    )
+    joint = fit_joint(
+        CAMERA, PEN, pixels, truth.rotations, truth.tip_pen, truth.cone_cam
+    )
+    joint_outlook = replace(
+        outlook(truth.rotations),
+        tip_pen=joint.tip_pen,
+        cone_cam=joint.cone_cam,
+        sigma=joint.sigma,
+    )
+    predicted = image_information(joint_outlook, joint.rotations)
+    full = joint.used.all(axis=1)
+    np.testing.assert_allclose(predicted[full], joint.information[full], rtol=1e-9)
+    assert full.sum() > 30
+
+
+def test_after_leaning_to_one_side_the_pen_is_sent_to_another() -> None:
+    for direction in (0.0, 90.0, 180.0, 270.0):
+        postures = product(
+            (5.0, 10.0, 15.0, 20.0, 25.0), (direction,), (-20.0, 0.0, 20.0)
+        )
+        known = swung(*postures)
+        target = next_posture(known, rotation(0, 0))
+        assert target is not None
+        away = np.cos(target.direction - np.radians(direction))
+        assert target.tilt * away < np.radians(5)
+
+
+def test_no_posture_would_have_shrunk_the_variance_more() -> None:
+    known = swung(*product((0.0, 12.0, 24.0), (0.0, 90.0), (-10.0, 15.0)))
+    present = rotation(0, 0)
+    target = next_posture(known, present)
+    assert target is not None
+
+    def variance_after(there: Posture) -> float:
+        end = rotations_of(
+            PEN,
+            np.array([there.tilt]),
+            np.array([there.direction]),
+            np.array([there.turn]),
+        )[0]
+        vector = vector_from_rotation(end @ present.T)
+        n_images = max(round(float(np.linalg.norm(vector)) / SPACING), 1)
+        shares = (np.arange(n_images) + 1) / n_images
+        steps = rotation_from_vector(shares[:, None] * vector) @ present
+        new = angles_between(steps, known.rotations).min(axis=1) >= SPACING
+        information = known.information + image_information(known, steps[new]).sum(
+            axis=0
+        )
+        before = np.trace(np.linalg.inv(known.information)[:3, :3])
+        after = np.trace(np.linalg.inv(information)[:3, :3])
+        return float((before - after) / n_images)
+
+    places = [(0.0, 0.0)] + [(t, k * np.pi / 4) for t in TILTS for k in range(8)]
+    gains = [
+        variance_after(Posture(*place, turn)) for place in places for turn in TURNS
+    ]
+    # The choice looks at three images of each way, this test at all of them.
+    assert variance_after(target) > 0.9 * max(gains)
+
+
+def test_only_wanted_fields_are_chosen() -> None:
+    known = swung(*product((0.0, 25.0), (0.0, 90.0, 180.0, 270.0), (0.0, 20.0)))
+    wanted = np.zeros((3, 8), dtype=bool)
+    wanted[1, 3] = True
+    target = next_posture(known, rotation(0, 0), wanted)
+    assert target is not None
+    assert (target.tilt, target.direction) == (TILTS[0], 3 * np.pi / 4)
+    assert next_posture(known, rotation(0, 0), np.zeros((3, 8), dtype=bool)) is None
+
+
+def test_postures_the_camera_cannot_see_are_left_out() -> None:
+    known = swung((10.0, 0.0, 0.0), (10.0, 90.0, 0.0))
+    assert visible_fields(known)[1:].all()
+
+    # The cone near the right border: leaning far to the right leaves the image.
+    aside = replace(known, cone_cam=PAPER_CONE + np.array([230.0, 0.0, 0.0]))
+    fields = visible_fields(aside)
+    assert not fields[2, 0]
+    assert fields[2, 4]
+    target = next_posture(aside, rotation(0, 0))
+    assert target is not None
+    assert np.cos(target.direction) < 0.8 or target.tilt < TILTS[1]
+
+    behind = replace(known, pen=replace(PEN, normals=-PEN.normals))
+    turned = rotations_of(PEN, np.zeros(1), np.zeros(1), np.zeros(1))
+    assert not usable_leds(behind, turned).any()
+
+
+def test_leds_that_touch_in_the_image_are_not_counted_on() -> None:
+    close = PEN.leds.copy()
+    close[1] = close[0] + [0, 10.5, 0]
+    known = replace(swung((0.0, 0.0, 0.0)), pen=replace(PEN, leds=close))
+    usable = usable_leds(known, known.rotations)[0]
+    assert not usable[:2].any()
+    assert usable[2:].all()

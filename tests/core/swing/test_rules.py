@@ -1,0 +1,513 @@
+"""The swing, driven by a simulated hand: states, rules and end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting, sight_centers
+from lightpen.messages import Code, Message
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.model.posture import angles_between
+from lightpen.simulator.hand import Operator
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+)
+from lightpen.swing.rules import (
+    Transition,
+    advance,
+    conclude,
+    finish,
+    pause,
+    resume,
+    stillness,
+)
+from lightpen.swing.shortfall import missing
+from lightpen.swing.state import (
+    Happening,
+    Pause,
+    Phase,
+    SwingEvent,
+    SwingSetup,
+    start_swing,
+)
+
+PERIOD = 0.05  # s
+
+
+class Station:
+    """A simulated operator before a camera of which only the LED centres are used."""
+
+    def __init__(
+        self,
+        *,
+        seed: int = 2,
+        sigma: float = 0.05,
+        limits: SwingLimits | None = None,
+        pen: Pen | None = None,
+    ) -> None:
+        self.clock = SkippingClock()
+        self.operator = Operator(self.clock, seed)
+        self.rng = np.random.default_rng([seed, 1])
+        self.sigma = sigma
+        self.setup = SwingSetup(
+            paper_camera(), pen or paper_pen(), limits or SwingLimits()
+        )
+        self.state = start_swing(self.setup)
+        self.cone = PAPER_CONE
+        self.events: list[SwingEvent] = []
+        self.phases = [self.state.phase]
+        self.told: object = None
+
+    def sight(self) -> Sighting:
+        """Return what the camera sees now."""
+        held = self.operator.held(np.array([self.now]))
+        rotations = held.postures.rotations
+        translations = self.cone + held.offsets - rotations @ PAPER_TIP
+        pixels = simulate_centers(
+            self.setup.camera,
+            self.setup.pen,
+            rotations,
+            translations,
+            self.sigma,
+            self.rng,
+        )[0]
+        pixels[[led - 1 for led in held.covered]] = np.nan
+        if held.is_away:
+            pixels[:] = np.nan
+        return sight_centers(
+            *(self.setup.camera, self.setup.pen, pixels),
+            *(rotations[0], translations[0]),
+        )
+
+    @property
+    def now(self) -> float:
+        return self.clock.now_ns() * 1e-9
+
+    def take(self, transition: Transition) -> None:
+        self.state = transition.state
+        self.events += transition.events
+        if self.phases[-1] is not transition.state.phase:
+            self.phases.append(transition.state.phase)
+
+    def follow(self) -> None:
+        """Do what the screen asks for."""
+        target = self.state.target
+        if self.state.message.code is Code.LEAN_TO_YOUR_RIGHT:
+            wish: object = "right"
+        else:
+            wish = target
+        if wish is None or wish is self.told:
+            return
+        self.told = wish
+        if target is None:
+            self.operator.lean_towards(np.radians(20), 0.0, 0.0)
+        else:
+            self.operator.lean_towards(target.tilt, target.direction, target.turn)
+
+    def run(self, seconds: float, until: Phase | None = None) -> "Station":
+        for _ in range(round(seconds / PERIOD)):
+            self.clock.wait(PERIOD)
+            self.take(advance(self.setup, self.state, self.sight(), self.now))
+            self.follow()
+            if self.state.phase is until:
+                break
+        return self
+
+    def happenings(self) -> list[Happening]:
+        frequent = (Happening.KEPT, Happening.FIELD_FULL)
+        return [event.what for event in self.events if event.what not in frequent]
+
+    @property
+    def tip_error(self) -> float:
+        assert self.state.kept.seat is not None
+        return float(np.abs(self.state.kept.seat.tip_pen - PAPER_TIP).max())
+
+
+def capturing(seconds: float = 8.0, sigma: float = 0.05) -> Station:
+    """Return a station that has been capturing for some time."""
+    station = Station(sigma=sigma)
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    return station.run(seconds)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Station:
+    """Return a station after a whole guided swing."""
+    station = Station()
+    station.operator.seat()
+    return station.run(120.0, until=Phase.SOLVING)
+
+
+def test_a_guided_swing_goes_through_its_phases_without_a_key(whole: Station) -> None:
+    assert whole.phases == [
+        Phase.WAIT,
+        Phase.SEEN,
+        Phase.SETTLED,
+        Phase.COUNTDOWN,
+        Phase.CAPTURING,
+        Phase.SOLVING,
+    ]
+    assert whole.happenings() == [Happening.SEATED, Happening.CAPTURED]
+
+
+def test_it_ends_when_postures_and_uncertainty_suffice(whole: Station) -> None:
+    limits = whole.setup.limits
+    assert whole.state.kept.uncertainty <= limits.max_uncertainty
+    assert (whole.state.counts[1:] >= limits.min_per_field).all()
+    assert whole.state.counts[0, 0] >= limits.min_per_field
+    assert limits.min_images <= whole.state.n_kept < limits.max_images
+    assert missing(whole.setup, whole.state) == ()
+    # Three standard deviations of the weakest direction.
+    assert whole.tip_error < 1.5 * whole.state.kept.uncertainty
+
+
+def test_kept_postures_differ_from_each_other_by_the_spacing(whole: Station) -> None:
+    rotations = whole.state.kept.rotations
+    angles = angles_between(rotations, rotations)
+    apart = angles[np.triu_indices(len(rotations), 1)]
+    assert apart.min() >= whole.setup.limits.spacing
+
+
+def test_each_kept_image_gets_the_next_number(whole: Station) -> None:
+    kept = [e.numbers[0] for e in whole.events if e.what is Happening.KEPT]
+    assert kept == list(range(1, whole.state.next_number))
+    np.testing.assert_array_equal(whole.state.kept.numbers, kept)
+
+
+def test_each_field_is_full_once(whole: Station) -> None:
+    full = [e.numbers for e in whole.events if e.what is Happening.FIELD_FULL]
+    assert len(set(full)) == len(full) == 17
+
+
+def test_the_trace_tells_every_estimate(whole: Station) -> None:
+    trace = whole.state.trace
+    assert len(trace.n_images) == whole.state.n_kept
+    np.testing.assert_allclose(trace.uncertainties[-1], whole.state.kept.uncertainty)
+    late = trace.uncertainties[-50:]
+    assert (np.diff(late) < 0.05 * late[:-1]).all()
+
+
+def test_the_countdown_counts_three_two_one() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.COUNTDOWN)
+    counted = [station.state.message.arguments]
+    while station.state.phase is Phase.COUNTDOWN:
+        station.run(PERIOD)
+        counted.append(station.state.message.arguments)
+    assert list(dict.fromkeys(counted)) == [(3,), (2,), (1,), ()]
+    assert station.state.n_kept <= 1
+
+
+def test_the_first_lean_teaches_the_operators_side() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    assert station.state.message == Message(Code.LEAN_TO_YOUR_RIGHT)
+    assert station.state.target is None
+    station.told = "right"
+    station.operator.lean_towards(np.radians(20), np.pi, 0.0)  # facing the camera
+    station.run(2.0)
+    assert station.state.heading == np.pi
+    assert station.state.message == Message(Code.FOLLOW_ARROW)
+    assert station.state.target is not None
+
+
+def test_a_pen_held_in_the_air_is_not_seated() -> None:
+    station = Station()
+    station.operator.lift()
+    station.run(10.0)
+    assert station.phases == [Phase.WAIT, Phase.SEEN]
+    assert station.state.message == Message(Code.SEAT_TIP)
+
+
+def test_without_a_nominal_tip_a_still_pen_is_asked_to_swing() -> None:
+    station = Station(pen=replace(paper_pen(), nominal_tip=None))
+    station.operator.seat()
+    station.run(6.0)
+    assert station.state.message == Message(Code.SWING_TO_SEAT)
+
+    station.operator.swing()
+    station.run(10.0, until=Phase.SETTLED)
+    assert station.state.seat is not None
+    assert np.abs(station.state.seat.tip_pen - PAPER_TIP).max() < 0.5
+
+
+def test_lifting_in_the_countdown_starts_over() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.COUNTDOWN)
+    station.operator.lift()
+    station.run(2.0)
+    assert station.state.phase is Phase.SEEN
+    assert station.happenings()[-1] is Happening.LOST
+
+
+def test_a_slip_drops_its_own_images_only() -> None:
+    station = capturing()
+    before = station.state.kept.numbers
+    station.operator.slip(0.3, 1.0)
+    station.run(4.0)
+
+    assert station.state.phase is Phase.CAPTURING
+    assert Happening.SLIPPED in station.happenings()
+    assert station.state.n_dropped[Reason.SLIPPED] > 2
+    lost = np.setdiff1d(before, station.state.kept.numbers)
+    assert len(lost) <= 3  # of the half second before, by a gate of 99 %
+    assert station.tip_error < 1.5 * station.state.kept.uncertainty
+
+
+def test_a_slip_says_so_once_with_the_number_of_images() -> None:
+    station = capturing()
+    station.operator.slip(0.3, 2.0)
+    station.run(1.5)
+    message = station.state.message
+    assert message.code is Code.TIP_SLIPPED
+    assert message.arguments == (station.state.n_dropped[Reason.SLIPPED],)
+    station.run(2.5)
+    assert station.happenings().count(Happening.SLIPPED) == 1
+    assert station.state.message == Message(Code.FOLLOW_ARROW)
+
+
+def test_images_that_slipped_are_found_when_more_is_known() -> None:
+    # 0.3 mm in the first images hides in what the tip may still be.
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    station.run(0.8)
+    n_early = station.state.n_kept
+    station.operator.slip(0.12, 0.6)
+    station.run(0.6)
+    hidden = station.state.kept.numbers[n_early:]
+    station.run(8.0)
+
+    assert len(hidden) >= 2
+    assert station.state.phase is Phase.CAPTURING
+    dropped = {
+        n for e in station.events if e.what is Happening.SLIPPED for n in e.numbers
+    }
+    assert dropped & set(hidden.tolist())
+    assert station.tip_error < 1.5 * station.state.kept.uncertainty
+
+
+def test_a_tip_that_stays_elsewhere_pauses_until_it_is_put_back() -> None:
+    station = capturing()
+    n_kept = station.state.n_kept
+    station.operator.slip(0.5, 5.0)
+    station.run(4.0)
+    assert station.state.pause is Pause.ELSEWHERE
+    assert station.state.message.code is Code.TIP_ELSEWHERE
+    assert float(station.state.message.arguments[0]) == pytest.approx(0.5, abs=0.05)
+    assert abs(station.state.n_kept - n_kept) <= 2
+
+    station.run(3.0)
+    assert station.state.phase is Phase.CAPTURING
+    assert station.happenings()[-1] is Happening.SEATED
+
+
+def test_images_from_a_wrong_place_give_way_to_more_from_the_right_one() -> None:
+    station = Station()
+    station.cone = PAPER_CONE + np.array([0.3, 0.0, 0.0])
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    station.run(1.0)
+    early = station.state.kept.numbers
+    station.cone = PAPER_CONE
+    station.run(12.0)
+
+    assert 3 <= len(early) < 12
+    assert not np.isin(early, station.state.kept.numbers).any()
+    assert station.state.n_kept > 12
+    assert station.tip_error < 1.5 * station.state.kept.uncertainty
+
+
+def test_a_lifted_pen_pauses_and_goes_on_in_the_cone() -> None:
+    station = capturing()
+    n_kept = station.state.n_kept
+    station.operator.lift()
+    station.run(3.0)
+    assert station.state.pause is Pause.LIFTED
+    assert station.state.n_kept <= n_kept + 1
+    assert station.happenings()[-1] is Happening.LOST
+
+    station.operator.seat()
+    station.run(6.0)
+    assert station.state.phase is Phase.CAPTURING
+    assert station.state.n_kept > n_kept
+    assert station.tip_error < 1.5 * station.state.kept.uncertainty
+
+
+def test_hidden_leds_pause_after_seven_tenths_of_a_second() -> None:
+    station = capturing()
+    station.operator.cover(0.6)
+    station.run(2.0)
+    assert station.state.phase is Phase.CAPTURING
+    station.operator.cover(2.0)
+    station.run(0.65)
+    assert station.state.phase is Phase.CAPTURING
+    station.run(0.3)
+    assert station.state.pause is Pause.LOST
+    assert station.state.message == Message(Code.PEN_LOST)
+    station.run(4.0)
+    assert station.state.phase is Phase.CAPTURING
+
+
+def test_too_few_leds_are_said_and_not_kept() -> None:
+    station = capturing()
+    n_kept = station.state.n_kept
+    station.operator.cover(leds=[1, 2, 3, 4, 5])
+    station.run(3.0)
+    assert station.state.n_kept <= n_kept + 1
+    assert station.state.message == Message(Code.FEW_LEDS, (5, 6))
+    # Some 60 images, but counted once a posture.
+    assert 1 <= station.state.n_dropped[Reason.TOO_FEW_LEDS] < 20
+
+    station.operator.uncover()
+    station.run(1.0)
+    assert station.state.message == Message(Code.FOLLOW_ARROW)
+
+
+def test_the_users_pause_keeps_nothing_until_the_user_goes_on() -> None:
+    station = capturing()
+    n_kept = station.state.n_kept
+    station.state = pause(station.state)
+    station.run(3.0)
+    assert station.state.pause is Pause.BY_USER
+    assert station.state.n_kept == n_kept
+
+    station.state = resume(station.state)
+    station.run(5.0)
+    assert Phase.COUNTDOWN not in station.phases[-4:]
+    assert station.state.phase is Phase.CAPTURING
+    assert station.state.n_kept > n_kept
+
+
+def test_finishing_early_says_what_is_missing() -> None:
+    station = capturing(4.0)
+    said = {
+        message.code: message.arguments
+        for message in missing(station.setup, station.state)
+    }
+    assert said[Code.TOO_FEW_IMAGES] == (station.state.n_kept, 60)
+    uncertainty, limit, n_more = said[Code.UNCERTAIN]
+    assert isinstance(n_more, int)
+    assert (uncertainty, limit) == (station.state.kept.uncertainty, 0.005)
+    assert n_more > 100
+    n_images, *directions = said[Code.TOO_LITTLE_TILT]
+    assert n_images == int(np.maximum(2 - station.state.counts[1:], 0).sum())
+    bare = np.flatnonzero((station.state.counts[1:] < 2).any(axis=0))
+    assert directions == bare.tolist()
+
+    transition = finish(station.state)
+    assert transition.state.phase is Phase.SOLVING
+    assert transition.events == (SwingEvent(Happening.CAPTURED),)
+
+
+def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
+    limits = SwingLimits(max_uncertainty=1e-4, max_images=70)
+    station = Station(limits=limits)
+    station.operator.seat()
+    station.run(120.0, until=Phase.SOLVING)
+    assert station.state.n_kept == 70
+    assert missing(station.setup, station.state)[-1].code is Code.UNCERTAIN
+
+
+def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
+    station = Station(limits=SwingLimits(max_uncertainty=0.02), sigma=0.01)
+    station.cone = PAPER_CONE + np.array([200.0, 0.0, 0.0])
+    station.operator.seat()
+    station.run(120.0, until=Phase.SOLVING)
+    assert station.state.phase is Phase.SOLVING
+    assert station.state.counts[2, 0] < 2
+
+
+def test_the_verdict_is_told(whole: Station) -> None:
+    good = Message(Code.GOOD, (0.004,))
+    transition = conclude(whole.state, good, passed=True)
+    assert transition.state.phase is Phase.VERDICT
+    assert transition.state.message == good
+    assert transition.events == (SwingEvent(Happening.DONE),)
+    assert conclude(whole.state, good, passed=False).events == (
+        SwingEvent(Happening.FAILED),
+    )
+    assert advance(whole.setup, transition.state, whole.sight(), whole.now).events == ()
+
+
+def test_a_pause_does_not_stop_the_solving(whole: Station) -> None:
+    assert pause(whole.state) is whole.state
+
+
+def test_an_upright_and_still_pen_is_noticed() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.COUNTDOWN)
+    assert station.state.still_since is not None
+    assert station.now - station.state.still_since > 0.5
+    station.operator.swing()
+    station.told = "right"
+    station.run(3.0)
+    assert station.state.still_since is None or (
+        station.now - station.state.still_since < 1.0
+    )
+
+
+def test_three_seconds_upright_and_still_say_yes_and_no_more_than_that() -> None:
+    still = replace(Station().state, still_since=1.0)
+    assert stillness(replace(still, still_since=None, time=9.0)) == 0.0
+    assert stillness(replace(still, time=3.9)) == pytest.approx(2.9 / 3)
+    assert stillness(replace(still, time=4.0)) == 1.0
+    assert stillness(replace(still, time=9.0)) == 1.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_happens_the_events_tell_what_is_kept(seed: int) -> None:
+    station = Station(seed=seed)
+    operator, rng = station.operator, np.random.default_rng(seed)
+    operator.seat()
+    mishaps = (
+        lambda: operator.slip(rng.uniform(0.05, 1.0), rng.uniform(0.1, 4.0)),
+        operator.lift,
+        operator.seat,
+        operator.seat,
+        operator.leave,
+        lambda: operator.cover(rng.uniform(0.1, 2.0)),
+        lambda: operator.cover(rng.uniform(0.1, 2.0), [1, 2, 3, 7]),
+        lambda: station.clock.wait(rng.uniform(0.1, 4.0)),
+    )
+    station.run(8.0)
+    for _ in range(20):
+        mishaps[rng.integers(len(mishaps))]()
+        station.run(rng.uniform(0.3, 4.0))
+
+    recorded: set[int] = set()
+    n_lost = 0
+    for event in station.events:
+        if event.what is Happening.KEPT:
+            assert event.numbers[0] not in recorded
+            recorded |= set(event.numbers)
+        elif event.what is Happening.SLIPPED:
+            assert set(event.numbers) <= recorded
+            recorded -= set(event.numbers)
+            n_lost += len(event.numbers)
+    assert recorded == set(station.state.kept.numbers.tolist())
+    assert n_lost <= station.state.n_dropped[Reason.SLIPPED]
+    assert len(recorded) > 20
+    assert station.tip_error < 2 * station.state.kept.uncertainty
+
+
+def test_an_uncertainty_that_is_not_known_yet_is_not_told_as_a_number() -> None:
+    station = Station()
+    station.operator.seat()
+    station.run(60.0, until=Phase.CAPTURING)
+    codes = [message.code for message in missing(station.setup, station.state)]
+    assert Code.UNKNOWN in codes
+    assert Code.UNCERTAIN not in codes

@@ -1,0 +1,158 @@
+"""Progress: what is missing, and where to lean next."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lightpen.detection.sighting import sight_centers
+from lightpen.messages import Code
+from lightpen.model.limits import SwingLimits
+from lightpen.model.posture import rotations_of
+from lightpen.simulator.postures import Postures
+from lightpen.simulator.swings import (
+    Swing,
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_from_postures,
+    swing_poses,
+)
+from lightpen.swing.kept_images import kept_before
+from lightpen.swing.shortfall import (
+    N_MORE,
+    limits_for_more,
+    measure_shortfall,
+    missing,
+    next_target,
+    oriented,
+    turn_range,
+)
+from lightpen.swing.state import (
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+
+
+def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
+    """Return a swing that has kept these postures."""
+    pixels = simulate_centers(
+        *(CAMERA, PEN, swing.rotations, swing.translations, 0.05),
+        np.random.default_rng(1),
+    )
+    kept = kept_before(
+        *(CAMERA, PEN, np.arange(len(swing)), pixels),
+        *(swing.rotations, swing.translations),
+    )
+    return replace(start_swing(setup), kept=kept)
+
+
+def to_the_right(n: int) -> Swing:
+    rng = np.random.default_rng(0)
+    return swing_from_postures(
+        Postures(
+            np.radians(rng.uniform(0, 30, n)),
+            np.radians(rng.uniform(-100, 100, n)),
+            np.radians(rng.uniform(-30, 30, n)),
+        )
+    )
+
+
+def test_the_estimate_of_images_to_come_holds() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.005))
+    swing = swing_poses(400, np.random.default_rng(0))
+    early = swing_poses(60, np.random.default_rng(0))
+    n_needed = 60 + measure_shortfall(setup, state_of(setup, early)).n_for_uncertainty
+    late = state_of(setup, swing)
+    n_true = 400 * (late.kept.uncertainty / 0.005) ** 2
+    np.testing.assert_allclose(n_needed, n_true, rtol=0.2)
+
+
+def test_no_more_images_are_announced_than_the_limit_allows() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    for max_images, n_more in ((70, 10), (60, 0), (50, 0)):
+        limits = SwingLimits(max_uncertainty=1e-4, max_images=max_images)
+        setup = SwingSetup(CAMERA, PEN, limits)
+        assert measure_shortfall(setup, state_of(setup, swing)).n_more == n_more
+
+
+def test_fields_that_the_camera_cannot_see_are_not_asked_for() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    limits = SwingLimits(min_per_field=2)
+    narrow = replace(CAMERA, width=round(CAMERA.cx) + 50)  # it sees the left half
+    state = state_of(SwingSetup(CAMERA, PEN, limits), swing)
+
+    whole = measure_shortfall(SwingSetup(CAMERA, PEN, limits), state).wanted
+    half = measure_shortfall(SwingSetup(narrow, PEN, limits), state).wanted
+
+    assert whole[0].tolist() == [2] + 7 * [0]
+    assert (whole[1:] == 2).all()
+    assert (half[1:, 0] == 0).all()
+    assert (half[1:, 4] == 2).all()
+
+
+def test_a_swing_that_is_done_can_go_on() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    limits = SwingLimits(max_uncertainty=1.0, max_images=60, min_per_field=0)
+    setup = SwingSetup(CAMERA, PEN, limits)
+    state = state_of(setup, swing)
+    more = replace(setup, limits=limits_for_more(limits, 60))
+
+    assert measure_shortfall(setup, state).is_none
+    assert measure_shortfall(more, state).n_more == N_MORE
+
+
+def test_the_range_of_turns_holds_each_posture_that_was_kept() -> None:
+    rng = np.random.default_rng(4)
+    n_poses = 40
+    turns = rng.uniform(-0.6, 0.5, n_poses)
+    rotations = rotations_of(
+        *(PEN, rng.uniform(0, 0.5, n_poses), rng.uniform(0, 6, n_poses), turns)
+    )
+
+    low, high = turn_range(PEN, rotations) or (0, 0)
+
+    np.testing.assert_allclose((low, high), (turns.min(), turns.max()), atol=1e-9)
+    assert turn_range(PEN, rotations[:0]) is None
+
+
+def test_missing_directions_are_named() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=1.0))
+    state = state_of(setup, to_the_right(120))
+    (message,) = missing(setup, state)
+    assert message.code is Code.TOO_LITTLE_TILT
+    assert set(message.arguments[1:]) == {3, 4, 5}
+
+
+def test_the_target_is_in_a_bare_field_once_the_uncertainty_suffices() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=1.0))
+    state = state_of(setup, to_the_right(120))
+    target = next_target(setup, state, state.kept.rotations[-1])
+    assert target is not None
+    assert round(target.direction / (np.pi / 4)) in (3, 4, 5)
+
+
+def test_there_is_no_target_before_the_tip_rests() -> None:
+    setup = SwingSetup(CAMERA, PEN)
+    upright = rotations_of(PEN, np.zeros(1), np.zeros(1), np.zeros(1))[0]
+    assert next_target(setup, start_swing(setup), upright) is None
+
+
+def test_the_operators_side_is_learnt_from_a_lean_and_kept() -> None:
+    setup = SwingSetup(CAMERA, PEN)
+    state = start_swing(setup)
+    headings = []
+    for tilt, direction in ((5.0, 10.0), (20.0, 170.0), (20.0, 300.0)):
+        swing = swing_from_postures(Postures(*np.radians([[tilt], [direction], [0.0]])))
+        pixels = simulate_centers(
+            *(CAMERA, PEN, swing.rotations, swing.translations, 0.0),
+            np.random.default_rng(0),
+        )
+        sighting = sight_centers(
+            CAMERA, PEN, pixels[0], swing.rotations[0], swing.translations[0]
+        )
+        state = oriented(setup, state, sighting)
+        headings.append(state.heading)
+    assert headings == [None, np.pi, np.pi]
