@@ -1,8 +1,22 @@
 """Errors the user can put right; anything else is a bug and is left to crash."""
 
+from lightpen.sentences import Sentence
+
 
 class LightpenError(Exception):
-    """Base of the errors whose text is shown to the user as it stands."""
+    """Base of the errors that are shown to the user.
+
+    Parameters
+    ----------
+    sentence : Sentence
+        What was found, what is needed and what to do.
+    """
+
+    def __init__(self, sentence: Sentence | str) -> None:
+        super().__init__(sentence)
+        self.sentence = (
+            sentence if isinstance(sentence, Sentence) else Sentence("", sentence)
+        )
 
 
 class FileError(LightpenError):
