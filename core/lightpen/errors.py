@@ -14,9 +14,9 @@ class LightpenError(Exception):
 
     def __init__(self, sentence: Sentence | str) -> None:
         super().__init__(sentence)
-        self.sentence = (
-            sentence if isinstance(sentence, Sentence) else Sentence("", sentence)
-        )
+        if isinstance(sentence, str):
+            sentence = Sentence("", "{text}", {"text": sentence})
+        self.sentence = sentence
 
 
 class FileError(LightpenError):
