@@ -36,7 +36,7 @@ from lightpen_app.work.settings import Preferences, Settings
 
 TIMER_MS = 10
 SAMPLE_MS = 1000
-NAMES = Names("Workbench", "Workbench", "SIM-1", "T-1", "C-1", 10.0)
+NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
 # Never reached, so that each swing goes on to its last image.
 LIMITS = SwingLimits(max_uncertainty=1e-9)
 

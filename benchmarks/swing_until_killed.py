@@ -29,7 +29,7 @@ from lightpen.swing.state import (
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
-NAMES = Names("Workbench", "Workbench", "SIM-1", "T-1", "C-1", 10.0)
+NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
 ENDLESS = SwingLimits(max_uncertainty=1e-9, max_images=100_000)
 
 
