@@ -31,9 +31,6 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
 from lightpen.detection.sighting import look, sight_centers
 from lightpen.live.looking import LiveImage
-from lightpen.live.preparation import (
-    Preparation,
-)
 from lightpen.live.sources import Surroundings
 from lightpen.record.names import Names
 from lightpen.record.results import Result, store_result
@@ -44,6 +41,9 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
+from lightpen.swing.preparation import (
+    Preparation,
+)
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import advance
 from lightpen.swing.state import SwingSetup, SwingState, start_swing

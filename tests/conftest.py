@@ -201,11 +201,6 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
 
     from lightpen.cameras.clock import SkippingClock
     from lightpen.detection.sighting import look
-    from lightpen.live.preparation import (
-        CameraFile,
-        PenFile,
-        Preparation,
-    )
     from lightpen.model.limits import SwingLimits
     from lightpen.record.names import Names
     from lightpen.record.writing import RecordWriter
@@ -215,6 +210,11 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
     from lightpen.swing.capture import capture_image
+    from lightpen.swing.preparation import (
+        CameraFile,
+        PenFile,
+        Preparation,
+    )
     from lightpen.swing.state import (
         start_swing,
     )

@@ -18,7 +18,6 @@ import lightpen_app.work.workbench
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.formats.pen_files import write_pen
-from lightpen.live.preparation import SourceChoice
 from lightpen.live.sources import Surroundings, camera_of
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.unfinished import find_unfinished
@@ -27,6 +26,7 @@ from lightpen.simulator.sample_pens import eight_led_pen
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
+from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.state import Phase
 from lightpen_app.work.settings import Settings, Station
 

@@ -10,10 +10,10 @@ from PySide6.QtCore import QCoreApplication
 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.verdict import Grade
-from lightpen.live.preparation import Lack
 from lightpen.messages import Argument, Code, Message
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.posture import Posture
+from lightpen.swing.preparation import Lack
 from lightpen.swing.state import Pause, Phase
 
 CONTEXT = "phrases"

@@ -26,8 +26,8 @@ from lightpen.cameras.worker import (
     Troubled,
     WorkerEvent,
 )
+from lightpen.detection.aim import Aim
 from lightpen.errors import LightpenError
-from lightpen.live.aim import Aim
 from lightpen.live.looking import (
     Live,
     LiveImage,

@@ -12,9 +12,6 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade, Verdict, judge
 from lightpen.live.looking import Swinging
-from lightpen.live.preparation import (
-    Preparation,
-)
 from lightpen.messages import Code, Message
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names, new_folder
@@ -25,6 +22,9 @@ from lightpen.record.unfinished import (
     discard_swing,
 )
 from lightpen.record.writing import RecordWriter, note_taken_out
+from lightpen.swing.preparation import (
+    Preparation,
+)
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rules import conclude
 from lightpen.swing.state import (

@@ -11,17 +11,17 @@ from PySide6.QtCore import QObject, QThreadPool, Signal
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import FileError, LightpenError
-from lightpen.live.preparation import (
+from lightpen.live.sources import Surroundings, camera_of
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.swing.preparation import (
     CameraFile,
     PenFile,
     Preparation,
     SourceChoice,
     SourceKind,
 )
-from lightpen.live.sources import Surroundings, camera_of
-from lightpen.model.limits import SwingLimits
-from lightpen.record.names import Names
-from lightpen.simulator.scene_files import write_sample_files
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun

@@ -31,10 +31,10 @@ from lightpen.cameras.worker import (
     FrameReady,
     WorkerEvent,
 )
+from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import Sighting, look
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import LightpenError
-from lightpen.live.aim import Aim
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.capture import capture_image
 from lightpen.swing.rules import Transition, finish, pause, resume

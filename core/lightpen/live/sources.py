@@ -7,9 +7,9 @@ from datetime import datetime
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.live.preparation import SourceChoice, SourceKind
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.preparation import SourceChoice, SourceKind
 
 
 @dataclass(frozen=True, eq=False)

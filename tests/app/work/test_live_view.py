@@ -19,13 +19,13 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import Connection
 from lightpen.detection.sighting import look
 from lightpen.live.looking import Swinging
-from lightpen.live.preparation import Preparation
 from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import open_record
 from lightpen.record.writing import RecordWriter, encode_png
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.rules import advance
 from lightpen.swing.state import (
     Happening,

@@ -18,11 +18,6 @@ from lightpen.errors import FileError
 from lightpen.estimation.report import calibration_json
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.pen_files import write_pen
-from lightpen.live.preparation import (
-    PenFile,
-    SourceChoice,
-    SourceKind,
-)
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
@@ -35,6 +30,11 @@ from lightpen.record.unfinished import (
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.swing.preparation import (
+    PenFile,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.state import (
     Happening,

@@ -13,7 +13,10 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.worker import Connection
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
-from lightpen.live.preparation import (
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.writing import encode_png
+from lightpen.swing.preparation import (
     CameraFile,
     Lack,
     PenFile,
@@ -21,9 +24,6 @@ from lightpen.live.preparation import (
     SourceChoice,
     SourceKind,
 )
-from lightpen.model.limits import SwingLimits
-from lightpen.record.names import Names
-from lightpen.record.writing import encode_png
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.workbench import SAMPLES, Workbench
 

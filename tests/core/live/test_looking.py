@@ -12,15 +12,14 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, ImageCamera
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import Connection, ConnectionChanged, Failed, WorkerEvent
+from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import look
 from lightpen.errors import FileError, LightpenError
-from lightpen.live.aim import Aim
 from lightpen.live.looking import (
     Live,
     LiveImage,
     Swinging,
 )
-from lightpen.live.preparation import CameraFile, PenFile, Preparation
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import IMAGES, Record, open_record
@@ -32,6 +31,7 @@ from lightpen.simulator.sample_pens import SAMPLE_PENS
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
+from lightpen.swing.preparation import CameraFile, PenFile, Preparation
 from lightpen.swing.rules import advance
 from lightpen.swing.state import (
     Happening,

@@ -8,11 +8,11 @@ import pytest
 
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
-from lightpen.live.preparation import SourceChoice, SourceKind
 from lightpen.live.sources import Surroundings, camera_of
 from lightpen.record.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.preparation import SourceChoice, SourceKind
 
 
 @pytest.fixture

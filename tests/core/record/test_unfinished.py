@@ -12,11 +12,6 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.live.preparation import (
-    CameraFile,
-    PenFile,
-    Preparation,
-)
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.unfinished import (
@@ -28,6 +23,11 @@ from lightpen.record.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen.swing.preparation import (
+    CameraFile,
+    PenFile,
+    Preparation,
+)
 from lightpen.swing.resuming import read_for_more, read_resumable
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

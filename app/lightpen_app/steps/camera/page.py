@@ -19,8 +19,8 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.detection.inspection import Exposure, inspect
 from lightpen.errors import FileError
-from lightpen.live.preparation import CameraFile, Lack, SourceChoice
 from lightpen.simulator.hand import Doing
+from lightpen.swing.preparation import CameraFile, Lack, SourceChoice
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
-from lightpen.live.preparation import SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.phrases import QT_TRANSLATE_NOOP
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.path_field import PathField

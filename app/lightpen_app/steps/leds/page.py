@@ -12,9 +12,9 @@ from typing_extensions import override
 from lightpen.cameras.worker import Connection
 from lightpen.errors import FileError, LightpenError, UsageError
 from lightpen.formats.pen_files import read_unchecked_pen, write_pen
-from lightpen.live.preparation import PenFile, SourceKind
 from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
 from lightpen.pen_check.match import PenMatch
+from lightpen.swing.preparation import PenFile, SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.file_panel import LedFilePanel

@@ -11,9 +11,6 @@ from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.errors import LightpenError
-from lightpen.live.preparation import (
-    Preparation,
-)
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result, last_result
 from lightpen.record.unfinished import (
@@ -21,6 +18,9 @@ from lightpen.record.unfinished import (
     discard_damaged,
     discard_swing,
     find_unfinished,
+)
+from lightpen.swing.preparation import (
+    Preparation,
 )
 from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text

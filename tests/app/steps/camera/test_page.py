@@ -28,16 +28,16 @@ from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
 from lightpen.live.looking import LiveImage
-from lightpen.live.preparation import (
-    SourceChoice,
-    SourceKind,
-)
 from lightpen.record.names import Names
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Doing
 from lightpen.simulator.scene_files import write_scene
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.view import Lamp
+from lightpen.swing.preparation import (
+    SourceChoice,
+    SourceKind,
+)
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import unbroken
 from lightpen_app.shell.main_window import MainWindow

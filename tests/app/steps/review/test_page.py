@@ -29,11 +29,6 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
-from lightpen.live.preparation import (
-    CameraFile,
-    PenFile,
-    Preparation,
-)
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
@@ -45,6 +40,11 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
+from lightpen.swing.preparation import (
+    CameraFile,
+    PenFile,
+    Preparation,
+)
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.shortfall import N_MORE
 from lightpen_app.steps import review

@@ -27,16 +27,16 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.live.preparation import (
-    SourceChoice,
-    SourceKind,
-)
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.results import Result, last_result, store_result
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen.swing.preparation import (
+    SourceChoice,
+    SourceKind,
+)
 from lightpen_app.look.sounds import Mute, Silence, Sound, Sounds
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page

@@ -15,10 +15,6 @@ from typing_extensions import override
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
-from lightpen.live.preparation import (
-    SourceChoice,
-    SourceKind,
-)
 from lightpen.live.sources import Surroundings
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
@@ -30,6 +26,10 @@ from lightpen.record.unfinished import (
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
+from lightpen.swing.preparation import (
+    SourceChoice,
+    SourceKind,
+)
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.state import (
     Pause,

@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
-from lightpen.live.aim import Aim
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
