@@ -134,10 +134,10 @@ class Soak(QObject):
             QApplication.exit()
             return
         run = self._wizard.workbench.run
-        if run.state is not None and run.state.phase is Phase.VERDICT:
+        if run.status.state is not None and run.status.state.phase is Phase.VERDICT:
             self._n_swings += 1
-            run.set_aside()
-            run.begin(self._wizard.workbench.preparation)
+            run.runner.set_aside()
+            run.runner.begin(self._wizard.workbench.preparation)
 
 
 def _memory_mb() -> float:
@@ -164,7 +164,7 @@ def main() -> int:
         QTimer.singleShot(0, soak.start)
         application.exec()
         print(json.dumps(soak.figures()))
-        workbench.run.abandon()
+        workbench.run.runner.abandon()
         wizard.window.close()
     return 0
 

@@ -41,8 +41,8 @@ def main() -> int:
     run = workbench.run
 
     def tell(event: SwingEvent) -> None:
-        if event.what is Happening.KEPT and run.record_folder is not None:
-            _say("kept", run.record_folder.name, *event.numbers)
+        if event.what is Happening.KEPT and run.status.record_folder is not None:
+            _say("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(tell)
     workbench.set_preparation(
@@ -57,10 +57,10 @@ def main() -> int:
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
         record = offered[0]
-        run.go_on(read_resumable(record.folder))
+        run.runner.go_on(read_resumable(record.folder))
         _say("resumed", record.folder.name, len(record.images))
     else:
-        run.begin(workbench.preparation)
+        run.runner.begin(workbench.preparation)
     return application.exec()
 
 

@@ -131,7 +131,7 @@ class Stage:
 
     def close(self) -> None:
         """Close the window without a question."""
-        self._workbench.run.abandon()
+        self._workbench.run.runner.abandon()
         self.wizard.window.close()
 
     def set_look(self, look: Look) -> None:
@@ -196,9 +196,9 @@ class Stage:
         run = self._workbench.run
         folder = run.records_folder / "20260930-100000_LP-04_T-10-80"
         _record(folder, self._workbench.preparation)
-        run.go_on(read_resumable(folder))
-        run.finish()
-        self._wait_until(lambda: run.solution is not None)
+        run.runner.go_on(read_resumable(folder))
+        run.runner.finish()
+        self._wait_until(lambda: run.status.solution is not None)
 
     def _show_image(self, index: int) -> None:
         image = sealed(render_plan(self._scene, self._shots[index]))

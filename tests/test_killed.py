@@ -76,7 +76,7 @@ def swing(folder):
 
     def say(event):
         if event.what is Happening.KEPT:
-            tell("kept", run.record_folder.name, *event.numbers)
+            tell("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(say)
     clock = around.clock
@@ -85,10 +85,10 @@ def swing(folder):
     workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
-        run.go_on(read_resumable(offered[0].folder))
-        tell("resumed", offered[0].folder.name, run.state.n_kept)
+        run.runner.go_on(read_resumable(offered[0].folder))
+        tell("resumed", offered[0].folder.name, run.status.state.n_kept)
     else:
-        run.begin(workbench.preparation)
+        run.runner.begin(workbench.preparation)
     application.exec()
 
 for line in sys.stdin:

@@ -80,8 +80,7 @@ class Wizard(QObject):
         # Connections
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
-        for part in (self.workbench.live, self.workbench.run):
-            part.relieved.connect(self.window.drop_notice)
+        self.workbench.run.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
@@ -160,7 +159,7 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
             demo.ended.connect(wizard.window.close)
         QTimer.singleShot(0, demo.start)
         status = _shown(application, wizard, signals)
-        if not is_seen and wizard.workbench.run.result is None:
+        if not is_seen and wizard.workbench.run.status.result is None:
             status = status or 1
     return _ended(wizard, status)
 
@@ -212,6 +211,7 @@ def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> 
 
 
 def _print_tip(run: SwingRun) -> None:
-    if run.solution is not None:
-        nominal = run.solution.source.pen.nominal_tip
-        print("\n" + calibration_text(run.solution.calibration, "joint", nominal))
+    solution = run.status.solution
+    if solution is not None:
+        nominal = solution.source.pen.nominal_tip
+        print("\n" + calibration_text(solution.calibration, "joint", nominal))

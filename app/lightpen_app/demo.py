@@ -75,19 +75,19 @@ class Demo(QObject):
         self._n_ticks += 1
         if self._n_ticks < self._pause_ticks:
             return
-        run = self._workbench.run
-        if run.result is not None:
+        status = self._workbench.run.status
+        if status.result is not None:
             self._end(self._farewell() if self._is_watched else "")
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
             self._end(self.tr("The demo ends here: there is no tip to accept."))
-        elif key != "swing" or run.solution is not None:
+        elif key != "swing" or status.solution is not None:
             self._window.press_main()
 
     def _has_failed(self) -> bool:
-        run = self._workbench.run
-        if run.state is None or run.state.phase is not Phase.VERDICT:
+        status = self._workbench.run.status
+        if status.state is None or status.state.phase is not Phase.VERDICT:
             return False
-        return run.verdict is None or not run.verdict.can_be_accepted
+        return status.verdict is None or not status.verdict.can_be_accepted
 
     def _enter(self, key: str) -> None:
         words = {

@@ -91,7 +91,7 @@ def tell(folder, asks):
 def swing(workbench):
     folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(sys.argv[1], folder)
-    workbench.run.go_on(read_resumable(folder))
+    workbench.run.runner.go_on(read_resumable(folder))
     tell_it = lambda: tell(folder, sys.argv[2])
     QTimer.singleShot(100, tell_it)
     if sys.argv[2]:
@@ -156,7 +156,7 @@ def swing_before(workbench: Workbench, stuck: Stuck) -> None:
 
 
 def n_kept(workbench: Workbench) -> int:
-    state = workbench.run.state
+    state = workbench.run.status.state
     return 0 if state is None else state.n_kept
 
 
@@ -214,9 +214,9 @@ def test_closing_waits_for_all_that_is_under_way_together(
 
     monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
     swing_before(workbench, stuck)
-    workbench.run.go_on(read_resumable(interrupted))
+    workbench.run.runner.go_on(read_resumable(interrupted))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
-    workbench.run.finish()
+    workbench.run.runner.finish()
     qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
 
     assert closing_time(workbench) < SOON + AT_ONCE
@@ -236,7 +236,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     )
     workbench.live.open(camera, CameraSettings(), around.clock)
     workbench.live.set_following(True)
-    workbench.run.go_on(read_resumable(interrupted))
+    workbench.run.runner.go_on(read_resumable(interrupted))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
 
     def write(writer: RecordWriter, *image: object) -> int:
@@ -270,13 +270,13 @@ def test_a_solution_that_ends_in_time_is_waited_for(
         return solution
 
     monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
-    workbench.run.go_on(read_resumable(interrupted))
-    workbench.run.finish()
+    workbench.run.runner.go_on(read_resumable(interrupted))
+    workbench.run.runner.finish()
     qtbot.waitUntil(began.is_set, timeout=TIMEOUT)
 
     assert workbench.shut_down()
     assert ended.is_set()
-    assert workbench.run.solution is None
+    assert workbench.run.status.solution is None
     assert_whole(interrupted, N_IMAGES)
 
 
@@ -297,8 +297,8 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
         slow.setattr("lightpen_app.work.swing_run.solve_record", solve)
-        run.go_on(read_resumable(folder))
-        run.finish()
+        run.runner.go_on(read_resumable(folder))
+        run.runner.finish()
         walker.until(stuck.is_reached.is_set)
 
     began = time.monotonic()

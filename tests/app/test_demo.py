@@ -67,5 +67,5 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     with qtbot.waitSignal(demo.ended, timeout=60_000):
         demo.start()
 
-    assert walker.workbench.run.result is None
+    assert walker.workbench.run.status.result is None
     assert "The demo ends here: there is no tip to accept." in walker.window.words()

@@ -248,7 +248,7 @@ def test_in_chinese_no_english_word_is_left(
     reading.timeout.connect(read)
     reading.start()
     walker.swing()
-    walker.until(lambda: walker.workbench.run.solution is not None)
+    walker.until(lambda: walker.workbench.run.status.solution is not None)
     reading.stop()
     for _ in ("verdict", "review", "in force", "start"):
         read_and_go_on()

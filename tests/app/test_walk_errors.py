@@ -114,25 +114,25 @@ def go_to(walker: "Walker", title: str) -> None:
 def keep_on(walker: "Walker", n_more: int = 4) -> None:
     """Wait until the swing has kept some more images."""
     run = walker.workbench.run
-    walker.until(lambda: run.state is not None)
+    walker.until(lambda: run.status.state is not None)
     n_before = n_kept(walker)
     walker.until(lambda: n_kept(walker) >= n_before + n_more)
 
 
 def n_kept(walker: "Walker") -> int:
-    state = walker.workbench.run.state
+    state = walker.workbench.run.status.state
     assert state is not None
     return state.n_kept
 
 
 def phase(walker: "Walker") -> Phase:
-    state = walker.workbench.run.state
+    state = walker.workbench.run.status.state
     assert state is not None
     return state.phase
 
 
 def record_folder(walker: "Walker") -> Path:
-    folder = walker.workbench.run.record_folder
+    folder = walker.workbench.run.status.record_folder
     assert folder is not None
     return folder
 
@@ -346,7 +346,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     assert n_kept(capturing) == n_before
     keep_on(capturing, 8)
     finish_now(capturing)
-    capturing.until(lambda: capturing.workbench.run.solution is not None)
+    capturing.until(lambda: capturing.workbench.run.status.solution is not None)
     capturing.until(capturing.main_button().isEnabled)
     capturing.click("Review")
 
@@ -358,7 +358,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     (again,) = (w for w in capturing.seen() if capturing.names(w) == {"Repeat"})
     capturing.click_on(again)
     capturing.until_shows("Swing")
-    capturing.until(lambda: capturing.workbench.run.record_folder not in (None, first))
+    capturing.until(lambda: capturing.workbench.run.status.record_folder not in (None, first))
     assert open_record(first).verdict == DISCARDED
     assert len(open_record(first).images) >= n_before
     keep_on(capturing)
@@ -378,7 +378,7 @@ def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
     assert capturing.says("The tip is not computed yet.")
 
     capturing.click("Compute again")
-    capturing.until(lambda: capturing.workbench.run.solution is not None)
+    capturing.until(lambda: capturing.workbench.run.status.solution is not None)
     capturing.until(capturing.main_button().isEnabled)
     capturing.click("Review")
 
@@ -461,7 +461,7 @@ def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     capturing.click("Start over")
     assert capturing.tells("Begin anew? The ")
     capturing.click("Begin anew")
-    capturing.until(lambda: capturing.workbench.run.record_folder not in (None, first))
+    capturing.until(lambda: capturing.workbench.run.status.record_folder not in (None, first))
     capturing.until(lambda: open_record(first).verdict == DISCARDED)
     assert len(open_record(first).images) >= n_images
     keep_on(capturing)
@@ -607,7 +607,7 @@ def test_pressing_enter_again_and_again_accepts_once(
     walker = open_wizard()
     go_to(walker, "Swing")
     walker.swing()
-    walker.until(lambda: walker.workbench.run.solution is not None)
+    walker.until(lambda: walker.workbench.run.status.solution is not None)
     walker.until(walker.main_button().isEnabled)
     walker.click("Review")
     button = walker.main_button()

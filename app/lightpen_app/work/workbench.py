@@ -41,8 +41,8 @@ class Workbench(QObject):
 
     Attributes
     ----------
-    live : LiveView
     run : SwingRun
+    live : LiveView
 
     Signals
     -------
@@ -69,8 +69,8 @@ class Workbench(QObject):
         self._preparation = Preparation()
         self._camera_settings = CameraSettings()
         self._is_started = False
-        self.live = LiveView(self)
-        self.run = SwingRun(self.live, folder, self)
+        self.run = SwingRun(folder, self._around.now, self)
+        self.live = LiveView(self.run, self)
 
         # Connections
         self.live.image_shown.connect(self._on_image_shown)
@@ -180,10 +180,12 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
-        self.run.shut_down()
+        self.run.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
-        return self.live.await_closed(max(0.0, deadline - monotonic())) and jobs_ended
+        has_closed = self.live.await_closed(max(0.0, deadline - monotonic()))
+        has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
+        return jobs_ended and has_closed and has_ended
 
     def _files(self, station: Station) -> tuple[CameraFile | None, PenFile | None]:
         """Read the files of a station; what cannot be read must be chosen again."""
@@ -206,10 +208,9 @@ class Workbench(QObject):
         now = self._preparation
         if now.source != before.source:
             self._preparation = now = replace(now, image_size=None)
-            if self.run.is_capturing:  # other images are not of this swing
-                self.run.abandon()
-            if self._is_started:
-                self.open_camera()
+        self.run.runner.choose(now)
+        if now.source != before.source and self._is_started:
+            self.open_camera()
         self.live.set_aim(now.aim)
         self.changed.emit()
 
@@ -272,6 +273,7 @@ class Workbench(QObject):
         size = shown.size.width(), shown.size.height()
         if size != self._preparation.image_size:
             self._preparation = replace(self._preparation, image_size=size)
+            self.run.runner.choose(self._preparation)
             self.changed.emit()
 
     def _on_settings_applied(self, settings: CameraSettings) -> None:

@@ -1,16 +1,12 @@
-"""Every image of a camera looked at as it comes, and a swing captured from them.
+"""Every image of a camera looked at as it comes, and handed to the swing.
 
-One thread looks at the images. While no swing is on it takes the newest and passes over
-those that came meanwhile; during a swing it takes them all, in order. The state of the
-swing belongs to that thread: what a user wants is handed over and done between two
-images.
+One thread looks at the images. While no swing is captured it takes the newest and
+passes over those that came meanwhile; during a swing it takes them all, in order.
 """
 
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from queue import Empty, SimpleQueue
-from threading import Event, Lock, Thread
+from dataclasses import dataclass
+from threading import Event, Thread
 from typing import Protocol
 
 from lightpen.cameras.clock import Clock
@@ -35,23 +31,11 @@ from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import Sighting, look
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import LightpenError
-from lightpen.record.writing import RecordWriter
-from lightpen.swing.capture import capture_image
-from lightpen.swing.rules import Transition, finish, pause, resume
-from lightpen.swing.state import (
-    Happening,
-    Phase,
-    SwingEvent,
-    SwingSetup,
-    SwingState,
-)
+from lightpen.sentences import sentence
+from lightpen.swing.runner import SwingRunner
+from lightpen.swing.state import SwingSetup
 
-LONGEST_WAIT = 0.1  # s, after which wishes are served at the latest
-CAPTURE_ENDS = (Phase.SOLVING, Phase.VERDICT)
-CRASH_SENTENCE = (
-    "The program made a mistake of its own and looks at no more images. Open the "
-    "camera again."
-)
+LONGEST_WAIT = 0.1  # s, after which a swing that began is noticed at the latest
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,38 +57,14 @@ class LiveImage:
     sighting: Sighting | None
 
 
-@dataclass(frozen=True, eq=False)
-class Swinging:
-    """A swing that is being captured.
-
-    Attributes
-    ----------
-    setup : SwingSetup
-    writer : RecordWriter
-        Of its record; closed when the capture ends.
-    state : SwingState
-        From which it goes on.
-    """
-
-    setup: SwingSetup
-    writer: RecordWriter
-    state: SwingState
-
-
 class Listener(Protocol):
     """Who is told, on the thread that looks or on that of the camera."""
 
     def on_image(self, image: LiveImage) -> None:
         """Take an image that was looked at."""
 
-    def on_swing(self, state: SwingState, events: tuple[SwingEvent, ...]) -> None:
-        """Take the state of the swing after an image or a wish."""
-
     def on_camera(self, event: WorkerEvent) -> None:
         """Take what happens to the camera, but for images."""
-
-    def on_trouble(self, error: LightpenError) -> None:
-        """Take why the swing was paused."""
 
 
 class Live:
@@ -117,6 +77,8 @@ class Live:
     settings : CameraSettings
         To be applied when it is opened.
     listener : Listener
+    runner : SwingRunner
+        Takes every image.
     clock : Clock, optional
         The one that the camera goes by.
     """
@@ -126,20 +88,18 @@ class Live:
         camera: ImageCamera,
         settings: CameraSettings,
         listener: Listener,
+        runner: SwingRunner,
         clock: Clock | None = None,
     ) -> None:
         self._worker = CameraWorker(camera, settings, self._on_event, clock=clock)
         self._listener = listener
+        self._runner = runner
         self._aim = Aim()
-        self._swinging: Swinging | None = None
-        self._last: Sighting | None = None
-        self._left: Swinging | None = None
-        self._n_since_kept = 0
+        self._wanted: Aim | SwingSetup = self._aim
+        self._last: Sighting | None = None  # of what is wanted
+        self._measures = False
         self._ready = Event()
         self._stopping = Event()
-        self._wishes: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._has_crashed = Event()
-        self._crash_lock = Lock()  # for the state, which belongs to no thread then
         self._thread = Thread(target=self._run, name="looking", daemon=True)
 
     @property
@@ -158,38 +118,22 @@ class Live:
         self._thread.start()
 
     def stop(self) -> None:
-        """Close the camera and a swing's record, and end both threads.
+        """Close the camera and end both threads.
 
         Raises
         ------
         DeviceLost
             The camera did not come back from a call.
         """
-        self.stop_looking()
-        self._worker.stop()
-
-    def stop_looking(self) -> Swinging | None:
-        """End the thread that looks, and leave the camera to `stop`.
-
-        Returns
-        -------
-        Swinging or None
-            The swing that was being captured; its record is closed.
-        """
         self._stopping.set()
         self._ready.set()
-        if self._thread.ident is None:
-            self._leave()
-        else:
+        if self._thread.ident is not None:
             self._thread.join(LONGEST_STOP)
-        if self._has_crashed.is_set():
-            with self._crash_lock:
-                self._leave()
-        return self._left
+        self._worker.stop()
 
     def set_aim(self, aim: Aim) -> None:
         """Look for something else from the next image on; a swing keeps its own."""
-        self._ask(lambda: self._take_aim(aim))
+        self._aim = aim
 
     def set_exposure(self, exposure_us: float) -> None:
         """Ask the camera for another exposure."""
@@ -199,82 +143,44 @@ class Live:
         """Ask the camera for another gain."""
         self._worker.set_gain(gain_db)
 
-    def swing(self, swinging: Swinging) -> None:
-        """Capture a swing from the next image on."""
-        self._ask(lambda: self._begin(swinging))
-
-    def pause(self) -> None:
-        """Pause the swing for its user."""
-        self._ask(lambda: self._change(lambda state: Transition(pause(state))))
-
-    def resume(self) -> None:
-        """Go on with a swing that its user paused."""
-        self._ask(lambda: self._change(lambda state: Transition(resume(state))))
-
-    def finish(self) -> None:
-        """End the capture with what there is."""
-        self._ask(lambda: self._change(finish))
-
-    def abandon(self, then: Callable[[], None] | None = None) -> None:
-        """Stop capturing; the record stays as it is, to be resumed.
-
-        Parameters
-        ----------
-        then : callable, optional
-            Called when the record is closed; a `LightpenError` that it raises is told
-            as trouble.
-        """
-        self._ask(lambda: self._abandon(then))
-
     def _run(self) -> None:
         try:
             while not self._stopping.is_set():
-                self._serve()
+                setup = self._captured()
                 frame = self._next_frame()
                 if frame is not None:
-                    self._take(frame)
+                    self._take(frame, setup)
         finally:
-            if self._stopping.is_set():
-                self._leave()
-            else:
+            if not self._stopping.is_set():
                 self._give_up()
 
     def _give_up(self) -> None:
         """Tell of a bug and let go of the camera; the swing stays as it is."""
-        self._has_crashed.set()
-        self._listener.on_camera(Failed(LightpenError(CRASH_SENTENCE)))
-        self._serve_late()
+        self._listener.on_camera(
+            Failed(
+                LightpenError(
+                    sentence(
+                        "live.bug",
+                        "The program made a mistake of its own and looks at no more "
+                        "images. Open the camera again.",
+                    )
+                )
+            )
+        )
         with suppress(DeviceLost):  # `stop` tells it
             self._worker.stop()
 
-    def _ask(self, wish: Callable[[], None]) -> None:
-        """Have something done between two images, or at once where none come."""
-        self._wishes.put(wish)
-        if self._has_crashed.is_set():
-            self._serve_late()
-
-    def _serve_late(self) -> None:
-        with self._crash_lock:
-            self._serve()
-
-    def _leave(self) -> None:
-        """Do what is still wished for, and note the swing that ends unfinished."""
-        try:
-            self._serve()
-        finally:
-            self._left = self._swinging or self._left
-            self._end()
-
-    def _serve(self) -> None:
-        while True:
-            try:
-                wish = self._wishes.get_nowait()
-            except Empty:
-                return
-            wish()
+    def _captured(self) -> SwingSetup | None:
+        """Return what is captured now, and take all images while something is."""
+        status = self._runner.status
+        setup = status.setup if status.is_capturing else None
+        if self._measures is not (setup is not None):
+            self._measures = setup is not None
+            self._worker.measure(self._measures)
+        return setup
 
     def _next_frame(self) -> Frame | None:
-        if self._swinging is not None:
+        if self._measures:
             try:
                 return self._worker.next_frame(LONGEST_WAIT)
             except FrameTimeout:
@@ -286,15 +192,18 @@ class Live:
         self._ready.clear()
         return self._worker.latest()
 
-    def _take(self, frame: Frame) -> None:
-        image = self._look(frame)
-        if self._swinging is not None and image.sighting is not None:
-            self._capture(self._swinging, frame, image.sighting)
+    def _take(self, frame: Frame, setup: SwingSetup | None) -> None:
+        wanted = setup or self._aim
+        if wanted is not self._wanted:
+            self._wanted, self._last = wanted, None
+        image = self._look(frame, wanted)
+        caps = self._worker.caps
+        n_images = None if caps is None else caps.n_images
+        self._runner.take(frame, image.sighting, setup, n_images)
         self._listener.on_image(image)
 
-    def _look(self, frame: Frame) -> LiveImage:
-        aim = self._aim if self._swinging is None else _aim_of(self._swinging.setup)
-        camera, pen, mask = aim.camera, aim.pen, aim.mask
+    def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:
+        camera, pen, mask = wanted.camera, wanted.pen, wanted.mask
         height, width = frame.image.shape
         fits = camera is not None and (camera.width, camera.height) == (width, height)
         if camera is None or pen is None or not fits:
@@ -305,81 +214,8 @@ class Live:
         assert spots is not None
         return LiveImage(frame, spots, sighting)
 
-    def _capture(self, swinging: Swinging, frame: Frame, sighting: Sighting) -> None:
-        setup, writer = swinging.setup, swinging.writer
-        time = frame.host_ts_ns * 1e-9
-        before = swinging.state
-        try:
-            transition = capture_image(
-                *(setup, before, writer, frame.image, sighting, time),
-                frame.device_ts_ns,
-            )
-        except LightpenError as error:
-            self._become(swinging, Transition(pause(before)))
-            self._listener.on_trouble(error)
-            return
-        if transition.state.phase is Phase.CAPTURING:
-            is_kept = any(event.what is Happening.KEPT for event in transition.events)
-            self._n_since_kept = 0 if is_kept else self._n_since_kept + 1
-            if self._is_played_out:
-                ended = finish(transition.state)
-                transition = Transition(
-                    ended.state, (*transition.events, *ended.events)
-                )
-        self._become(swinging, transition)
-
-    @property
-    def _is_played_out(self) -> bool:
-        """Whether a recording was played from end to end in vain."""
-        n_images = self._worker.caps.n_images if self._worker.caps else None
-        return n_images is not None and self._n_since_kept >= n_images
-
-    def _take_aim(self, aim: Aim) -> None:
-        self._aim = aim
-        if self._swinging is None:
-            self._last = None
-
-    def _begin(self, swinging: Swinging) -> None:
-        self._end()
-        self._last = None
-        self._n_since_kept = 0
-        self._swinging = swinging
-        self._worker.measure(True)
-        self._listener.on_swing(swinging.state, ())
-
-    def _change(self, act: Callable[[SwingState], Transition]) -> None:
-        if self._swinging is not None:
-            self._become(self._swinging, act(self._swinging.state))
-
-    def _abandon(self, then: Callable[[], None] | None) -> None:
-        self._end()
-        if then is None:
-            return
-        try:
-            then()
-        except LightpenError as error:
-            self._listener.on_trouble(error)
-
-    def _become(self, swinging: Swinging, transition: Transition) -> None:
-        self._swinging = replace(swinging, state=transition.state)
-        if transition.state.phase in CAPTURE_ENDS:
-            self._end()
-        self._listener.on_swing(transition.state, transition.events)
-
-    def _end(self) -> None:
-        """Let go of the swing and its record."""
-        self._worker.measure(False)
-        swinging, self._swinging = self._swinging, None
-        if swinging is not None:
-            self._last = None
-            swinging.writer.close()
-
     def _on_event(self, event: WorkerEvent) -> None:
         if isinstance(event, FrameReady):
             self._ready.set()
         else:
             self._listener.on_camera(event)
-
-
-def _aim_of(setup: SwingSetup) -> Aim:
-    return Aim(setup.camera, setup.pen, setup.mask)

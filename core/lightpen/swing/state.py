@@ -62,6 +62,7 @@ class Happening(StrEnum):
     CAPTURED = "captured"
     DONE = "done"
     FAILED = "failed"
+    CONFIRMED = "confirmed"  # after the verdict, by holding the pen still
 
 
 @dataclass(frozen=True)

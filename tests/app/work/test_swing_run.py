@@ -77,12 +77,12 @@ class Stage:
         self.workbench.set_preparation(
             replace(self.workbench.preparation, limits=limits)
         )
-        self.run.begin(self.workbench.preparation)
+        self.run.runner.begin(self.workbench.preparation)
 
     def capture_more(self) -> None:
         """Go on with a swing that was solved, and wait until it does."""
-        self.run.capture_more()
-        self.wait_until(lambda: self.run.is_capturing)
+        self.run.runner.capture_more()
+        self.wait_until(lambda: self.run.status.is_capturing)
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
         self.qtbot.waitUntil(is_so, timeout=TIMEOUT)
@@ -92,20 +92,20 @@ class Stage:
 
     def wait_for_phase(self, phase: Phase) -> None:
         self.wait_until(
-            lambda: self.run.state is not None and self.run.state.phase is phase
+            lambda: self.run.status.state is not None and self.run.status.state.phase is phase
         )
 
     def wait_until_solved(self) -> None:
         """Wait until nothing is computed any more."""
-        self.wait_until(lambda: not self.run.is_solving)
+        self.wait_until(lambda: not self.run.status.is_solving)
 
     def solution(self) -> Solution:
-        assert self.run.solution is not None
-        return self.run.solution
+        assert self.run.status.solution is not None
+        return self.run.status.solution
 
     def folder(self) -> Path:
-        assert self.run.record_folder is not None
-        return self.run.record_folder
+        assert self.run.status.record_folder is not None
+        return self.run.status.record_folder
 
     def n_recorded(self) -> int:
         return len(open_record(self.folder()).images)
@@ -115,7 +115,7 @@ class Stage:
         return tip
 
     def in_force(self) -> Result | None:
-        names = self.run.names
+        names = self.run.status.names
         return last_result(self.run.results_folder, names.pen, names.tip)
 
     def _note(self, sentence: str) -> None:
@@ -124,7 +124,7 @@ class Stage:
 
 
 def n_kept(run: SwingRun) -> int:
-    return 0 if run.state is None else run.state.n_kept
+    return 0 if run.status.state is None else run.status.state.n_kept
 
 
 def limit_uncertainty(folder: Path, limit: float) -> None:
@@ -152,8 +152,8 @@ def interrupted(workbench: Workbench, swung: Callable[..., Path]) -> Path:
 def solved(stage: Stage, interrupted: Path) -> Stage:
     """A swing that was solved, whose tip can be accepted."""
     limit_uncertainty(interrupted, 1.0)
-    stage.run.go_on(read_resumable(interrupted))
-    stage.run.finish()
+    stage.run.runner.go_on(read_resumable(interrupted))
+    stage.run.runner.finish()
     stage.wait_for_phase(Phase.VERDICT)
     return stage
 
@@ -184,13 +184,13 @@ Command = Callable[[Path], dict[str, Any]]
 def test_a_swing_goes_from_the_first_image_to_the_verdict_without_a_wish(
     stage: Stage, command: Command
 ) -> None:
-    assert (stage.run.state, stage.run.is_capturing) == (None, False)
+    assert (stage.run.status.state, stage.run.status.is_capturing) == (None, False)
     stage.workbench.open_camera()
     assert stage.workbench.live.operator is not None
     stage.workbench.live.operator.seat()
     stage.workbench.live.set_following(True)
     stage.begin()
-    assert stage.run.is_capturing
+    assert stage.run.status.is_capturing
     with stage.qtbot.waitSignal(stage.run.progressed, timeout=TIMEOUT):
         stage.wait_for_phase(Phase.SOLVING)
     stage.wait_for_phase(Phase.VERDICT)
@@ -199,9 +199,9 @@ def test_a_swing_goes_from_the_first_image_to_the_verdict_without_a_wish(
 
     assert kept == [(number,) for number in range(1, stage.n_recorded() + 1)]
     assert others == [Happening.SEATED, Happening.CAPTURED, Happening.DONE]
-    assert stage.run.verdict is not None
-    assert stage.run.verdict.grade is not Grade.REPEAT
-    assert not stage.run.is_capturing
+    assert stage.run.status.verdict is not None
+    assert stage.run.status.verdict.grade is not Grade.REPEAT
+    assert not stage.run.status.is_capturing
     assert stage.sentences == []
     assert stage.tip() == command(stage.folder())["tip_pen_mm"]
 
@@ -220,15 +220,15 @@ def test_without_a_nominal_tip_the_swing_finds_the_seat_and_goes_to_the_verdict(
     stage.workbench.set_preparation(replace(prepared, pen_file=pen_file))
     stage.open_camera()
     stage.begin()
-    assert stage.run.setup is not None
-    assert stage.run.setup.pen.nominal_tip is None
+    assert stage.run.status.setup is not None
+    assert stage.run.status.setup.pen.nominal_tip is None
     stage.wait_for_phase(Phase.VERDICT)
 
     assert stage.happened[0].what is Happening.SEATED
-    assert stage.run.verdict is not None
-    assert stage.run.verdict.grade is not Grade.REPEAT
+    assert stage.run.status.verdict is not None
+    assert stage.run.status.verdict.grade is not Grade.REPEAT
     true_tip = stage.workbench.around.scene.tip_pen
-    uncertainty = stage.run.setup.limits.max_uncertainty
+    uncertainty = stage.run.status.setup.limits.max_uncertainty
     assert np.abs(np.array(stage.tip()) - true_tip).max() < 2 * uncertainty
 
 
@@ -249,27 +249,27 @@ def test_whatever_the_pen_and_the_tip_are_called_the_record_has_a_folder(
     stage: Stage, name: str
 ) -> None:
     names = Names("Hall 2", "Ann", pen=name, tip=name, cone=name)
-    stage.run.begin(replace(stage.workbench.preparation, names=names))
+    stage.run.runner.begin(replace(stage.workbench.preparation, names=names))
 
     assert stage.folder().parent == stage.run.records_folder
-    assert stage.run.names == names
+    assert stage.run.status.names == names
 
 
 def test_a_record_that_cannot_be_made_leaves_the_swing_before(stage: Stage) -> None:
     stage.begin()
-    before, state = stage.folder(), stage.run.state
+    before, state = stage.folder(), stage.run.status.state
     stage.run.records_folder.rename(stage.run.records_folder.with_name("old"))
     stage.run.records_folder.write_text("not a folder")
     with pytest.raises(FileError, match="cannot be written"):
         stage.begin()
 
-    assert stage.run.state is state
+    assert stage.run.status.state is state
     assert stage.folder() == before
 
 
 def test_a_swing_begun_while_the_camera_is_closed_waits_for_it(stage: Stage) -> None:
     stage.begin()
-    assert stage.run.is_capturing
+    assert stage.run.status.is_capturing
     stage.open_camera()
     stage.wait_for_kept(1)
 
@@ -282,8 +282,8 @@ def test_the_swing_is_captured_with_the_files_as_they_are_recorded(
     write_pen(SAMPLE_PENS["six"](), pen_file.path)  # behind the program's back
     stage.begin()
 
-    assert stage.run.setup is not None
-    assert stage.run.setup.pen.n_leds == 6
+    assert stage.run.status.setup is not None
+    assert stage.run.status.setup.pen.n_leds == 6
 
 
 def test_files_that_are_gone_are_told_before_anything_begins(stage: Stage) -> None:
@@ -293,52 +293,52 @@ def test_files_that_are_gone_are_told_before_anything_begins(stage: Stage) -> No
     with pytest.raises(FileError, match="does not exist"):
         stage.begin()
 
-    assert stage.run.state is None
+    assert stage.run.status.state is None
 
 
 def test_a_paused_swing_goes_on_when_it_is_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
-    stage.run.pause()
+    stage.run.runner.pause()
     stage.wait_for_phase(Phase.PAUSED)
-    assert stage.run.state is not None
-    assert stage.run.state.pause is Pause.BY_USER
+    assert stage.run.status.state is not None
+    assert stage.run.status.state.pause is Pause.BY_USER
     n_images = stage.n_recorded()
-    stage.run.resume()
+    stage.run.runner.resume()
     stage.wait_for_kept(n_images + 1)
 
 
 def test_a_paused_swing_can_be_finished(stage: Stage, interrupted: Path) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
-    stage.run.pause()
-    stage.run.finish()
+    stage.run.runner.go_on(read_resumable(interrupted))
+    stage.run.runner.pause()
+    stage.run.runner.finish()
     stage.wait_for_phase(Phase.VERDICT)
 
-    assert stage.run.solution is not None
+    assert stage.run.status.solution is not None
 
 
 def test_a_swing_without_images_ends_with_the_sentence_why(stage: Stage) -> None:
     stage.begin()
-    stage.run.finish()
+    stage.run.runner.finish()
     stage.wait_for_phase(Phase.VERDICT)
-    state = stage.run.state
+    state = stage.run.status.state
     assert state is not None
 
     assert state.message.code is Code.NO_TIP
     assert "holds no images. Resume the swing" in str(state.message.arguments[0])
     assert [e.what for e in stage.happened] == [Happening.CAPTURED, Happening.FAILED]
-    assert (stage.run.solution, stage.run.verdict) == (None, None)
+    assert (stage.run.status.solution, stage.run.status.verdict) == (None, None)
 
 
 def test_a_disk_that_is_gone_pauses_the_swing_and_is_told(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     (interrupted / IMAGES).rename(interrupted / "elsewhere")
     stage.wait_for_phase(Phase.PAUSED)
@@ -348,7 +348,7 @@ def test_a_disk_that_is_gone_pauses_the_swing_and_is_told(
     n_images = n_kept(stage.run)
     assert stage.n_recorded() == n_images
     assert stage.relieved == []
-    stage.run.resume()
+    stage.run.runner.resume()
     stage.wait_for_kept(n_images + 1)
     assert stage.relieved == stage.sentences
 
@@ -360,7 +360,7 @@ def test_the_swing_goes_on_when_its_camera_is_opened_again(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     stage.open_camera()
     n_images = stage.n_recorded()
@@ -376,7 +376,7 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
     stage: Stage, interrupted: Path, wish: str
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
     stage.open_camera()
     getattr(stage.run, wish)()
@@ -384,7 +384,7 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
     if wish == "pause":
         stage.wait_until(
             lambda: (
-                stage.run.state is not None and stage.run.state.pause is Pause.BY_USER
+                stage.run.status.state is not None and stage.run.status.state.pause is Pause.BY_USER
             )
         )
     else:
@@ -393,11 +393,11 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
 
 def test_a_record_that_is_gone_by_then_is_told(stage: Stage, interrupted: Path) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES)
     shutil.move(interrupted, interrupted.with_name("elsewhere"))
     stage.open_camera()
-    stage.wait_until(lambda: stage.run.state is None)
+    stage.wait_until(lambda: stage.run.status.state is None)
 
     assert "does not exist" in stage.sentences[-1]
 
@@ -406,11 +406,11 @@ def test_another_source_leaves_the_swing_to_be_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.workbench.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     source = SourceChoice(SourceKind.RECORDED, str(interrupted))
     stage.workbench.set_preparation(replace(stage.workbench.preparation, source=source))
 
-    assert stage.run.state is None
+    assert stage.run.status.state is None
     assert (
         find_unfinished(stage.run.records_folder).interrupted[0].folder == interrupted
     )
@@ -423,16 +423,16 @@ def test_an_abandoned_swing_is_resumed_with_all_its_images(stage: Stage) -> None
     stage.open_camera()
     stage.begin()
     stage.wait_for_kept(3)
-    folder, names = stage.folder(), stage.run.names
-    stage.run.abandon()
-    assert (stage.run.state, stage.run.record_folder) == (None, None)
+    folder, names = stage.folder(), stage.run.status.names
+    stage.run.runner.abandon()
+    assert (stage.run.status.state, stage.run.status.record_folder) == (None, None)
     stage.workbench.live.close()
     stage.workbench.live.await_closed()
     n_images = len(open_record(folder).images)
-    stage.run.go_on(read_resumable(folder))
+    stage.run.runner.go_on(read_resumable(folder))
 
     assert n_kept(stage.run) == n_images >= 3
-    assert stage.run.names == names
+    assert stage.run.status.names == names
 
 
 def test_a_resumed_swing_goes_by_its_own_files_and_limits(
@@ -440,22 +440,22 @@ def test_a_resumed_swing_goes_by_its_own_files_and_limits(
 ) -> None:
     write_pen(SAMPLE_PENS["six"](), interrupted.parent / "other.json")
     stage.begin(replace(SHORT, max_images=77))
-    stage.run.go_on(read_resumable(interrupted))
-    assert stage.run.setup is not None
+    stage.run.runner.go_on(read_resumable(interrupted))
+    assert stage.run.status.setup is not None
 
-    assert stage.run.setup.pen.n_leds == 10
-    assert stage.run.setup.limits.max_images == 300
-    assert stage.run.setup.limits.min_images == N_IMAGES
+    assert stage.run.status.setup.pen.n_leds == 10
+    assert stage.run.status.setup.limits.max_images == 300
+    assert stage.run.status.setup.limits.min_images == N_IMAGES
 
 
 def test_resuming_the_swing_that_is_under_way_changes_nothing(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.go_on(read_resumable(interrupted))
-    setup = stage.run.setup
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
+    setup = stage.run.status.setup
+    stage.run.runner.go_on(read_resumable(interrupted))
 
-    assert stage.run.setup is setup
+    assert stage.run.status.setup is setup
 
 
 def test_a_damaged_record_is_refused_and_nothing_begins(
@@ -463,9 +463,9 @@ def test_a_damaged_record_is_refused_and_nothing_begins(
 ) -> None:
     (interrupted / JOURNAL).write_bytes(b"{}\n{}\n")
     with pytest.raises(FileError, match="Line 1 of"):
-        stage.run.go_on(read_resumable(interrupted))
+        stage.run.runner.go_on(read_resumable(interrupted))
 
-    assert stage.run.state is None
+    assert stage.run.status.state is None
 
 
 def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
@@ -475,15 +475,15 @@ def test_the_end_of_a_swing_before_is_not_taken_for_the_end_of_this_one(
     stage.begin()
     stage.wait_for_kept(1)
     delivered = stage.workbench.live.stats.delivered
-    stage.run.finish()
+    stage.run.runner.finish()
     deadline = time.monotonic() + TIMEOUT / 1000
     while stage.workbench.live.stats.delivered < delivered + 5:
         assert time.monotonic() < deadline
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 1)
 
-    assert stage.run.is_capturing
-    assert not stage.run.is_solving
+    assert stage.run.status.is_capturing
+    assert not stage.run.status.is_solving
 
 
 # The solution
@@ -504,16 +504,16 @@ def test_so_it_is_after_taking_images_out_and_putting_some_back(
     solved: Stage, command: Command
 ) -> None:
     before = solved.tip()
-    solved.run.take_out([2, 5, 9])
+    solved.run.runner.take_out([2, 5, 9])
     solved.wait_until_solved()
     without = solved.tip()
-    solved.run.put_back([5])
+    solved.run.runner.put_back([5])
     solved.wait_until_solved()
     assert len({tuple(tip) for tip in (before, without, solved.tip())}) == 3
     assert solved.tip() == command(solved.folder())["tip_pen_mm"]
     assert set(open_record(solved.folder()).taken_out) == {2, 9}
 
-    solved.run.put_back([2, 9])
+    solved.run.runner.put_back([2, 9])
     solved.wait_until_solved()
     assert solved.tip() == before == command(solved.folder())["tip_pen_mm"]
 
@@ -522,8 +522,8 @@ def test_images_taken_out_in_quick_succession_all_count(
     solved: Stage, command: Command
 ) -> None:
     for number in range(1, 8):
-        solved.run.take_out([number])
-    solved.run.put_back([4])
+        solved.run.runner.take_out([number])
+    solved.run.runner.put_back([4])
     solved.wait_until_solved()
 
     assert set(solved.solution().taken_out) == {1, 2, 3, 5, 6, 7}
@@ -534,10 +534,10 @@ def test_images_taken_out_in_quick_succession_all_count(
 
 
 def test_too_few_images_left_keep_the_solution_and_the_record(solved: Stage) -> None:
-    solved.run.take_out([1])
+    solved.run.runner.take_out([1])
     solved.wait_until_solved()
     before, journal = solved.solution(), (solved.folder() / JOURNAL).read_bytes()
-    solved.run.take_out(range(1, N_IMAGES))
+    solved.run.runner.take_out(range(1, N_IMAGES))
     solved.wait_until_solved()
 
     assert solved.solution() is before
@@ -548,15 +548,15 @@ def test_too_few_images_left_keep_the_solution_and_the_record(solved: Stage) -> 
         in (solved.sentences[-1])
     )
     assert solved.relieved == []
-    solved.run.take_out([2])  # what failed is not asked for again
+    solved.run.runner.take_out([2])  # what failed is not asked for again
     solved.wait_until_solved()
     assert set(solved.solution().taken_out) == {1, 2}
     assert solved.relieved == solved.sentences
 
 
 def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: Stage) -> None:
-    solved.run.take_out(range(1, N_IMAGES))
-    solved.run.put_back(range(4, N_IMAGES))
+    solved.run.runner.take_out(range(1, N_IMAGES))
+    solved.run.runner.put_back(range(4, N_IMAGES))
     solved.wait_until_solved()
 
     assert set(solved.solution().taken_out) == {1, 2, 3}
@@ -567,7 +567,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: Stage) -> No
     before = solved.solution()
     journal = solved.folder() / JOURNAL
     journal.rename(journal.with_name("elsewhere"))
-    solved.run.take_out([3])
+    solved.run.runner.take_out([3])
     solved.wait_until_solved()
     journal.with_name("elsewhere").rename(journal)
 
@@ -575,7 +575,7 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: Stage) -> No
     assert "does not exist" in solved.sentences[-1]
     assert "stay in" not in solved.sentences[-1]
     assert solved.relieved == []
-    solved.run.take_out([3])
+    solved.run.runner.take_out([3])
     solved.wait_until_solved()
     assert solved.relieved == solved.sentences
 
@@ -583,26 +583,26 @@ def test_a_record_that_cannot_be_written_keeps_the_solution(solved: Stage) -> No
 def test_solving_can_be_cancelled_and_done_again(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.go_on(read_resumable(interrupted))
-    stage.run.finish()
-    assert stage.run.is_solving
-    stage.run.cancel()
-    assert not stage.run.is_solving
-    assert stage.run.solution is None
+    stage.run.runner.go_on(read_resumable(interrupted))
+    stage.run.runner.finish()
+    assert stage.run.status.is_solving
+    stage.run.runner.cancel()
+    assert not stage.run.status.is_solving
+    assert stage.run.status.solution is None
 
-    stage.run.solve()
+    stage.run.runner.solve()
     stage.wait_for_phase(Phase.VERDICT)
-    assert stage.run.solution is not None
+    assert stage.run.status.solution is not None
 
 
 def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
     solved: Stage,
 ) -> None:
     before, journal = solved.solution(), (solved.folder() / JOURNAL).read_bytes()
-    solved.run.take_out([3])
-    solved.run.cancel()
-    assert not solved.run.is_solving
-    solved.run.take_out([7])
+    solved.run.runner.take_out([3])
+    solved.run.runner.cancel()
+    assert not solved.run.status.is_solving
+    solved.run.runner.take_out([7])
     solved.wait_until_solved()
 
     assert before.taken_out == {}
@@ -612,11 +612,11 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
 
 
 def test_a_solution_asked_for_without_a_swing_is_a_mistake(stage: Stage) -> None:
-    for act in (stage.run.solve, stage.run.capture_more, stage.run.set_aside):
+    for act in (stage.run.runner.solve, stage.run.runner.capture_more, stage.run.runner.set_aside):
         with pytest.raises(ValueError, match="needs a swing"):
             act()
     with pytest.raises(ValueError, match="must be solved"):
-        stage.run.take_out([1])
+        stage.run.runner.take_out([1])
 
 
 # Accepting, or not
@@ -625,14 +625,14 @@ def test_a_solution_asked_for_without_a_swing_is_a_mistake(stage: Stage) -> None
 def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     solved: Stage,
 ) -> None:
-    first = solved.run.accept()
-    solved.run.take_out([1])
+    first = solved.run.runner.accept()
+    solved.run.runner.take_out([1])
     solved.wait_until_solved()
     before = solved.in_force()
     assert before is not None
     assert before.accepted == first.accepted
 
-    second = solved.run.accept()
+    second = solved.run.runner.accept()
     in_force = solved.in_force()
     assert in_force is not None
     assert in_force.accepted == second.accepted
@@ -642,9 +642,9 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
 
 def test_an_accepted_swing_is_concluded_and_no_longer_offered(solved: Stage) -> None:
     assert len(find_unfinished(solved.run.records_folder).interrupted) == 1
-    result = solved.run.accept()
+    result = solved.run.runner.accept()
 
-    assert solved.run.result is result
+    assert solved.run.status.result is result
     assert open_record(solved.folder()).verdict == result.grade
     assert result.record == str(solved.folder())
     assert find_unfinished(solved.run.records_folder).interrupted == ()
@@ -654,51 +654,51 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
     stage: Stage, interrupted: Path
 ) -> None:
     limit_uncertainty(interrupted, 1e-6)
-    stage.run.go_on(read_resumable(interrupted))
-    stage.run.finish()
+    stage.run.runner.go_on(read_resumable(interrupted))
+    stage.run.runner.finish()
     stage.wait_for_phase(Phase.VERDICT)
-    assert stage.run.verdict is not None
-    assert stage.run.verdict.grade is Grade.REPEAT
+    assert stage.run.status.verdict is not None
+    assert stage.run.status.verdict.grade is Grade.REPEAT
 
     with pytest.raises(ValueError, match="must not be repeat"):
-        stage.run.accept()
+        stage.run.runner.accept()
     assert stage.in_force() is None
     assert open_record(interrupted).verdict is None
 
 
 def test_no_more_is_captured_for_a_tip_in_force(solved: Stage) -> None:
-    solved.run.accept()
+    solved.run.runner.accept()
     with pytest.raises(ValueError, match="begin another one"):
-        solved.run.capture_more()
+        solved.run.runner.capture_more()
 
 
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: Stage) -> None:
     solved.run.results_folder.write_text("not a folder")
     with pytest.raises(FileError, match="cannot be made"):
-        solved.run.accept()
+        solved.run.runner.accept()
 
-    assert solved.run.result is None
+    assert solved.run.status.result is None
     assert open_record(solved.folder()).verdict is None
 
 
 def test_a_new_solution_has_to_be_accepted_anew(solved: Stage) -> None:
-    solved.run.accept()
-    solved.run.take_out([1])
+    solved.run.runner.accept()
+    solved.run.runner.take_out([1])
     solved.wait_until_solved()
 
-    assert solved.run.result is None
+    assert solved.run.status.result is None
 
 
 def test_more_images_can_be_captured_after_the_verdict(
     solved: Stage, command: Command
 ) -> None:
-    solved.run.take_out([3])
+    solved.run.runner.take_out([3])
     solved.wait_until_solved()
     solved.open_camera()
     solved.capture_more()
-    assert solved.run.solution is None
+    assert solved.run.status.solution is None
     solved.wait_for_kept(N_IMAGES)  # one was taken out, one came
-    solved.run.finish()
+    solved.run.runner.finish()
     solved.wait_for_phase(Phase.VERDICT)
 
     assert solved.n_recorded() > N_IMAGES
@@ -715,29 +715,29 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     n_kept_first = n_kept(stage.run)
     stage.capture_more()
     stage.wait_for_kept(n_kept_first + 1)
-    stage.run.finish()
+    stage.run.runner.finish()
     stage.wait_for_phase(Phase.VERDICT)
 
-    ended = stage.run.state
-    assert stage.run.verdict is not None, ended and ended.message
-    assert stage.run.verdict.reason.code is not Code.TOO_FEW_IMAGES
+    ended = stage.run.status.state
+    assert stage.run.status.verdict is not None, ended and ended.message
+    assert stage.run.status.verdict.reason.code is not Code.TOO_FEW_IMAGES
 
 
 def test_more_images_can_be_captured_while_a_wish_is_computed(solved: Stage) -> None:
-    solved.run.take_out([3])
+    solved.run.runner.take_out([3])
     solved.open_camera()
     solved.capture_more()
     solved.wait_for_kept(N_IMAGES + 2)
 
     assert open_record(solved.folder()).taken_out == {}
-    assert solved.run.solution is None
+    assert solved.run.status.solution is None
 
 
 def test_a_solved_swing_is_set_aside_with_its_images(solved: Stage) -> None:
     folder = solved.folder()
-    solved.run.set_aside()
+    solved.run.runner.set_aside()
 
-    assert solved.run.state is None
+    assert solved.run.status.state is None
     assert open_record(folder).verdict == "discarded"
     assert len(open_record(folder).images) == N_IMAGES
     assert find_unfinished(solved.run.records_folder).interrupted == ()
@@ -747,9 +747,9 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 2)
-    stage.run.set_aside()
+    stage.run.runner.set_aside()
     stage.wait_until(lambda: open_record(interrupted).verdict == "discarded")
     stage.begin()
     stage.wait_for_kept(1)
@@ -768,14 +768,14 @@ def test_a_bug_while_the_tip_is_computed_leaves_the_swing_to_be_solved_again(
     monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
     with monkeypatch.context() as broken:
         broken.setattr("lightpen_app.work.swing_run.solve_record", lambda *_: 1 / 0)
-        stage.run.go_on(read_resumable(interrupted))
-        stage.run.finish()
+        stage.run.runner.go_on(read_resumable(interrupted))
+        stage.run.runner.finish()
         stage.wait_until_solved()
         stage.wait_until(lambda: len(caught) == 1)
     assert isinstance(caught[0], ZeroDivisionError)
-    assert stage.run.solution is None
+    assert stage.run.status.solution is None
 
-    stage.run.solve()
+    stage.run.runner.solve()
     stage.wait_for_phase(Phase.VERDICT)
 
 
@@ -787,8 +787,8 @@ def test_a_bug_while_images_are_read_again_leaves_the_solution(
     before = solved.solution()
     with monkeypatch.context() as broken:
         broken.setattr("lightpen_app.work.swing_run.read_for_more", lambda _: 1 / 0)
-        solved.run.capture_more()
-        solved.wait_until(lambda: not solved.run.is_reading and len(caught) == 1)
+        solved.run.runner.capture_more()
+        solved.wait_until(lambda: not solved.run.status.is_reading and len(caught) == 1)
     assert solved.solution() is before
 
     solved.capture_more()
@@ -801,9 +801,9 @@ def test_a_bug_while_images_are_read_again_leaves_the_solution(
 def test_closing_while_a_solution_is_computed_leaves_the_swing_to_be_resumed(
     stage: Stage, interrupted: Path
 ) -> None:
-    stage.run.go_on(read_resumable(interrupted))
-    stage.run.finish()
-    assert stage.run.is_solving
+    stage.run.runner.go_on(read_resumable(interrupted))
+    stage.run.runner.finish()
+    assert stage.run.status.is_solving
     stage.workbench.shut_down()
 
     assert (
@@ -816,7 +816,7 @@ def test_closing_while_images_are_captured_keeps_all_of_them(
     stage: Stage, interrupted: Path
 ) -> None:
     stage.open_camera()
-    stage.run.go_on(read_resumable(interrupted))
+    stage.run.runner.go_on(read_resumable(interrupted))
     stage.wait_for_kept(N_IMAGES + 2)
     stage.workbench.shut_down()
     n_images = len(open_record(interrupted).images)

@@ -403,9 +403,9 @@ def test_a_swing_of_a_recorded_source_finds_its_images(
     )
     stage.workbench.open_camera()
     stage.wait_for_size((1224, 1024))
-    stage.workbench.run.begin(stage.workbench.preparation)
+    stage.workbench.run.runner.begin(stage.workbench.preparation)
     run = stage.workbench.run
-    stage.qtbot.waitUntil(lambda: run.state is not None and run.state.n_kept >= 3)
+    stage.qtbot.waitUntil(lambda: run.status.state is not None and run.status.state.n_kept >= 3)
 
 
 def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:

@@ -85,7 +85,7 @@ class CameraPage(Page):
         self._stray.cover_requested.connect(self._on_cover_requested)
         self._exposure.exposure_changed.connect(self._live.set_exposure)
         self._exposure.gain_changed.connect(self._live.set_gain)
-        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.run.changed.connect(self._remark_swing)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
@@ -94,7 +94,7 @@ class CameraPage(Page):
         self._live.failed.connect(self._on_failed)
 
         self._retranslate()
-        self._on_bench_changed()
+        self._on_workbench_changed()
 
     @override
     def title(self) -> str:
@@ -195,7 +195,7 @@ class CameraPage(Page):
 
     # What is chosen
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         now = self._workbench.preparation
         self._source.set_value(now.source)
         self._intrinsics.set_value(now.camera_file)
@@ -337,7 +337,7 @@ class CameraPage(Page):
 
     def _remark_swing(self) -> None:
         remark = Remark()
-        if self._workbench.run.is_capturing:
+        if self._workbench.run.status.is_capturing:
             words = self.tr(
                 "A swing is under way. Another source ends it; other intrinsics and "
                 "another mask count from the next swing on."

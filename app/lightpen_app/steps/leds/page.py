@@ -91,11 +91,11 @@ class LedsPage(Page):
         self._space.led_chosen.connect(self._table.set_chosen)
         self._space.move_requested.connect(self._on_move_requested)
         self._watch.value_changed.connect(self._on_match_changed)
-        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.live.image_shown.connect(self._on_image_shown)
         self._workbench.live.connection_changed.connect(self._on_connection_changed)
 
-        self._on_bench_changed()
+        self._on_workbench_changed()
 
     @override
     def title(self) -> str:
@@ -134,7 +134,7 @@ class LedsPage(Page):
     def left(self) -> None:
         self._is_shown = False
         self._watch.stop()
-        if self._is_pending and not self._workbench.run.is_capturing:
+        if self._is_pending and not self._workbench.run.status.is_capturing:
             self._workbench.live.set_aim(self._workbench.preparation.aim)
 
     @override
@@ -191,7 +191,7 @@ class LedsPage(Page):
             return lack_text(lack)
         return ""
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         preparation = self._workbench.preparation
         file = preparation.pen_file
         if file is not self._in_use:
@@ -367,7 +367,7 @@ class LedsPage(Page):
         pen = self._check.sought
         preparation = self._workbench.preparation
         self._watch.set_pen(preparation.camera, pen)
-        if not self._workbench.run.is_capturing:
+        if not self._workbench.run.status.is_capturing:
             aimed = replace(preparation.aim, pen=pen)
             self._workbench.live.set_aim(aimed if self._is_pending else preparation.aim)
         self._refresh_live()

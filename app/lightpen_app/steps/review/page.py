@@ -20,6 +20,7 @@ from lightpen.estimation.verdict import (
 )
 from lightpen.record.results import Result, last_result
 from lightpen.record.solving import Solution
+from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.signs import Sign
@@ -67,7 +68,9 @@ class ReviewPage(Page):
         self._solution: Solution | None = None
         self._last: Result | None = None
         self._told: tuple[object, ...] = ()
-        self._wants_more = False
+        self._result_shown: Result | None = None
+        self._wants_more = self._repeats = False
+
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
@@ -101,16 +104,17 @@ class ReviewPage(Page):
 
         # Connections
         self._run.changed.connect(self._on_run_changed)
+        self._run.troubled.connect(self._on_run_troubled)
         self._run.progressed.connect(self._on_progressed)
-        self._cancel.clicked.connect(self._run.cancel)
+        self._cancel.clicked.connect(self._run.runner.cancel)
         self._patience.timeout.connect(self._solving.show)
         self._acceptance.timeout.connect(self.changed)
         self._capture_more.clicked.connect(self._on_capture_more_clicked)
         self._repeat.clicked.connect(self._question.ask)
         self._question.agreed.connect(self._on_repeat_agreed)
         self._question.declined.connect(self._repeat.setFocus)
-        self._images.take_out_requested.connect(self._run.take_out)
-        self._images.put_back_requested.connect(self._run.put_back)
+        self._images.take_out_requested.connect(self._run.runner.take_out)
+        self._images.put_back_requested.connect(self._run.runner.put_back)
         self._tabs.currentChanged.connect(self._fill_tab)
         for panel in self._panels:
             panel.saved.connect(self.status_changed)
@@ -124,9 +128,9 @@ class ReviewPage(Page):
 
     @override
     def lead(self) -> str:
-        if self._run.result is not None:
+        if self._run.status.result is not None:
             return self.tr("Next: start the next calibration, or close the program.")
-        if self._run.verdict is None:
+        if self._run.status.verdict is None:
             return self.tr("Nothing is in force until it is accepted.")
         return {
             NextStep.ACCEPT: self.tr(
@@ -139,19 +143,20 @@ class ReviewPage(Page):
             NextStep.CHECK_FILES: self.tr(
                 "Next: check the intrinsics file and the LED file, then repeat."
             ),
-        }[self._run.verdict.next_step]
+        }[self._run.status.verdict.next_step]
 
     @override
     def is_complete(self) -> bool:
-        return self._run.result is not None
+        return self._run.status.result is not None
 
     @override
     def why_closed(self) -> str:
-        return "" if self._run.solution is not None else self.tr("Swing the pen first.")
+        has_tip = self._run.status.solution is not None
+        return "" if has_tip else self.tr("Swing the pen first.")
 
     @override
     def main_action(self) -> MainAction:
-        if self._run.result is not None:
+        if self._run.status.result is not None:
             # The second click of a double one must not go on at once.
             is_new = self._acceptance.isActive()
             why_not = self.tr("The tip is in force.") if is_new else ""
@@ -160,17 +165,13 @@ class ReviewPage(Page):
 
     @override
     def run_main_action(self) -> None:
-        if self._run.result is not None:
-            self._run.abandon()
+        if self._run.status.result is not None:
+            self._run.runner.abandon()
             self.step_requested.emit("start")
             return
         if self._why_not_accepted():
             return
-        self._acceptance.start(2 * QApplication.doubleClickInterval())
-        try:
-            self._run.accept()
-        except FileError as error:
-            self.notice_raised.emit(str(error))
+        self._run.runner.accept()
 
     @override
     def first_control(self) -> QWidget:
@@ -182,7 +183,7 @@ class ReviewPage(Page):
 
     @override
     def unsaved(self) -> str:
-        if self._run.solution is None or self._run.result is not None:
+        if self._run.status.solution is None or self._run.status.result is not None:
             return ""
         return self.tr(
             "The tip is not accepted. The swing is kept and offered again at the next "
@@ -274,27 +275,32 @@ class ReviewPage(Page):
                 side.show()  # a tab that is not the current one is hidden
 
     def _why_not_accepted(self) -> str:
-        if self._run.solution is None or self._run.verdict is None:
+        if self._run.status.solution is None or self._run.status.verdict is None:
             return self.tr("Swing the pen first.")
-        if self._run.is_solving:
+        if self._run.status.is_solving:
             return self.tr("The tip is being computed.")
-        if self._run.is_reading:
+        if self._run.status.is_reading:
             return self.tr("The swing goes on.")
-        if not self._run.verdict.can_be_accepted:
+        if self._run.status.activity is Activity.ACCEPTING:
+            return self.tr("The result is being stored.")
+        if not self._run.status.verdict.can_be_accepted:
             return self.tr("Not good enough: capture more images, or repeat the swing.")
         return ""
 
     @Slot()
     def _on_run_changed(self) -> None:
-        run = self._run
+        status = self._run.status
         told = (
-            *(run.solution, run.verdict, run.result),
-            *(run.is_solving, run.is_reading),
+            *(status.solution, status.verdict, status.result),
+            *(status.activity, status.is_capturing),
         )
         if told == self._told:
             return  # a swing that is captured changes twenty times a second
         self._told = told
-        if run.is_solving:
+        if status.result is not self._result_shown:
+            self._result_shown = status.result
+            self._acceptance.start(2 * QApplication.doubleClickInterval())
+        if status.is_solving:
             self._progress.setValue(0)
             self._patience.start()
         else:
@@ -303,14 +309,17 @@ class ReviewPage(Page):
         if self.isVisible():
             self._refresh()
         self.changed.emit()
-        if self._wants_more and not run.is_reading:
+        if self._wants_more and not status.is_reading:
             self._wants_more = False
-            if run.is_capturing:
+            if status.is_capturing:
                 self.step_requested.emit("swing")
+        if self._repeats and status.solution is None:
+            self._repeats = False
+            self.step_requested.emit("swing")
 
     def _refresh(self) -> None:
         """Show what there is now."""
-        solution = self._run.solution
+        solution = self._run.status.solution
         if solution is not self._solution:
             self._solution = solution
             self._question.hide()
@@ -328,10 +337,10 @@ class ReviewPage(Page):
     def _outcome(self, solution: Solution | None) -> Outcome | None:
         if solution is None:
             return None
-        return Outcome(solution, self._run.names, self._last_accepted())
+        return Outcome(solution, self._run.status.names, self._last_accepted())
 
     def _last_accepted(self) -> Result | None:
-        names = self._run.names
+        names = self._run.status.names
         try:
             return last_result(self._run.results_folder, names.pen, names.tip)
         except FileError as error:
@@ -339,15 +348,15 @@ class ReviewPage(Page):
             return None
 
     def _refresh_words(self) -> None:
-        run = self._run
+        status = self._run.status
         self._banner.set_value(self._state())
         self._remarks.set_value(self._warnings())
         why_locked = ""
-        if run.result is not None:
+        if status.result is not None:
             why_locked = self.tr("The tip is accepted; start the next calibration.")
-        elif run.solution is None:
+        elif status.solution is None:
             why_locked = self.tr("Swing the pen first.")
-        goes_on = self.tr("The swing goes on.") if run.is_reading else ""
+        goes_on = self.tr("The swing goes on.") if status.is_reading else ""
         self._images.set_locked(why_locked or goes_on)
         for button, step, what in (
             (
@@ -362,21 +371,21 @@ class ReviewPage(Page):
             ),
         ):
             button.set_why_not(why_locked, what)
-            _recommend(button, not why_locked and _is_next(run.verdict, step))
+            _recommend(button, not why_locked and _is_next(status.verdict, step))
 
     def _state(self) -> State:
-        run = self._run
-        if run.result is not None:
-            since = f"{run.result.accepted.astimezone():%Y-%m-%d %H:%M:%S}"
+        status = self._run.status
+        if status.result is not None:
+            since = f"{status.result.accepted.astimezone():%Y-%m-%d %H:%M:%S}"
             text = self.tr("Since {0}. Earlier results are kept.").format(since)
             return State(self.tr("IN FORCE"), text, Sign.CHECK, Tone.GOOD)
-        if run.verdict is None:
+        if status.verdict is None:
             text = self.tr("The tip shows here once the pen is swung.")
             return State(self.tr("NO TIP YET"), text, Sign.WAIT, Tone.QUIET)
-        heading = None if run.state is None else run.state.heading
-        said = phrase(run.verdict.reason, heading)
-        sign, tone = GRADE_MARKS[run.verdict.grade]
-        word = self.tr("{0}: {1}").format(grade_text(run.verdict.grade), said.short)
+        heading = None if status.state is None else status.state.heading
+        said = phrase(status.verdict.reason, heading)
+        sign, tone = GRADE_MARKS[status.verdict.grade]
+        word = self.tr("{0}: {1}").format(grade_text(status.verdict.grade), said.short)
         return State(word, said.hint, sign, tone)
 
     def _warnings(self) -> tuple[Remark, ...]:
@@ -391,15 +400,14 @@ class ReviewPage(Page):
 
     def _on_capture_more_clicked(self) -> None:
         self._wants_more = True
-        self._run.capture_more()
+        self._run.runner.capture_more()
 
     def _on_repeat_agreed(self) -> None:
-        try:
-            self._run.set_aside()
-        except FileError as error:
-            self.notice_raised.emit(str(error))
-            return
-        self.step_requested.emit("swing")
+        self._repeats = True
+        self._run.runner.set_aside()
+
+    def _on_run_troubled(self) -> None:
+        self._repeats = False
 
 
 def _is_next(verdict: Verdict | None, step: NextStep) -> bool:

@@ -10,7 +10,6 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen.errors import LightpenError
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result, last_result
 from lightpen.record.unfinished import (
@@ -59,6 +58,7 @@ class StartPage(Page):
         self._lookup: Job | None = None
         self._search: Job | None = None
         self._work: Job | None = None
+        self._resumed: Path | None = None
 
         # Widgets: the order of making them is the order of the Tab key
         self._names = NamesForm()
@@ -104,7 +104,9 @@ class StartPage(Page):
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
         self._interrupted.search_requested.connect(self._search_interrupted)
-        workbench.changed.connect(self._on_bench_changed)
+        workbench.changed.connect(self._on_workbench_changed)
+        workbench.run.changed.connect(self._on_run_changed)
+        workbench.run.troubled.connect(self._on_run_troubled)
 
         self._show_changes(None, self._shown)
         self._retranslate()
@@ -227,7 +229,7 @@ class StartPage(Page):
 
     # What is shown
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         before, now = self._shown, self._workbench.preparation
         self._shown = now
         self._show_changes(before, now)
@@ -292,7 +294,7 @@ class StartPage(Page):
         self._search.failed.connect(self.notice_raised)
 
     def _on_interrupted_found(self, swings: Unfinished) -> None:
-        present = self._workbench.run.record_folder
+        present = self._workbench.run.status.record_folder
         others = Unfinished(
             tuple(r for r in swings.interrupted if r.folder != present),
             tuple(r for r in swings.under_way if r.folder != present),
@@ -348,12 +350,17 @@ class StartPage(Page):
         self._names.set_stations(workbench.stations())
 
     def _go_on(self, swing: Resumable) -> None:
-        try:
-            self._workbench.run.go_on(swing)
-        except LightpenError as error:
-            self.notice_raised.emit(str(error))
-            return
-        self.step_requested.emit("swing")
+        self._resumed = swing.record.folder
+        self._workbench.run.runner.go_on(swing)
+
+    def _on_run_changed(self) -> None:
+        status = self._workbench.run.status
+        if self._resumed is not None and status.record_folder == self._resumed:
+            self._resumed = None
+            self.step_requested.emit("swing")
+
+    def _on_run_troubled(self) -> None:
+        self._resumed = None
 
     def _on_discard_requested(self, folder: Path) -> None:
         self._interrupted.set_waiting(self.tr("The swing is being discarded."))

@@ -1,13 +1,11 @@
-"""What the live images show while a swing is on, and a pen that is held still."""
+"""What the live images show while a swing is on, in a few words."""
 
 from collections import deque
-from dataclasses import replace
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject
 
 from lightpen.live.looking import LiveImage
-from lightpen.swing.rules import advance, stillness
-from lightpen.swing.state import Phase, SwingSetup, SwingState
+from lightpen.swing.state import SwingSetup
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.swing_run import SwingRun
 
@@ -20,21 +18,13 @@ class SwingSight(QObject):
     Parameters
     ----------
     run : SwingRun
-
-    Signals
-    -------
-    continued()
-        After the verdict the pen was held upright and still.
     """
-
-    continued = Signal()
 
     def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._run = run
         self._seen: LiveImage | None = None
         self._arrivals: deque[tuple[float, int]] = deque()  # time, number of the image
-        self._watched: SwingState | None = None
 
     def take(self, shown: Shown) -> None:
         """Look at one more image."""
@@ -46,11 +36,10 @@ class SwingSight(QObject):
         self._arrivals.append((time, frame.seq))
         while time - self._arrivals[0][0] > RATE_S:
             self._arrivals.popleft()
-        self._watch(shown.seen, time)
 
     def words(self) -> str:
         """Return what the last image shows, a few words; nothing without one."""
-        seen, setup = self._seen, self._run.setup
+        seen, setup = self._seen, self._run.status.setup
         if seen is None or setup is None:
             return ""
         if not _is_of_size(seen, setup):
@@ -65,21 +54,6 @@ class SwingSight(QObject):
             return 0.0
         (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
         return (last - first) / (end - start)
-
-    def stillness(self) -> float:
-        """Return how long the pen is upright and still: 1 is long enough."""
-        return 0.0 if self._watched is None else stillness(self._watched)
-
-    def _watch(self, seen: LiveImage, time: float) -> None:
-        state, setup = self._run.state, self._run.setup
-        if state is None or setup is None or state.phase is not Phase.VERDICT:
-            self._watched = None
-        elif seen.sighting is not None:
-            before = self._watched or replace(state, recent=(), still_since=None)
-            was_still = self.stillness() == 1.0
-            self._watched = advance(setup, before, seen.sighting, time).state
-            if self.stillness() == 1.0 and not was_still:
-                self.continued.emit()
 
 
 def _is_of_size(seen: LiveImage, setup: SwingSetup) -> bool:

@@ -9,6 +9,7 @@ from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
 from lightpen.messages import Code
 from lightpen.model.posture import Posture, posture_of
+from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
 from lightpen.swing.rules import COUNTDOWN, has_just_slipped
 from lightpen.swing.shortfall import Shortfall, turn_range
@@ -109,15 +110,17 @@ class SwingWords(QObject):
             dial=_dial(moment),
         )
 
-    def waiting_value(self, refusal: str) -> OperatorValue:
+    def waiting_value(self, refusal: Sentence | None) -> OperatorValue:
         """Return what is shown before there is a swing.
 
         Parameters
         ----------
-        refusal : str
-            Why none can begin, a sentence; empty while images are waited for.
+        refusal : Sentence or None
+            Why none can begin; None while images are waited for.
         """
-        told = Phrase(self.tr("No swing"), refusal) if refusal else self._no_images()
+        told = self._no_images()
+        if refusal is not None:
+            told = Phrase(self.tr("No swing"), str(refusal))
         return OperatorValue(
             instruction=told.short,
             hint=told.hint,

@@ -9,6 +9,7 @@ from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
 from lightpen.swing.kept_images import KeptImages
+from lightpen.swing.rules import stillness
 from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
 from lightpen.swing.state import Happening, Pause, Phase, SwingEvent, SwingState
 from lightpen_app.look.phrases import lack_text, phrase
@@ -17,7 +18,6 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.services import Services
 from lightpen_app.steps.swing.face import SwingFace
-from lightpen_app.steps.swing.flow import SwingFlow
 from lightpen_app.steps.swing.hand_panel import HandPanel
 from lightpen_app.steps.swing.live_sight import SwingSight
 from lightpen_app.steps.swing.moment import Moment, SwingWords
@@ -55,7 +55,7 @@ class SwingPage(Page):
         super().__init__(parent)
         self._workbench, self._sounds = services.workbench, services.sounds
         self._run, self._live = self._workbench.run, self._workbench.live
-        self._flow = SwingFlow(self._workbench, self)
+        self._runner = self._run.runner
         self._sight = SwingSight(self._run, self)
         self._words = SwingWords(self)
         self._solved = 0.0  # how far the tip is computed
@@ -63,8 +63,8 @@ class SwingPage(Page):
         self._said: tuple[MainAction, bool] | None = None
         self._was_capturing = False
         self._was_troubled = False
-        self._press_act: Callable[[], object] = self._flow.toggle_pause
-        self._on_yes: Callable[[], object] = self._run.finish
+        self._press_act: Callable[[], object] = self.toggle_pause
+        self._on_yes: Callable[[], object] = self._runner.finish
 
         # Widgets
         self._act = PushButton()
@@ -87,14 +87,11 @@ class SwingPage(Page):
         layout.addWidget(self._hand)
 
         # Connections
-        self._run.changed.connect(self._show_soon)
+        self._run.changed.connect(self._on_run_changed)
         self._run.happened.connect(self._on_happened)
         self._run.progressed.connect(self._on_progressed)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
-        self._flow.changed.connect(self._on_flow_changed)
-        self._flow.troubled.connect(self.notice_raised)
-        self._sight.continued.connect(self._on_continued)
         self._question.agreed.connect(self._on_question_agreed)
         self._act.clicked.connect(self._on_act_clicked)
         self._start_over.clicked.connect(self._on_start_over_clicked)
@@ -111,36 +108,36 @@ class SwingPage(Page):
 
     @override
     def is_complete(self) -> bool:
-        return self._run.solution is not None
+        return self._run.status.solution is not None
 
     @override
     def why_closed(self) -> str:
         lacks = self._workbench.preparation.lacks()
-        return lack_text(lacks[0]) if lacks and self._run.state is None else ""
+        return lack_text(lacks[0]) if lacks and self._run.status.state is None else ""
 
     @override
     def main_action(self) -> MainAction:
-        state = self._run.state
-        if state is None or (self._run.is_capturing and not state.n_kept):
+        state = self._run.status.state
+        if state is None or (self._run.status.is_capturing and not state.n_kept):
             why_not = self.tr("No image is kept yet.")
             return MainAction(self.tr("Finish early"), why_not)
-        if self._run.is_capturing:
+        if self._run.status.is_capturing:
             return MainAction(self.tr("Finish early"))
         return MainAction(self.tr("Review"), self._why_no_review(state))
 
     @override
     def run_main_action(self) -> None:
-        if not self._run.is_capturing:
+        if not self._run.status.is_capturing:
             self.advance_requested.emit()
             return
         lacks = self._missing()
         if lacks:
             self._ask(
                 *(lacks, self.tr("Finish now"), self.tr("Go on swinging")),
-                self._run.finish,
+                self._runner.finish,
             )
         else:
-            self._run.finish()
+            self._runner.finish()
 
     @override
     def is_hands_free(self) -> bool:
@@ -148,11 +145,14 @@ class SwingPage(Page):
 
     @override
     def toggle_pause(self) -> None:
-        self._flow.toggle_pause()
+        if self._run.status.is_paused_by_user:
+            self._runner.resume()
+        else:
+            self._runner.pause()
 
     @override
     def entered(self) -> None:
-        if self._flow.has_other_choices:
+        if self._run.status.has_other_choices:
             self._ask(
                 self.tr(
                     "Something else was chosen meanwhile. This swing goes on with the "
@@ -160,10 +160,10 @@ class SwingPage(Page):
                 ),
                 self.tr("Start over with the new ones"),
                 self.tr("Go on with this swing"),
-                self._flow.start_over,
+                self._start_anew,
             )
-            self._flow.keep_choices()
-        self._flow.enter()
+            self._runner.keep_choices()
+        self._runner.come()
         self._show()
         self._plotting.start()
 
@@ -171,11 +171,11 @@ class SwingPage(Page):
     def left(self) -> None:
         self._plotting.stop()
         self._question.hide()
-        self._flow.leave()
+        self._runner.leave()
 
     @override
     def unsaved(self) -> str:
-        state = self._run.state
+        state = self._run.status.state
         if state is None or state.phase is Phase.VERDICT or not state.n_kept:
             return ""
         return self.tr(
@@ -198,11 +198,11 @@ class SwingPage(Page):
         self._show()
 
     def _why_no_review(self, state: SwingState) -> str:
-        if self._run.is_solving:
+        if self._run.status.is_solving:
             return self.tr("The tip is being computed.")
-        if self._run.is_reading:
+        if self._run.status.is_reading:
             return self.tr("The swing goes on.")
-        if self._run.solution is not None:
+        if self._run.status.solution is not None:
             return ""
         if state.phase is Phase.VERDICT:
             return self.tr("There is no tip to review: capture more, or start over.")
@@ -210,14 +210,15 @@ class SwingPage(Page):
 
     def _missing(self) -> str:
         """Return what the swing lacks, in sentences."""
-        state, setup = self._run.state, self._run.setup
+        state, setup = self._run.status.state, self._run.status.setup
         if state is None or setup is None:
             return ""
         lacks = missing(setup, state)
         return " ".join(phrase(each, state.heading).hint for each in lacks)
 
     def _moment(self) -> Moment | None:
-        state, setup = self._run.state, self._run.setup
+        status = self._run.status
+        state, setup = status.state, status.setup
         if state is None or setup is None:
             return None
         if self._measured is None or self._measured[0] is not state.kept:
@@ -228,11 +229,11 @@ class SwingPage(Page):
             short=self._measured[1],
             connection=self._live.connection,
             seen=self._sight.words(),
-            is_troubled=self._flow.is_troubled,
-            solving=self._solved if self._run.is_solving else None,
-            verdict=self._run.verdict,
-            is_accepted=self._run.result is not None,
-            stillness=self._sight.stillness(),
+            is_troubled=status.is_troubled,
+            solving=self._solved if status.is_solving else None,
+            verdict=status.verdict,
+            is_accepted=status.result is not None,
+            stillness=stillness(state) if state.phase is Phase.VERDICT else 0.0,
             is_simulated=self._live.operator is not None,
         )
 
@@ -249,7 +250,7 @@ class SwingPage(Page):
         """Show what is the case now, here and in the operator view."""
         moment = self._moment()
         if moment is None:
-            value = self._words.waiting_value(self._flow.refusal)
+            value = self._words.waiting_value(self._run.status.refusal)
             self._face.set_value(value)
         else:
             value = self._words.operator_value(moment)
@@ -260,8 +261,8 @@ class SwingPage(Page):
         self._face.dial.set_interactive(self._live.operator is not None)
         text, self._press_act = self._offered()
         self._act.setText(text)
-        if self._run.is_capturing is not self._was_capturing:
-            self._was_capturing = self._run.is_capturing
+        if self._run.status.is_capturing is not self._was_capturing:
+            self._was_capturing = self._run.status.is_capturing
             self._question.hide()
         said = self.main_action(), self.is_complete()
         if said != self._said:
@@ -270,23 +271,23 @@ class SwingPage(Page):
 
     def _offered(self) -> tuple[str, Callable[[], object]]:
         """Return what the button beside Start over does now."""
-        state = self._run.state
-        if state is None or self._run.is_capturing:
+        state = self._run.status.state
+        if state is None or self._run.status.is_capturing:
             if self._live.connection is Connection.CLOSED:
-                return self.tr("Open the camera"), self._flow.try_again
+                return self.tr("Open the camera"), self._try_again
             if state is None:
-                return self.tr("Try again"), self._flow.try_again
+                return self.tr("Try again"), self._try_again
             if state.pause is Pause.BY_USER:
-                return self.tr("Go on (Space)"), self._flow.toggle_pause
-            return self.tr("Pause (Space)"), self._flow.toggle_pause
-        if self._run.is_solving:
-            return self.tr("Stop computing"), self._run.cancel
+                return self.tr("Go on (Space)"), self.toggle_pause
+            return self.tr("Pause (Space)"), self.toggle_pause
+        if self._run.status.is_solving:
+            return self.tr("Stop computing"), self._runner.cancel
         if state.phase is Phase.SOLVING:
-            return self.tr("Compute again"), self._run.solve
-        return self.tr("Capture more"), self._run.capture_more
+            return self.tr("Compute again"), self._runner.solve
+        return self.tr("Capture more"), self._runner.capture_more
 
     def _plot(self) -> None:
-        state, setup = self._run.state, self._run.setup
+        state, setup = self._run.status.state, self._run.status.setup
         if state is not None and setup is not None:
             self._face.plots().show_next(state, setup.limits.max_uncertainty)
 
@@ -298,6 +299,10 @@ class SwingPage(Page):
         self._show_soon()
 
     def _on_happened(self, event: SwingEvent) -> None:
+        if event.what is Happening.CONFIRMED:
+            if self.isVisible() and not self.main_action().why_not:
+                self.advance_requested.emit()
+            return
         moment = self._moment()
         progress = 0.0
         if moment is not None:
@@ -306,23 +311,20 @@ class SwingPage(Page):
         self._sounds.play(SOUNDS[event.what], progress)
 
     def _on_connection_changed(self, connection: Connection) -> None:
-        if connection is Connection.LOST and self._run.is_capturing:
+        if connection is Connection.LOST and self._run.status.is_capturing:
             self._sounds.play(Sound.LOST)
         self._show_soon()
 
-    def _on_flow_changed(self) -> None:
-        if self._flow.is_troubled and not self._was_troubled:
+    def _on_run_changed(self) -> None:
+        is_troubled = self._run.status.is_troubled
+        if is_troubled and not self._was_troubled:
             self._sounds.play(Sound.LOST)
-        self._was_troubled = self._flow.is_troubled
+        self._was_troubled = is_troubled
         self._show_soon()
 
     def _on_progressed(self, fraction: float) -> None:
         self._solved = fraction
         self._show_soon()
-
-    def _on_continued(self) -> None:
-        if self.isVisible() and not self.main_action().why_not:
-            self.advance_requested.emit()
 
     def _on_question_agreed(self) -> None:
         self._on_yes()
@@ -331,17 +333,30 @@ class SwingPage(Page):
         self._press_act()
 
     def _on_start_over_clicked(self) -> None:
-        state = self._run.state
-        if state is None or self._run.result is not None:
-            self._flow.start_over()
+        status = self._run.status
+        if status.state is None or status.result is not None:
+            self._start_anew()
             return
         text = self.tr(
             "Begin anew? The images of this swing ({0}) are set aside; they stay on "
             "the disk."
         )
         self._ask(
-            text.format(state.n_kept),
+            text.format(status.state.n_kept),
             self.tr("Begin anew"),
             self.tr("Go on with this swing"),
-            self._flow.start_over,
+            self._start_anew,
         )
+
+    def _start_anew(self) -> None:
+        lacks = self._workbench.preparation.lacks()
+        if lacks:
+            self.notice_raised.emit(lack_text(lacks[0]))
+        else:
+            self._runner.start_over()
+
+    def _try_again(self) -> None:
+        """Open the camera again, or begin where it was refused."""
+        if self._live.connection is Connection.CLOSED:
+            self._workbench.open_camera()
+        self._runner.try_again()

@@ -906,7 +906,7 @@ def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) ->
 def test_a_swing_under_way_is_told(live: Seen, workbench: Workbench) -> None:
     assert "A swing is under way." not in live.words
 
-    workbench.run.begin(workbench.preparation)
+    workbench.run.runner.begin(workbench.preparation)
 
     live.wait("A swing is under way.")
 

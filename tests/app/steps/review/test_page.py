@@ -117,10 +117,10 @@ class Bed:
         header["settings"]["max_uncertainty_mm"] = limit
         (folder / "header.json").write_text(json.dumps(header), "utf-8")
         workbench.open_camera()
-        workbench.run.go_on(read_resumable(folder))
-        workbench.run.finish()
+        workbench.run.runner.go_on(read_resumable(folder))
+        workbench.run.runner.finish()
         self.qtbot.waitUntil(
-            lambda: workbench.run.verdict is not None, timeout=PATIENCE_MS
+            lambda: workbench.run.status.verdict is not None, timeout=PATIENCE_MS
         )
         workbench.live.close()
         return workbench
@@ -217,12 +217,12 @@ def centres(page: ReviewPage) -> list[list[float]]:
 
 
 def tip(workbench: Workbench) -> FloatArray:
-    assert workbench.run.solution is not None
-    return workbench.run.solution.calibration.joint.tip_pen
+    assert workbench.run.status.solution is not None
+    return workbench.run.status.solution.calibration.joint.tip_pen
 
 
 def await_solution(qtbot: QtBot, workbench: Workbench) -> None:
-    qtbot.waitUntil(lambda: not workbench.run.is_solving, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: not workbench.run.status.is_solving, timeout=PATIENCE_MS)
 
 
 def in_force(workbench: Workbench) -> Result | None:
@@ -232,7 +232,7 @@ def in_force(workbench: Workbench) -> Result | None:
 
 def put_in_force(workbench: Workbench, tip_pen: FloatArray, pen: str = "LP-04") -> None:
     """Store a result of some time ago."""
-    names = replace(workbench.run.names, pen=pen)
+    names = replace(workbench.run.status.names, pen=pen)
     uncertainty = np.full(3, 0.002)
     store_result(
         workbench.run.results_folder,
@@ -278,8 +278,8 @@ def test_a_good_swing_passes_with_its_reason_and_the_next_step(
 def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
     page: ReviewPage, workbench: Workbench
 ) -> None:
-    assert workbench.run.solution is not None
-    uncertainty = workbench.run.solution.calibration.budget.expanded_uncertainty
+    assert workbench.run.status.solution is not None
+    uncertainty = workbench.run.status.solution.calibration.budget.expanded_uncertainty
     shown = the(page, TipReadout).texts()
     for text, value, u in zip(shown, tip(workbench), uncertainty[:3], strict=True):
         number, _, within = text.split()
@@ -292,8 +292,8 @@ def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     bed: Bed,
 ) -> None:
     workbench = bed.solve()
-    assert workbench.run.solution is not None
-    uncertainty = workbench.run.solution.calibration.budget.weakest_uncertainty
+    assert workbench.run.status.solution is not None
+    uncertainty = workbench.run.status.solution.calibration.budget.weakest_uncertainty
     bed.solve(0.7 * uncertainty)
     page = bed.show()
 
@@ -458,12 +458,12 @@ def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
 ) -> None:
     table(page).choose(3)
 
-    assert workbench.run.solution is not None
-    points = workbench.run.solution.observations.seen_pixels[2]
+    assert workbench.run.status.solution is not None
+    points = workbench.run.status.solution.observations.seen_pixels[2]
     seen = points[np.isfinite(points[:, 0])].tolist()
     qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
     shown = the(page, ResidualView)
-    assert shown.image_size().width() == workbench.run.solution.source.camera.width
+    assert shown.image_size().width() == workbench.run.status.solution.source.camera.width
     assert len(shown.arrows().residuals) == len(seen)
     assert shown.zoom() > 1  # the pen fills the view
     assert the(page, MisfitPlot).number() == 3
@@ -477,8 +477,8 @@ def test_of_images_passed_over_quickly_the_last_is_shown(
     number = table(page).number()
 
     assert number == table(page).value()[8].number
-    assert workbench.run.solution is not None
-    points = workbench.run.solution.observations.seen_pixels[number - 1]
+    assert workbench.run.status.solution is not None
+    points = workbench.run.status.solution.observations.seen_pixels[number - 1]
     seen = points[np.isfinite(points[:, 0])].tolist()
     qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
 
@@ -488,7 +488,7 @@ def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
 ) -> None:
     panel, view = the(page, ImagesPanel), the(page, ResidualView)
     qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
-    solution, number = workbench.run.solution, table(page).number()
+    solution, number = workbench.run.status.solution, table(page).number()
     assert solution is not None
     other = replace(solution, source=replace(solution.source))
 
@@ -643,15 +643,15 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
     monkeypatch.setattr(review, "PATIENCE_MS", 0)
     workbench = bed.solve()
     page = bed.show()
-    before = workbench.run.solution
+    before = workbench.run.status.solution
 
-    workbench.run.solve()
+    workbench.run.runner.solve()
     bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
     click(page, "Cancel")
 
-    assert not workbench.run.is_solving
+    assert not workbench.run.status.is_solving
     assert not button(page, "Cancel").isVisible()
-    assert workbench.run.solution is before
+    assert workbench.run.status.solution is before
     assert page.main_action().why_not == ""
 
 
@@ -708,8 +708,8 @@ def test_the_two_stage_method_stands_beside_the_joint_fit(
     shown = the(the(page, MethodsPanel), NumberTable).value()
     rows = dict(zip(shown.rows, shown.cells, strict=True))
 
-    assert workbench.run.solution is not None
-    calibration = workbench.run.solution.calibration
+    assert workbench.run.status.solution is not None
+    calibration = workbench.run.status.solution.calibration
     joint = [float(cell) for cell in rows["Joint fit"][:3]]
     paper = [float(cell) for cell in rows["Two-stage (paper)"][:3]]
     assert joint == pytest.approx(calibration.joint.tip_pen.tolist(), abs=1e-3)
@@ -754,7 +754,7 @@ def test_an_accepted_swing_is_changed_no_more(
         assert button(page, text).toolTip() == why
     table(page).setFocus()
     QTest.keyClick(table(page), Qt.Key.Key_Delete)
-    assert not workbench.run.is_solving
+    assert not workbench.run.status.is_solving
 
 
 def test_after_acceptance_the_next_calibration_starts(
@@ -798,12 +798,12 @@ def test_more_images_are_captured_into_the_same_swing(
         assert page.main_action().why_not == "The swing goes on."
 
     assert asked.args == ["swing"]
-    assert workbench.run.is_capturing
-    assert workbench.run.setup is not None
-    assert workbench.run.setup.limits.min_images == N_IMAGES + N_MORE
-    assert workbench.run.state is not None
-    assert workbench.run.state.n_kept == N_IMAGES
-    assert workbench.run.record_folder == workbench.run.records_folder / "swing"
+    assert workbench.run.status.is_capturing
+    assert workbench.run.status.setup is not None
+    assert workbench.run.status.setup.limits.min_images == N_IMAGES + N_MORE
+    assert workbench.run.status.state is not None
+    assert workbench.run.status.state.n_kept == N_IMAGES
+    assert workbench.run.status.record_folder == workbench.run.records_folder / "swing"
 
 
 def test_a_record_that_is_gone_cannot_be_captured_into(
@@ -815,7 +815,7 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
         click(page, "Capture more")
 
     assert "is damaged" in told.args[0]
-    assert workbench.run.solution is not None
+    assert workbench.run.status.solution is not None
     assert page.main_action().why_not == ""
 
 
@@ -831,7 +831,7 @@ def test_a_repetition_is_asked_for_and_can_be_declined(
     answer(page, "Go on with these")
 
     assert asks.words() == ""
-    assert workbench.run.solution is not None
+    assert workbench.run.status.solution is not None
 
 
 def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
@@ -846,7 +846,7 @@ def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
     record = open_record(workbench.run.records_folder / "swing")
     assert record.verdict == DISCARDED
     assert len(record.images) == N_IMAGES
-    assert workbench.run.solution is None
+    assert workbench.run.status.solution is None
 
 
 def test_a_swing_that_cannot_be_set_aside_is_told(
@@ -859,4 +859,4 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
         answer(page, "Repeat")
 
     assert "does not exist" in told.args[0]
-    assert workbench.run.solution is not None
+    assert workbench.run.status.solution is not None

@@ -320,8 +320,8 @@ def test_any_name_will_do(
     assert again.stations() == tuple(sorted(("Hall 2", name)))
     again.start()
     assert again.preparation.names == names
-    again.run.begin(again.preparation)
-    assert again.run.record_folder is not None
+    again.run.runner.begin(again.preparation)
+    assert again.run.status.record_folder is not None
     again.shut_down()
     accepted(workbench, timedelta(0))
     found = last_result(again.run.results_folder, name, name)
@@ -724,10 +724,10 @@ def test_a_swing_goes_on_with_its_images_at_the_step_swing(
     start.press("Resume")
     qtbot.wait_until(lambda: start.steps == ["swing"])
 
-    assert workbench.run.record_folder == folder
-    assert workbench.run.state is not None
-    assert workbench.run.state.n_kept == 12
-    assert workbench.run.names.pen == workbench.preparation.names.pen == "LP-05"
+    assert workbench.run.status.record_folder == folder
+    assert workbench.run.status.state is not None
+    assert workbench.run.status.state.n_kept == 12
+    assert workbench.run.status.names.pen == workbench.preparation.names.pen == "LP-05"
     assert start.text_of("Operator") == "Bea"
     assert start.subjects[-1].startswith("Pen LP-05")
     assert start.notices == []
@@ -796,7 +796,7 @@ def test_without_a_camera_it_is_told_where_to_choose_one(
 
     assert start.notices[-1].startswith("No camera is open. Choose the source")
     assert start.steps == []
-    assert workbench.run.state is None
+    assert workbench.run.status.state is None
 
 
 def test_a_swing_does_not_go_on_with_images_of_another_size(
@@ -945,7 +945,7 @@ def test_a_swing_that_another_program_captures_is_no_offer_until_it_is_killed(
     start.press("Resume")
     qtbot.wait_until(lambda: start.steps == ["swing"])
 
-    assert workbench.run.record_folder == folder
+    assert workbench.run.status.record_folder == folder
 
 
 def test_a_swing_that_another_program_took_meanwhile_is_not_resumed_or_discarded(

@@ -112,8 +112,8 @@ class Desk:
 
     @property
     def state(self) -> SwingState:
-        assert self.run.state is not None
-        return self.run.state
+        assert self.run.status.state is not None
+        return self.run.status.state
 
     @property
     def operator(self) -> Operator:
@@ -260,8 +260,8 @@ def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
     desk, workbench = shared_desk, shared_desk.workbench
     if workbench.preparation.limits is SHORT:
         workbench.set_preparation(replace(workbench.preparation, limits=LONG))
-        if desk.run.state is not None:
-            desk.run.set_aside()
+        if desk.run.status.state is not None:
+            desk.run.runner.set_aside()
     show(qtbot, desk)
     desk.let_operator_swing()
     keep_on(qtbot, desk)
@@ -272,15 +272,15 @@ def show(qtbot: QtBot, desk: Desk) -> None:
     """Show the step Swing, with images coming."""
     if not desk.workbench.live.is_open:
         open_camera(qtbot, desk.workbench)
-    if desk.run.state is None:
+    if desk.run.status.state is None:
         desk.window.go_to(0)  # a swing begins when its step is entered
     desk.window.go_to(1)
-    until(qtbot, lambda: desk.run.state is not None)
+    until(qtbot, lambda: desk.run.status.state is not None)
 
 
 def keep_on(qtbot: QtBot, desk: Desk, n_more: int = 3) -> None:
     """Wait until some more images are kept."""
-    until(qtbot, lambda: desk.run.state is not None)
+    until(qtbot, lambda: desk.run.status.state is not None)
     n_before = desk.state.n_kept
     until(
         qtbot,
@@ -365,7 +365,7 @@ def test_no_key_is_needed_from_the_seat_to_the_verdict(at_verdict: Desk) -> None
         *("Captured",),
     ):
         assert desk.has_told(instruction), instruction
-    verdict = desk.run.verdict
+    verdict = desk.run.status.verdict
     assert verdict is not None
     assert desk.value.state.word == grade_text(verdict.grade)
     assert desk.value.state.detail == phrase(verdict.reason, desk.state.heading).hint
@@ -412,8 +412,8 @@ def test_after_the_verdict_more_can_be_captured(qtbot: QtBot, at_verdict: Desk) 
     until(qtbot, lambda: desk.state.n_kept > n_before + 5)
     desk.finish()
     until_verdict(qtbot, desk)
-    assert desk.run.solution is not None
-    assert len(desk.run.solution.numbers) == desk.state.n_kept
+    assert desk.run.status.solution is not None
+    assert len(desk.run.status.solution.numbers) == desk.state.n_kept
 
 
 def test_computing_can_be_stopped_and_begun_again(
@@ -424,7 +424,7 @@ def test_computing_can_be_stopped_and_begun_again(
     desk.click("Capture more")
     until(qtbot, lambda: desk.value.state.word == "CAPTURING")
     desk.finish()
-    until(qtbot, lambda: desk.run.is_solving)
+    until(qtbot, lambda: desk.run.status.is_solving)
     until(qtbot, lambda: desk.offers("Stop computing"))
 
     desk.click("Stop computing")
@@ -443,9 +443,9 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
     qtbot: QtBot, at_verdict: Desk
 ) -> None:
     desk = at_verdict
-    folder = desk.run.record_folder
+    folder = desk.run.status.record_folder
     desk.window.go_to(2)
-    desk.run.accept()
+    desk.run.runner.accept()
     until(qtbot, lambda: desk.value.state.word == "IN FORCE")
     assert desk.value.instruction == "Accepted"
     assert folder is not None
@@ -453,8 +453,8 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
 
     desk.window.go_to(1)
 
-    assert desk.run.result is None
-    assert desk.run.record_folder not in (None, folder)
+    assert desk.run.status.result is None
+    assert desk.run.status.record_folder not in (None, folder)
     desk.let_operator_swing()
     until_verdict(qtbot, desk)
     assert (folder / JOURNAL).read_bytes() == journal
@@ -467,7 +467,7 @@ def test_a_swing_that_begins_behind_another_step_waits_for_its_own(
     desk.let_operator_swing()
     desk.click("Capture more")
     desk.window.go_to(0)
-    until(qtbot, lambda: desk.run.is_capturing)
+    until(qtbot, lambda: desk.run.status.is_capturing)
     until(qtbot, lambda: desk.state.pause is Pause.BY_USER)
 
     desk.window.go_to(1)
@@ -573,7 +573,7 @@ def test_a_full_disk_pauses_with_its_sentence_and_space_goes_on(
     capturing.type(Key.Key_Space)
     keep_on(qtbot, capturing)
 
-    folder = capturing.run.record_folder
+    folder = capturing.run.status.record_folder
     assert folder is not None
     assert len(open_record(folder).used_images) >= n_before + 3
 
@@ -622,14 +622,14 @@ def test_a_camera_that_was_closed_can_be_opened_here(
     qtbot: QtBot, capturing: Desk
 ) -> None:
     n_before = capturing.state.n_kept
-    folder = capturing.run.record_folder
+    folder = capturing.run.status.record_folder
     capturing.workbench.live.close()
     until(qtbot, lambda: capturing.offers("Open the camera"))
 
     capturing.click("Open the camera")
     keep_on(qtbot, capturing)
 
-    assert capturing.run.record_folder == folder
+    assert capturing.run.status.record_folder == folder
     assert capturing.state.n_kept > n_before
 
 
@@ -657,7 +657,7 @@ def test_closing_the_window_asks_and_names_the_images(capturing: Desk) -> None:
 def test_other_choices_do_not_change_a_swing_that_is_under_way(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    workbench, setup = capturing.workbench, capturing.run.setup
+    workbench, setup = capturing.workbench, capturing.run.status.setup
     capturing.window.go_to(0)
     workbench.set_preparation(
         replace(workbench.preparation, names=replace(NAMES, operator="Bob"))
@@ -671,8 +671,8 @@ def test_other_choices_do_not_change_a_swing_that_is_under_way(
     capturing.window.go_to(0)
     capturing.window.go_to(1)
     assert asked(capturing) == ""  # it was told once
-    assert capturing.run.setup is setup
-    assert capturing.run.names.operator == "Ann"
+    assert capturing.run.status.setup is setup
+    assert capturing.run.status.names.operator == "Ann"
 
 
 def test_enter_presses_the_main_button_unless_another_was_chosen(
@@ -693,16 +693,16 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
 def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    old = capturing.run.record_folder
+    old = capturing.run.status.record_folder
     assert old is not None
     n_before = capturing.state.n_kept
 
     capturing.click("Start over")
     assert f"The images of this swing ({n_before})" in asked(capturing)
-    assert capturing.run.record_folder == old
+    assert capturing.run.status.record_folder == old
     capturing.click("Begin anew")
 
-    until(qtbot, lambda: capturing.run.record_folder not in (None, old))
+    until(qtbot, lambda: capturing.run.status.record_folder not in (None, old))
     until(qtbot, lambda: open_record(old).verdict == DISCARDED)
     assert len(open_record(old).used_images) >= n_before
     keep_on(qtbot, capturing)
@@ -712,16 +712,16 @@ def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
 def test_an_interrupted_swing_goes_on_with_all_its_images(
     qtbot: QtBot, capturing: Desk
 ) -> None:
-    folder = capturing.run.record_folder
+    folder = capturing.run.status.record_folder
     assert folder is not None
-    capturing.run.abandon()
+    capturing.run.runner.abandon()
     capturing.workbench.live.close()
     capturing.workbench.live.await_closed()
     n_recorded = len(open_record(folder).used_images)
     capturing.window.go_to(0)
     open_camera(qtbot, capturing.workbench)
 
-    capturing.run.go_on(read_resumable(folder))
+    capturing.run.runner.go_on(read_resumable(folder))
     capturing.window.go_to(1)
 
     assert capturing.state.n_kept == n_recorded
@@ -734,7 +734,7 @@ def test_finishing_early_gives_a_verdict_that_says_why(
     keep_on(qtbot, capturing, 8)
     capturing.finish()
 
-    until(qtbot, lambda: capturing.run.state is not None)
+    until(qtbot, lambda: capturing.run.status.state is not None)
     until(qtbot, lambda: capturing.state.phase is Phase.VERDICT)
     until(qtbot, lambda: capturing.value.state.word in {"REPEAT", "NO TIP"})
     assert capturing.recorder.sounds()[-1] is Sound.FAILED

@@ -1,0 +1,5 @@
+"""(being written elsewhere)"""
+
+from pathlib import Path
+
+Archive = Path

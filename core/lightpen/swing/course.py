@@ -1,0 +1,518 @@
+"""The course of a swing, step by step: what commands, images and solutions do to it.
+
+Nothing here knows threads: one who owns a course makes all calls in turn, and has long
+computations made elsewhere.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol, TypeVar
+
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.errors import LightpenError
+from lightpen.estimation.verdict import Grade, judge
+from lightpen.messages import Code, Message
+from lightpen.model.limits import SwingLimits
+from lightpen.record.acceptance import accept
+from lightpen.record.archive import Archive
+from lightpen.record.names import new_folder
+from lightpen.record.reading import (
+    DISCARDED,
+    open_record,
+    recorded_limits,
+    recorded_names,
+)
+from lightpen.record.solving import Solution, solve_again, solve_record
+from lightpen.record.unfinished import discard_swing
+from lightpen.record.writing import RecordWriter, note_taken_out
+from lightpen.sentences import Sentence, sentence
+from lightpen.swing.attendance import Attendance
+from lightpen.swing.capture import capture_image
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
+from lightpen.swing.rules import (
+    Transition,
+    advance,
+    conclude,
+    finish,
+    pause,
+    resume,
+    stillness,
+)
+from lightpen.swing.serial_queue import Act, Report, Task
+from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
+from lightpen.swing.status import Activity, Listener, SwingStatus
+
+T = TypeVar("T")
+
+
+class Start(Protocol):
+    """Has something computed elsewhere; see `SerialQueue.start`."""
+
+    def __call__(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Sentence], None],
+        on_bug: Act,
+        on_progress: Report,
+    ) -> Task:
+        """Return the task; one of the three callables is called in its turn."""
+
+
+class SwingCourse:
+    """One swing after another, from the first image to acceptance.
+
+    What cannot be done in the state that the swing is in is not done.
+
+    Parameters
+    ----------
+    records : Path
+        Folder that a new swing's record is made in.
+    archive : Archive
+        Of the accepted results.
+    listener : Listener
+    now : callable
+        Returns date and time with the time zone.
+    start : Start
+    """
+
+    def __init__(
+        self,
+        records: Path,
+        archive: Archive,
+        listener: Listener,
+        now: Callable[[], datetime],
+        start: Start,
+    ) -> None:
+        self._records = records
+        self._archive = archive
+        self._listener = listener
+        self._now = now
+        self._start_task = start
+        self._status = SwingStatus()
+        self._attendance = Attendance()
+        self._limits = SwingLimits()
+        self._writer: RecordWriter | None = None
+        self._n_since_kept = 0
+        self._wanted: Mapping[int, str] = {}  # images that are to be taken out
+        self._tried: Mapping[int, str] = {}  # of them, those being computed without
+        self._trouble: Sentence | None = None
+        self._task: Task | None = None
+
+    @property
+    def status(self) -> SwingStatus:
+        """The swing as it was told last."""
+        return self._status
+
+    def recover(self) -> None:
+        """Carry on after a bug, which costs no more than what was being done."""
+        self._drop_task()
+        self.pause()
+        self._tell_trouble(
+            sentence(
+                "swing.bug",
+                "The program made a mistake of its own. The images kept so far are "
+                "safe; go on, or start the program again.",
+            )
+        )
+
+    def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
+        """Become this status, and tell of it."""
+        has_others = status.is_capturing and self._attendance.has_other_choices
+        self._status = replace(
+            status,
+            refusal=self._attendance.refusal,
+            has_other_choices=has_others,
+        )
+        self._listener.on_swing(self._status, events)
+
+    def _republish(self) -> None:
+        self._publish(self._status)
+
+    def go_on(self, swing: Resumable) -> None:
+        """Go on with a swing that was read back, or say why it cannot be."""
+        self._trying(lambda: self._enter(swing))
+
+    def _trying(self, act: Act) -> None:
+        """Do something that may fail; then it is told, and all stays as it was."""
+        try:
+            act()
+        except LightpenError as error:
+            self._tell_trouble(error.sentence)
+
+    def _tell_trouble(self, trouble: Sentence) -> None:
+        self._trouble = trouble
+        self._listener.on_trouble(trouble)
+
+    def _relieve(self) -> None:
+        trouble, self._trouble = self._trouble, None
+        if trouble is not None:
+            self._listener.on_relief(trouble)
+
+    # Attendance
+
+    def choose(self, preparation: Preparation) -> None:
+        """Know what is chosen now; images of another source are not of this swing."""
+        before = self._attendance.choices
+        self._attendance = replace(self._attendance, choices=preparation)
+        is_other = before is not None and before.source != preparation.source
+        if is_other and self._status.is_capturing:
+            self.abandon()
+        self._republish()
+
+    def keep_choices(self) -> None:
+        """Go on with what the swing began with."""
+        attendance = self._attendance
+        self._attendance = replace(attendance, begun_with=attendance.choices)
+        self._republish()
+
+    def come(self) -> None:
+        """Begin with the next image, or go on where the leaving was what paused it."""
+        was_paused = self._attendance.paused_by_leaving
+        self._attendance = self._attendance.come()
+        if self._status.result is not None:  # nothing more belongs to that swing
+            self.abandon()
+        if was_paused:
+            self._change(lambda state: Transition(resume(state)))
+        self._republish()
+
+    def leave(self) -> None:
+        """Begin nothing any more, and pause what is captured."""
+        self._attendance = self._attendance.left()
+        self._hold_back()
+
+    def _hold_back(self) -> None:
+        """Pause a swing that nobody is at."""
+        status = self._status
+        goes_on = status.is_capturing and not status.is_paused_by_user
+        if goes_on and self._attendance.is_away:
+            self._attendance = replace(self._attendance, paused_by_leaving=True)
+            self._change(lambda state: Transition(pause(state)))
+
+    def try_again(self) -> None:
+        """Forget why no swing could begin."""
+        self._attendance = replace(self._attendance, refusal=None)
+        self._republish()
+
+    # Capture
+
+    def begin(self, preparation: Preparation) -> None:
+        """Begin a new swing, or say why it cannot."""
+        try:
+            folder = new_folder(self._records, preparation.names, self._now())
+            RecordWriter.create(folder, preparation.header()).close()
+            self._enter(read_resumable(folder))  # so with the files as recorded
+        except LightpenError as error:
+            self._attendance = replace(self._attendance, refusal=error.sentence)
+            self._tell_trouble(error.sentence)
+            self._republish()
+
+    def _enter(self, swing: Resumable) -> None:
+        """Go on with a swing that was read from the disk, a new one or an old one."""
+        status, record = self._status, swing.record
+        if status.is_capturing and record.folder == status.record_folder:
+            return  # it goes on already
+        writer = RecordWriter.resume(record)
+        self._drop_task()
+        self._close_record()
+        self._writer = writer
+        self._limits = recorded_limits(record)  # asking for more does not raise them
+        self._wanted = {}
+        self._n_since_kept = 0
+        self._attendance = self._attendance.begun()
+        self._relieve()
+        self._publish(
+            SwingStatus(
+                setup=swing.setup,
+                state=swing.state,
+                record_folder=record.folder,
+                names=recorded_names(record),
+            )
+        )
+        self._hold_back()
+
+    def take(
+        self,
+        frame: Frame,
+        sighting: Sighting | None,
+        setup: SwingSetup | None,
+        n_images: int | None,
+    ) -> None:
+        """Take an image, as `SwingRunner.take` has it."""
+        status, choices = self._status, self._attendance.choices
+        if status.state is None:
+            if self._attendance.is_due and choices is not None:
+                self.begin(choices)
+        elif sighting is None:
+            pass
+        elif status.state.phase is Phase.VERDICT:
+            self._watch(status.state, sighting, frame)
+        elif status.is_capturing and setup is status.setup:
+            self._capture(status.state, sighting, frame, n_images)
+
+    def _capture(
+        self,
+        before: SwingState,
+        sighting: Sighting,
+        frame: Frame,
+        n_images: int | None,
+    ) -> None:
+        setup, writer = self._status.setup, self._writer
+        assert setup is not None
+        assert writer is not None
+        time = frame.host_ts_ns * 1e-9
+        try:
+            transition = capture_image(
+                *(setup, before, writer, frame.image, sighting, time),
+                frame.device_ts_ns,
+            )
+        except LightpenError as error:
+            self._become(Transition(pause(before)), is_troubled=True)
+            self._tell_trouble(error.sentence)
+            return
+        state = transition.state
+        if state.phase is Phase.CAPTURING:
+            is_kept = any(e.what is Happening.KEPT for e in transition.events)
+            if is_kept:
+                self._relieve()
+            self._n_since_kept = 0 if is_kept else self._n_since_kept + 1
+            if n_images is not None and self._n_since_kept >= n_images:
+                ended = finish(state)
+                transition = Transition(
+                    ended.state, (*transition.events, *ended.events)
+                )
+        self._become(transition)
+
+    def _watch(self, before: SwingState, sighting: Sighting, frame: Frame) -> None:
+        """See whether the pen is held upright and still, by which its holder agrees."""
+        setup = self._status.setup
+        assert setup is not None
+        state = advance(setup, before, sighting, frame.host_ts_ns * 1e-9).state
+        says_yes = stillness(state) == 1.0 and stillness(before) < 1.0
+        events = (SwingEvent(Happening.CONFIRMED),) if says_yes else ()
+        self._publish(replace(self._status, state=state), *events)
+
+    def pause(self) -> None:
+        """Pause for the user."""
+        self._attendance = replace(self._attendance, paused_by_leaving=False)
+        self._change(lambda state: Transition(pause(state)))
+
+    def resume(self) -> None:
+        """Go on after a pause of the user."""
+        self._change(lambda state: Transition(resume(state)))
+
+    def _change(self, act: Callable[[SwingState], Transition]) -> None:
+        """Do with a swing that is captured what its user wants."""
+        status = self._status
+        if status.is_capturing and status.state is not None:
+            self._become(act(status.state))
+
+    def _become(self, transition: Transition, *, is_troubled: bool = False) -> None:
+        state = transition.state
+        ends = state.phase is Phase.SOLVING
+        if ends:
+            self._close_record()
+        status = replace(self._status, state=state)
+        is_troubled = is_troubled or (status.is_troubled and status.is_paused_by_user)
+        self._publish(replace(status, is_troubled=is_troubled), *transition.events)
+        if ends:
+            self.solve()
+
+    def abandon(self) -> None:
+        """Leave the swing as it is on the disk."""
+        self._drop_task()
+        self._close_record()
+        self._publish(SwingStatus(setup=self._status.setup))
+
+    def set_aside(self) -> None:
+        """Leave the swing for good, or say why it cannot be noted."""
+        self._trying(self._discard)
+
+    def _discard(self) -> None:
+        folder = self._status.record_folder
+        if folder is None:
+            return
+        if self._writer is None:
+            discard_swing(folder)
+        else:
+            self._writer.conclude(DISCARDED)
+        self.abandon()
+
+    def start_over(self) -> None:
+        """Set the swing aside, if its tip is not in force, and begin anew."""
+        status = self._status
+        if status.state is not None and status.result is None:
+            self.set_aside()
+        else:
+            self.abandon()
+        self.try_again()
+
+    def capture_more(self) -> None:
+        """Read the images of a swing that has its verdict, and go on with them."""
+        status = self._status
+        folder, state = status.record_folder, status.state
+        if folder is None or state is None or status.result is not None:
+            return
+        if state.phase is not Phase.VERDICT or status.activity is Activity.READING:
+            return
+        self._drop_task()
+        self._start(
+            *(Activity.READING, lambda _: read_for_more(folder)),
+            *(self._on_read, self._on_unread),
+        )
+
+    def _on_read(self, swing: Resumable) -> None:
+        self._task = None
+        try:
+            self._enter(swing)
+        except LightpenError as error:
+            self._on_unread(error.sentence)
+
+    def _on_unread(self, why: Sentence) -> None:
+        self._task = None
+        self._tell_trouble(why)
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _close_record(self) -> None:
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
+
+    # Solution
+
+    def solve(self) -> None:
+        """Have the tip computed."""
+        folder = self._status.record_folder
+        if folder is not None and not self._status.is_capturing and not self._task:
+            self._compute(lambda report: solve_record(open_record(folder), report))
+
+    def finish(self) -> None:
+        """End the capture with what there is."""
+        self._change(finish)
+
+    def take_out(self, numbers: Iterable[int]) -> None:
+        """Have the tip computed without these images."""
+        self._want({**self._wanted, **dict.fromkeys(numbers, str(Reason.TAKEN_OUT))})
+
+    def put_back(self, numbers: Iterable[int]) -> None:
+        """Have the tip computed with these images again."""
+        back = set(numbers)
+        self._want({n: why for n, why in self._wanted.items() if n not in back})
+
+    def _want(self, taken_out: Mapping[int, str]) -> None:
+        """Solve without these images, or once what is being computed is there."""
+        status = self._status
+        if status.solution is None or status.result is not None:
+            return
+        self._wanted = taken_out
+        if self._task is None:
+            self._solve_again(status.solution)
+
+    def _solve_again(self, solution: Solution) -> None:
+        wanted = self._tried = self._wanted
+        self._compute(lambda _: solve_again(solution, wanted))
+
+    def _compute(self, work: Callable[[Report], Solution]) -> None:
+        self._start(Activity.SOLVING, work, self._on_solved, self._on_unsolved)
+
+    def _start(
+        self,
+        activity: Activity,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Sentence], None],
+    ) -> None:
+        self._task = self._start_task(
+            *(work, then, otherwise, self.cancel, self._listener.on_progress)
+        )
+        self._publish(replace(self._status, activity=activity))
+
+    def _drop_task(self) -> None:
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+
+    def cancel(self) -> None:
+        """Stop computing and reading."""
+        if self._task is None:
+            return
+        self._drop_task()
+        if self._status.solution is not None:
+            self._wanted = self._status.solution.taken_out
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _on_solved(self, solution: Solution) -> None:
+        self._task = None
+        status = self._status
+        before, folder, state = status.solution, status.record_folder, status.state
+        assert folder is not None
+        assert state is not None
+        if before is None:
+            self._wanted = solution.taken_out
+        elif before.taken_out != solution.taken_out:
+            try:
+                note_taken_out(folder, solution.taken_out)
+            except LightpenError as error:
+                self._keep_solution(before, error.sentence)
+                return
+        self._relieve()
+        verdict = judge(solution.calibration, self._limits)
+        status = replace(status, solution=solution, verdict=verdict, result=None)
+        self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
+        if self._wanted != solution.taken_out:
+            self._solve_again(solution)
+
+    def _on_unsolved(self, why: Sentence) -> None:
+        self._task = None
+        solution = self._status.solution
+        if solution is None:
+            self._conclude(
+                self._status, Message(Code.NO_TIP, (str(why),)), passed=False
+            )
+            return
+        if set(self._tried) > set(solution.taken_out):
+            why = sentence(
+                "swing.images-stay-in",
+                "Without these images there is no tip, so they stay in. {why}",
+                why=why,
+            )
+        self._keep_solution(solution, why)
+
+    def _keep_solution(self, solution: Solution, why: Sentence) -> None:
+        """Leave the images as they were, and say why they cannot be as wanted."""
+        if self._wanted != self._tried:  # the user went on meanwhile
+            self._solve_again(solution)
+            return
+        self._wanted = solution.taken_out
+        self._tell_trouble(why)
+        self._publish(replace(self._status, activity=Activity.NONE))
+
+    def _conclude(self, status: SwingStatus, reason: Message, passed: bool) -> None:
+        assert status.state is not None
+        is_first = status.state.phase is not Phase.VERDICT
+        transition = conclude(status.state, reason, passed)
+        status = replace(status, state=transition.state, activity=Activity.NONE)
+        self._publish(status, *(transition.events if is_first else ()))
+
+    def accept(self) -> None:
+        """Put the tip in force, or say why it cannot be stored."""
+        self._trying(self._store)
+
+    def _store(self) -> None:
+        status = self._status
+        solution, verdict = status.solution, status.verdict
+        if solution is None or verdict is None or self._task is not None:
+            return
+        if status.result is not None or not verdict.can_be_accepted:
+            return
+        self._publish(replace(status, activity=Activity.ACCEPTING))
+        try:
+            result = accept(self._archive, solution, verdict, status.names, self._now())
+            status = replace(status, result=result)
+        finally:
+            self._publish(status)

@@ -1,0 +1,101 @@
+"""All there is to know of a swing at one moment, for whoever shows or leads it."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Protocol
+
+from lightpen.estimation.verdict import Verdict
+from lightpen.record.names import Names
+from lightpen.record.results import Result
+from lightpen.record.solving import Solution
+from lightpen.sentences import Sentence
+from lightpen.swing.state import Pause, Phase, SwingEvent, SwingSetup, SwingState
+
+
+class Activity(StrEnum):
+    """What is under way beside the images."""
+
+    NONE = ""
+    READING = "reading"  # the images of the swing, to capture more
+    SOLVING = "solving"
+    ACCEPTING = "accepting"
+
+
+@dataclass(frozen=True, eq=False)
+class SwingStatus:
+    """A swing from its first image to the accepted tip; nothing of it is ever changed.
+
+    Attributes
+    ----------
+    setup : SwingSetup or None
+        What it is captured with; stays when the swing is left.
+    state : SwingState or None
+        None while there is no swing.
+    record_folder : Path or None
+        Where it is recorded.
+    names : Names
+        Who calibrates what with it.
+    solution : Solution or None
+        The tip by its images; None until it is solved.
+    verdict : Verdict or None
+        What the solution is worth.
+    result : Result or None
+        The result that was accepted.
+    activity : Activity
+    refusal : Sentence or None
+        Why no swing could begin by itself.
+    is_troubled : bool
+        Whether it is paused because an image could not be recorded.
+    has_other_choices : bool
+        Whether something else was chosen since it began.
+    """
+
+    setup: SwingSetup | None = None
+    state: SwingState | None = None
+    record_folder: Path | None = None
+    names: Names = field(default_factory=Names)
+    solution: Solution | None = None
+    verdict: Verdict | None = None
+    result: Result | None = None
+    activity: Activity = Activity.NONE
+    refusal: Sentence | None = None
+    is_troubled: bool = False
+    has_other_choices: bool = False
+
+    @property
+    def is_capturing(self) -> bool:
+        """Whether images are being taken, or wait to be."""
+        state = self.state
+        return state is not None and state.phase not in (Phase.SOLVING, Phase.VERDICT)
+
+    @property
+    def is_solving(self) -> bool:
+        """Whether a solution is being computed."""
+        return self.activity is Activity.SOLVING
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether its images are being read, to capture more."""
+        return self.activity is Activity.READING
+
+    @property
+    def is_paused_by_user(self) -> bool:
+        """Whether it waits for its user to go on."""
+        return self.state is not None and self.state.pause is Pause.BY_USER
+
+
+class Listener(Protocol):
+    """Who is told, on the threads of a runner; must return soon."""
+
+    def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
+        """Take the status after a change, and what happened."""
+
+    def on_progress(self, fraction: float) -> None:
+        """Take how far the tip is computed, 0 to 1."""
+
+    def on_trouble(self, sentence: Sentence) -> None:
+        """Take a sentence to be read: something could not be done, nothing is lost."""
+
+    def on_relief(self, sentence: Sentence) -> None:
+        """Take the sentence of a trouble whose cause is gone."""
