@@ -210,11 +210,8 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
     from lightpen.swing.capture import capture_image
-    from lightpen.swing.preparation import (
-        CameraFile,
-        PenFile,
-        Preparation,
-    )
+    from lightpen.formats.opened_files import CameraFile, PenFile
+    from lightpen.swing.preparation import Preparation
     from lightpen.swing.state import (
         start_swing,
     )

@@ -358,7 +358,9 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     (again,) = (w for w in capturing.seen() if capturing.names(w) == {"Repeat"})
     capturing.click_on(again)
     capturing.until_shows("Swing")
-    capturing.until(lambda: capturing.workbench.run.status.record_folder not in (None, first))
+    capturing.until(
+        lambda: capturing.workbench.run.status.record_folder not in (None, first)
+    )
     assert open_record(first).verdict == DISCARDED
     assert len(open_record(first).images) >= n_before
     keep_on(capturing)
@@ -461,7 +463,9 @@ def test_space_pauses_and_starting_over_asks(capturing: "Walker") -> None:
     capturing.click("Start over")
     assert capturing.tells("Begin anew? The ")
     capturing.click("Begin anew")
-    capturing.until(lambda: capturing.workbench.run.status.record_folder not in (None, first))
+    capturing.until(
+        lambda: capturing.workbench.run.status.record_folder not in (None, first)
+    )
     capturing.until(lambda: open_record(first).verdict == DISCARDED)
     assert len(open_record(first).images) >= n_images
     keep_on(capturing)

@@ -1,6 +1,7 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
@@ -10,18 +11,13 @@ from PySide6.QtCore import QObject, QThreadPool, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.errors import FileError, LightpenError
-from lightpen.live.sources import Surroundings, camera_of
+from lightpen.errors import LightpenError
+from lightpen.formats.opened_files import OpenedFiles, open_files
+from lightpen.live.sources import Surroundings, camera_of, sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
-from lightpen.simulator.scene_files import write_sample_files
-from lightpen.swing.preparation import (
-    CameraFile,
-    PenFile,
-    Preparation,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
@@ -69,6 +65,9 @@ class Workbench(QObject):
         self._preparation = Preparation()
         self._camera_settings = CameraSettings()
         self._is_started = False
+        self._wants_samples = False
+        self._reading: Job | None = None
+        self._unread = Station()
         self.run = SwingRun(folder, self._around.now, self)
         self.live = LiveView(self.run, self)
 
@@ -92,13 +91,9 @@ class Workbench(QObject):
     def start(self) -> None:
         """Take over what was chosen last, and open the camera."""
         self.choose_station(self._settings.last_station())
-        now = self._preparation
-        simulated = now.source.kind is SourceKind.SIMULATED
-        if simulated and now.camera_file is None and now.pen_file is None:
-            try:
-                self.use_sample_files()
-            except FileError as error:
-                self.troubled.emit(str(error))
+        self._wants_samples = True
+        if self._reading is None:
+            self._fill_in_samples()
         self.open_camera()
 
     def stations(self) -> tuple[str, ...]:
@@ -109,7 +104,6 @@ class Workbench(QObject):
         """Take over what was chosen last at a station."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
-        camera_file, pen_file = self._files(station)
         self._preparation = replace(
             before,
             names=Names(
@@ -119,14 +113,15 @@ class Workbench(QObject):
             ),
             nominal_tip=_parse_point(station.nominal_tip),
             source=_source(station),
-            camera_file=camera_file,
-            pen_file=pen_file,
+            camera_file=None,
+            pen_file=None,
             mask=_parse_circles(station.mask),
             limits=_limits(station),
         )
         self._camera_settings = CameraSettings(
             exposure_us=_given(station.exposure_us), gain_db=_given(station.gain_db)
         )
+        self._open_files(station)
         self._remember_station()
         self._follow(before)
         if self._preparation.source == before.source:
@@ -154,21 +149,9 @@ class Workbench(QObject):
         self.live.open(camera, self._camera_settings, self._around.clock)
 
     def use_sample_files(self) -> None:
-        """Choose the files that go with the simulated camera.
-
-        Raises
-        ------
-        FileError
-            They cannot be written.
-        """
-        files = write_sample_files(self._around.scene, self._folder / SAMPLES)
-        self.set_preparation(
-            replace(
-                self._preparation,
-                camera_file=CameraFile.read(files.camera),
-                pen_file=PenFile.read(files.pen),
-            )
-        )
+        """Choose the files that go with the simulated camera, once they are written."""
+        around, folder = self._around, self._folder / SAMPLES
+        self._start(lambda _: sample_files(around, folder), self._on_samples_written)
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel what is under way, and wait until all has ended.
@@ -187,21 +170,67 @@ class Workbench(QObject):
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended
 
-    def _files(self, station: Station) -> tuple[CameraFile | None, PenFile | None]:
+    def _open_files(self, station: Station) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""
-        camera_file, pen_file = None, None
-        if station.camera_file:
-            try:
-                camera_file = CameraFile.read(Path(station.camera_file))
-            except LightpenError as error:
-                self.troubled.emit(str(error))
-        if station.pen_file:
-            try:
-                units = station.pen_units or None
-                pen_file = PenFile.read(Path(station.pen_file), units)
-            except LightpenError as error:
-                self.troubled.emit(str(error))
-        return camera_file, pen_file
+        self._stop_reading()
+        camera_path = Path(station.camera_file) if station.camera_file else None
+        pen_path = Path(station.pen_file) if station.pen_file else None
+        units = station.pen_units or None
+        if camera_path is not None or pen_path is not None:
+            self._unread = station
+            self._start(
+                lambda _: open_files(camera_path, pen_path, units), self._on_files_read
+            )
+
+    def _start(
+        self,
+        function: Callable[[Report], OpenedFiles],
+        on_succeeded: Callable[[OpenedFiles], None],
+    ) -> None:
+        self._stop_reading()
+        self._reading = job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self.troubled)
+        job.start()
+
+    def _stop_reading(self) -> None:
+        job, self._reading = self._reading, None
+        if job is not None:
+            job.cancel()
+
+    def _on_files_read(self, opened: OpenedFiles) -> None:
+        self._reading, self._unread = None, Station()
+        for trouble in opened.troubles:
+            self.troubled.emit(str(trouble))
+        before = self._preparation  # files chosen meanwhile count
+        self._preparation = replace(
+            before,
+            camera_file=before.camera_file or opened.camera_file,
+            pen_file=before.pen_file or opened.pen_file,
+        )
+        self._follow(before)
+        self._fill_in_samples()
+
+    def _fill_in_samples(self) -> None:
+        """Use the simulated camera's own files at the start if there are no others."""
+        now, wants_samples = self._preparation, self._wants_samples
+        self._wants_samples = False
+        simulated = now.source.kind is SourceKind.SIMULATED
+        has_none = now.camera_file is None and now.pen_file is None
+        if wants_samples and simulated and has_none:
+            self.use_sample_files()
+
+    def _on_samples_written(self, samples: OpenedFiles) -> None:
+        self._reading = None
+        self.set_preparation(
+            replace(
+                self._preparation,
+                camera_file=samples.camera_file,
+                pen_file=samples.pen_file,
+            )
+        )
 
     def _follow(self, before: Preparation) -> None:
         """Let the camera and its images follow the choices."""
@@ -238,8 +267,8 @@ class Workbench(QObject):
         names = now.names
         if not names.station:
             return
-        camera_file = now.camera_file
-        pen_file = now.pen_file
+        camera_file, pen_file = now.camera_file, now.pen_file
+        unread = self._unread  # files that are being read stay remembered
         nan = math.nan
         exposure_us, gain_db = (
             self._camera_settings.exposure_us,
@@ -254,9 +283,11 @@ class Workbench(QObject):
             nominal_tip=_point_text(now.nominal_tip),
             source=now.source.kind,
             source_place=now.source.place,
-            camera_file="" if camera_file is None else str(camera_file.path),
-            pen_file="" if pen_file is None else str(pen_file.path),
-            pen_units="" if pen_file is None else pen_file.units or "",
+            camera_file=(
+                unread.camera_file if camera_file is None else str(camera_file.path)
+            ),
+            pen_file=unread.pen_file if pen_file is None else str(pen_file.path),
+            pen_units=(unread.pen_units if pen_file is None else pen_file.units or ""),
             mask=_circles_text(now.mask),
             exposure_us=nan if exposure_us is None else exposure_us,
             gain_db=nan if gain_db is None else gain_db,

@@ -3,11 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import datetime
+from pathlib import Path
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.replay import ReplayCamera
+from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
 from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import SourceChoice, SourceKind
 
@@ -28,6 +31,18 @@ class Surroundings:
     scene: Scene = field(default_factory=Scene)
     clock: Clock = field(default_factory=MachineClock)
     now: Callable[[], datetime] = lambda: datetime.now().astimezone()
+
+
+def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:
+    """Write the files that go with the simulated camera, and return them.
+
+    Raises
+    ------
+    FileError
+        They cannot be written.
+    """
+    files = write_sample_files(around.scene, folder)
+    return OpenedFiles(CameraFile.read(files.camera), PenFile.read(files.pen))
 
 
 def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:

@@ -4,15 +4,12 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from enum import StrEnum
 from importlib.metadata import version
-from pathlib import Path
-from typing import Self
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.aim import Aim
-from lightpen.formats.camera_files import read_camera
-from lightpen.formats.pen_files import read_pen
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -43,41 +40,6 @@ class SourceChoice:
 
     kind: SourceKind = SourceKind.SIMULATED
     place: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class CameraFile:
-    """An intrinsics file that was read."""
-
-    path: Path
-    camera: Camera
-
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """Read it; `FileError` if it cannot be."""
-        return cls(path, read_camera(path))
-
-
-@dataclass(frozen=True, eq=False)
-class PenFile:
-    """An LED geometry file that was read.
-
-    Attributes
-    ----------
-    path : Path
-    pen : Pen
-    units : str or None
-        That were given for a file that does not say.
-    """
-
-    path: Path
-    pen: Pen
-    units: str | None = None
-
-    @classmethod
-    def read(cls, path: Path, units: str | None = None) -> Self:
-        """Read it; `FileError` if it cannot be."""
-        return cls(path, read_pen(path, units), units)
 
 
 class Lack(StrEnum):

@@ -17,6 +17,7 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import FileError
 from lightpen.estimation.report import calibration_json
 from lightpen.estimation.verdict import Grade
+from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
@@ -30,11 +31,7 @@ from lightpen.record.unfinished import (
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.sample_pens import SAMPLE_PENS
-from lightpen.swing.preparation import (
-    PenFile,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.state import (
     Happening,
@@ -92,7 +89,10 @@ class Stage:
 
     def wait_for_phase(self, phase: Phase) -> None:
         self.wait_until(
-            lambda: self.run.status.state is not None and self.run.status.state.phase is phase
+            lambda: (
+                self.run.status.state is not None
+                and self.run.status.state.phase is phase
+            )
         )
 
     def wait_until_solved(self) -> None:
@@ -384,7 +384,8 @@ def test_what_is_wished_for_between_two_cameras_is_done_with_the_second(
     if wish == "pause":
         stage.wait_until(
             lambda: (
-                stage.run.status.state is not None and stage.run.status.state.pause is Pause.BY_USER
+                stage.run.status.state is not None
+                and stage.run.status.state.pause is Pause.BY_USER
             )
         )
     else:
@@ -612,7 +613,11 @@ def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
 
 
 def test_a_solution_asked_for_without_a_swing_is_a_mistake(stage: Stage) -> None:
-    for act in (stage.run.runner.solve, stage.run.runner.capture_more, stage.run.runner.set_aside):
+    for act in (
+        stage.run.runner.solve,
+        stage.run.runner.capture_more,
+        stage.run.runner.set_aside,
+    ):
         with pytest.raises(ValueError, match="needs a swing"):
             act()
     with pytest.raises(ValueError, match="must be solved"):

@@ -12,18 +12,12 @@ from pytestqt.qtbot import QtBot
 from lightpen.arrays import FloatArray
 from lightpen.cameras.worker import Connection
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.writing import encode_png
-from lightpen.swing.preparation import (
-    CameraFile,
-    Lack,
-    PenFile,
-    Preparation,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.workbench import SAMPLES, Workbench
 
@@ -405,7 +399,9 @@ def test_a_swing_of_a_recorded_source_finds_its_images(
     stage.wait_for_size((1224, 1024))
     stage.workbench.run.runner.begin(stage.workbench.preparation)
     run = stage.workbench.run
-    stage.qtbot.waitUntil(lambda: run.status.state is not None and run.status.state.n_kept >= 3)
+    stage.qtbot.waitUntil(
+        lambda: run.status.state is not None and run.status.state.n_kept >= 3
+    )
 
 
 def test_shutting_down_twice_does_no_harm(stage: Stage) -> None:

@@ -15,6 +15,7 @@ from lightpen.cameras.worker import Connection, ConnectionChanged, Failed, Worke
 from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import look
 from lightpen.errors import FileError, LightpenError
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.live.looking import (
     Live,
     LiveImage,
@@ -31,7 +32,7 @@ from lightpen.simulator.sample_pens import SAMPLE_PENS
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen.swing.preparation import CameraFile, PenFile, Preparation
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.rules import advance
 from lightpen.swing.state import (
     Happening,

@@ -12,6 +12,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.unfinished import (
@@ -23,11 +24,7 @@ from lightpen.record.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
-from lightpen.swing.preparation import (
-    CameraFile,
-    PenFile,
-    Preparation,
-)
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_for_more, read_resumable
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)

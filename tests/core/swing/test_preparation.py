@@ -7,20 +7,14 @@ import numpy as np
 import pytest
 
 from lightpen.errors import FileError
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.reading import Record, open_record, recorded_names
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import (
-    CameraFile,
-    Lack,
-    PenFile,
-    Preparation,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
 from lightpen.swing.resuming import recorded_setup
 
 NAMES = Names("Hall 2", "Zoë", "LP-04", "T-10", "C-1", 3.0005)

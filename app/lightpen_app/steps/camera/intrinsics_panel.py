@@ -11,8 +11,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from lightpen.formats.opened_files import CameraFile
 from lightpen.model.camera import Camera
-from lightpen.swing.preparation import CameraFile
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.path_field import PathField

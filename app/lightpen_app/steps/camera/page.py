@@ -18,9 +18,9 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.detection.inspection import Exposure, inspect
-from lightpen.errors import FileError
+from lightpen.formats.opened_files import CameraFile
 from lightpen.simulator.hand import Doing
-from lightpen.swing.preparation import CameraFile, Lack, SourceChoice
+from lightpen.swing.preparation import Lack, SourceChoice
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
@@ -230,10 +230,7 @@ class CameraPage(Page):
         self._intrinsics.set_problem(sentence)
 
     def _on_samples_requested(self) -> None:
-        try:
-            self._workbench.use_sample_files()
-        except FileError as error:
-            self._intrinsics.set_problem(str(error))
+        self._workbench.use_sample_files()
 
     def _on_mask_requested(self, circles: FloatArray) -> None:
         now = self._workbench.preparation

@@ -4,17 +4,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
-from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.pen_files import read_unchecked_pen, write_pen
+from lightpen.formats.opened_files import PenFile
 from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
 from lightpen.pen_check.match import PenMatch
-from lightpen.swing.preparation import PenFile, SourceKind
+from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
+from lightpen.swing.preparation import SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.file_panel import LedFilePanel
@@ -26,7 +27,10 @@ from lightpen_app.steps.leds.table_panel import Changes, LedTablePanel
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.services import Services
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import Shown
+
+T = TypeVar("T")
 
 NARROW = 110 * GRID  # px; a page of less width has two panels side by side, not three
 LOW = 62 * GRID  # px; a page of less height scrolls
@@ -54,6 +58,7 @@ class LedsPage(Page):
         self._draft = self._opened = PenDraft()
         self._is_foreign = False  # opened from a file that cannot be used
         self._check = DraftCheck()
+        self._job: Job | None = None
 
         # Widgets
         self._file = LedFilePanel()
@@ -291,29 +296,21 @@ class LedsPage(Page):
     def _open(self, path: Path, units: str | None = None) -> None:
         self.status_changed.emit("")
         self._file.ask_units("")
-        try:
-            file = PenFile.read(path, units)
-        except UsageError as error:
-            if units is None:
-                self._file.set_problem("")
-                self._file.ask_units(path.name)
-            else:
-                self._refuse(str(error))
-        except FileError as error:
-            self._open_to_mend(path, units, str(error))
-        else:
-            self._use(file)
+        self._start(lambda _: open_pen(path, units), self._on_opened)
 
-    def _open_to_mend(self, path: Path, units: str | None, sentence: str) -> None:
-        """Show LEDs that cannot be used; those in use stay in use."""
-        try:
-            pen = read_unchecked_pen(path, units)
-        except LightpenError:
-            self._refuse(sentence)
-            return
-        self._open_draft(PenDraft.of(pen), foreign=True)
-        self._file.set_value(str(path))
-        self._file.set_problem(sentence)
+    def _on_opened(self, opened: OpenedPen) -> None:
+        problem = "" if opened.problem is None else str(opened.problem)
+        if opened.file is not None:
+            self._use(opened.file)
+        elif opened.draft is not None:  # those in use stay in use
+            self._open_draft(opened.draft, foreign=True)
+            self._file.set_value(str(opened.path))
+            self._file.set_problem(problem)
+        elif opened.needs_units:
+            self._file.set_problem("")
+            self._file.ask_units(opened.path.name)
+        else:
+            self._refuse(problem)
 
     def _refuse(self, sentence: str) -> None:
         """Say why a file cannot be opened, and which one is open."""
@@ -331,26 +328,32 @@ class LedsPage(Page):
         self.changed.emit()
 
     def _use_samples(self) -> None:
-        try:
-            self._workbench.use_sample_files()
-        except FileError as error:
-            self._file.set_problem(str(error))
-        else:
-            self._open_in_use()
+        if self._is_edited:
+            self._set_draft(self._opened)
+        self._workbench.use_sample_files()
 
     def _on_save_chosen(self, path: Path) -> None:
         pen = self._check.usable
-        if pen is None:
-            return
-        try:
-            write_pen(pen, path)
-            file = PenFile.read(path)
-        except LightpenError as error:
-            self._file.set_problem(str(error))
-            return
+        if pen is not None:
+            self._start(lambda _: save_pen(pen, path), self._on_saved)
+
+    def _on_saved(self, file: PenFile) -> None:
         self._use(file)
         words = self.tr("The LEDs are saved as {0} and in use.")
-        self.status_changed.emit(words.format(path.name))
+        self.status_changed.emit(words.format(file.path.name))
+
+    def _start(
+        self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
+    ) -> None:
+        """Read or write a file; an earlier one that is under way is not waited for."""
+        if self._job is not None:
+            self._job.cancel()
+        self._job = job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self._file.set_problem)
+        job.start()
 
     # The table
 

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
-from lightpen.messages import Code
+from lightpen.messages import Code, Message
 from lightpen.model.posture import Posture, posture_of
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
@@ -110,14 +110,22 @@ class SwingWords(QObject):
             dial=_dial(moment),
         )
 
-    def waiting_value(self, refusal: Sentence | None) -> OperatorValue:
+    def waiting_value(
+        self, refusal: Sentence | None, *, is_near: bool
+    ) -> OperatorValue:
         """Return what is shown before there is a swing.
 
         Parameters
         ----------
         refusal : Sentence or None
             Why none can begin; None while images are waited for.
+        is_near : bool
+            Whether images come, so that a swing begins at any moment.
         """
+        if is_near and refusal is None:
+            told = phrase(Message(Code.SHOW_PEN))
+            state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
+            return OperatorValue(told.short, told.hint, state, dial=DialValue())
         told = self._no_images()
         if refusal is not None:
             told = Phrase(self.tr("No swing"), str(refusal))

@@ -61,6 +61,7 @@ class SwingPage(Page):
         self._solved = 0.0  # how far the tip is computed
         self._measured: tuple[KeptImages, Shortfall] | None = None
         self._said: tuple[MainAction, bool] | None = None
+        self._is_entered = False
         self._was_capturing = False
         self._was_troubled = False
         self._press_act: Callable[[], object] = self.toggle_pause
@@ -152,18 +153,9 @@ class SwingPage(Page):
 
     @override
     def entered(self) -> None:
-        if self._run.status.has_other_choices:
-            self._ask(
-                self.tr(
-                    "Something else was chosen meanwhile. This swing goes on with the "
-                    "files, names and limits that it began with."
-                ),
-                self.tr("Start over with the new ones"),
-                self.tr("Go on with this swing"),
-                self._start_anew,
-            )
-            self._runner.keep_choices()
+        self._is_entered = True
         self._runner.come()
+        self._ask_about_choices()
         self._show()
         self._plotting.start()
 
@@ -171,6 +163,7 @@ class SwingPage(Page):
     def left(self) -> None:
         self._plotting.stop()
         self._question.hide()
+        self._is_entered = False
         self._runner.leave()
 
     @override
@@ -242,6 +235,21 @@ class SwingPage(Page):
         self._question.set_words(text, yes, no)
         self._question.ask()
 
+    def _ask_about_choices(self) -> None:
+        """Ask whether a swing goes on though something else was chosen meanwhile."""
+        if not (self._is_entered and self._run.status.has_other_choices):
+            return
+        self._runner.keep_choices()
+        self._ask(
+            self.tr(
+                "Something else was chosen meanwhile. This swing goes on with the "
+                "files, names and limits that it began with."
+            ),
+            self.tr("Start over with the new ones"),
+            self.tr("Go on with this swing"),
+            self._start_anew,
+        )
+
     def _show_soon(self) -> None:
         if not self._showing.isActive():
             self._showing.start()
@@ -250,7 +258,8 @@ class SwingPage(Page):
         """Show what is the case now, here and in the operator view."""
         moment = self._moment()
         if moment is None:
-            value = self._words.waiting_value(self._run.status.refusal)
+            is_near = self._live.connection is Connection.STREAMING
+            value = self._words.waiting_value(self._run.status.refusal, is_near=is_near)
             self._face.set_value(value)
         else:
             value = self._words.operator_value(moment)
@@ -320,6 +329,7 @@ class SwingPage(Page):
         if is_troubled and not self._was_troubled:
             self._sounds.play(Sound.LOST)
         self._was_troubled = is_troubled
+        self._ask_about_choices()
         self._show_soon()
 
     def _on_progressed(self, fraction: float) -> None:

@@ -22,6 +22,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
@@ -31,12 +32,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.sample_pens import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
-from lightpen.swing.preparation import (
-    Lack,
-    PenFile,
-    SourceChoice,
-    SourceKind,
-)
+from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import unbroken
 from lightpen_app.shell.main_window import MainWindow

@@ -29,6 +29,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
@@ -40,11 +41,7 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
-from lightpen.swing.preparation import (
-    CameraFile,
-    PenFile,
-    Preparation,
-)
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.shortfall import N_MORE
 from lightpen_app.steps import review
@@ -463,7 +460,9 @@ def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
     seen = points[np.isfinite(points[:, 0])].tolist()
     qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
     shown = the(page, ResidualView)
-    assert shown.image_size().width() == workbench.run.status.solution.source.camera.width
+    assert (
+        shown.image_size().width() == workbench.run.status.solution.source.camera.width
+    )
     assert len(shown.arrows().residuals) == len(seen)
     assert shown.zoom() > 1  # the pen fills the view
     assert the(page, MisfitPlot).number() == 3

@@ -56,7 +56,7 @@ SHORT = SwingLimits(
 LONG = SwingLimits(max_uncertainty=1e-5, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
 UPRIGHT = Posture(0.0, 0.0, 0.0)
-PATIENCE_MS = 20_000  # on a machine that does other things besides
+PATIENCE_MS = 120_000
 
 
 class Blank(Page):
