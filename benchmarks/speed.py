@@ -25,7 +25,7 @@ from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.joint import extend_joint, fit_joint
+from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.two_stage import fit_two_stage
 from lightpen.formats.observation_files import Centers
@@ -224,6 +224,7 @@ def _fit_times() -> _FitTimes:
     pivot = fit_pivot(poses.rotations, poses.translations, poses.covariances)
     R, tip, cone = poses.rotations, pivot.tip_pen, pivot.pivot_cam
     but_one = fit_joint(CAMERA, PEN, pixels[:-1], R[:-1], tip, cone)
+    found = np.concatenate([but_one.rotations, R[-1:]])
 
     def two_stage() -> None:
         paper = fit_paper_poses(CAMERA, PEN, pixels, R, poses.translations)
@@ -233,7 +234,10 @@ def _fit_times() -> _FitTimes:
         joint=median_ms(lambda: fit_joint(CAMERA, PEN, pixels, R, tip, cone), REPEATS),
         calibration=median_ms(lambda: calibrate(CAMERA, PEN, seen), REPEATS),
         extend=median_ms(
-            lambda: extend_joint(CAMERA, PEN, pixels, but_one, R[-1:]), REPEATS
+            lambda: fit_joint(
+                CAMERA, PEN, pixels, found, but_one.tip_pen, but_one.cone_cam
+            ),
+            REPEATS,
         ),
         two_stage=median_ms(two_stage, REPEATS),
     )
