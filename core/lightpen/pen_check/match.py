@@ -10,10 +10,9 @@ it is instead.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
@@ -316,10 +315,29 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
         return [-1] * n_leds
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
+    if n_leds <= n_points:
+        return _cheapest_columns(costs)
     owners = [-1] * n_leds
-    for led, point in zip(*linear_sum_assignment(costs), strict=True):
-        owners[led] = int(point)
+    for point, led in enumerate(_cheapest_columns(costs.T)):
+        owners[led] = point
     return owners
+
+
+def _cheapest_columns(costs: FloatArray) -> list[int]:
+    """Return a column for each row, none twice, that cost least together.
+
+    Of its n cheapest columns, a row always finds one that the other n - 1 rows leave
+    free. All these choices are tried, as unknown LEDs, and with them rows, are few.
+    """
+    rows = costs.tolist()
+    cheapest = np.argsort(costs, axis=1)[:, : len(rows)].tolist()
+    choices = (each for each in product(*cheapest) if len(set(each)) == len(each))
+    return list(
+        min(
+            choices,
+            key=lambda each: sum(row[k] for row, k in zip(rows, each, strict=True)),
+        )
+    )
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:
