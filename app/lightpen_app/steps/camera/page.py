@@ -29,13 +29,13 @@ from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.live_markers import mask_markers, stray_markers
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.work.job import Job
 from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
 
 SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
 
@@ -45,16 +45,16 @@ class CameraPage(Rearranged, Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "camera"
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
-        self._live = services.workbench.live
+        self._workbench = workbench
+        self._live = workbench.live
         self._is_shown = False
         self._settings = CameraSettings()  # in force
         self._trouble = ""  # the last, of the camera or of a swing

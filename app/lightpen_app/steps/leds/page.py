@@ -23,10 +23,10 @@ from lightpen_app.steps.leds.match_watch import PenWatch
 from lightpen_app.steps.leds.pen_view import PenPicture
 from lightpen_app.steps.leds.table_panel import Changes, LedTablePanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
 
 
 class LedsPage(Rearranged, Page):
@@ -37,16 +37,16 @@ class LedsPage(Rearranged, Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "leds"
     narrow_below = 110 * GRID  # px; then two panels are side by side, not three
     low_below = 62 * GRID  # px; then it scrolls
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
+        self._workbench = workbench
         self._is_shown = False
         self._in_use: PenFile | None = None
         self._draft = self._opened = PenDraft()

@@ -34,13 +34,13 @@ from lightpen_app.steps.review.plots_panel import (
 )
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.work.workbench import Workbench
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
@@ -52,17 +52,17 @@ class ReviewPage(Rearranged, Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "review"
     narrow_below = 112 * GRID  # px; then it has the result in a tab
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
+        self._workbench = workbench
         self._doubts = ReviewDoubts(self)
-        self._run = services.workbench.run
+        self._run = workbench.run
         self._solution: Solution | None = None
         self._last: Result | None = None
         self._told: tuple[object, ...] = ()

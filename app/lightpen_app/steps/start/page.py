@@ -24,10 +24,10 @@ from lightpen.swing.preparation import (
 )
 from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
@@ -35,6 +35,7 @@ from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.job import Job, Report
+from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 
@@ -46,15 +47,18 @@ class StartPage(Rearranged, Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
+    sounds : Sounds
     """
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        workbench = self._workbench = services.workbench
+        self._workbench = workbench
         self._shown = workbench.preparation
         self._looked_up = ("", "")
         self._lookup: Job | None = None
@@ -65,8 +69,8 @@ class StartPage(Rearranged, Page):
         self._names = NamesForm()
         self._limits = LimitsForm()
         self._interrupted = InterruptedPanel()
-        self._last = LastResultPanel(services.workbench.around.now)
-        self._sound_test = SoundTest(services.sounds)
+        self._last = LastResultPanel(workbench.around.now)
+        self._sound_test = SoundTest(sounds)
         self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
         self._searching = QTimer(self, singleShot=True, interval=0)
 

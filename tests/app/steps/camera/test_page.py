@@ -47,7 +47,6 @@ from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
@@ -143,8 +142,8 @@ class Seen:
 
 
 @pytest.fixture
-def page(qtbot: QtBot, services: Services) -> Iterator[CameraPage]:
-    page = CameraPage(services)
+def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
+    page = CameraPage(workbench)
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
