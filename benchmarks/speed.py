@@ -129,8 +129,8 @@ def _row(what: str, time_ms: float, limit: str, others: str = "") -> Row:
 
 
 def _image_times() -> _ImageTimes:
-    shots = [live_plan(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
-    images = [render_plan(SCENE, shot) for shot in shots]
+    image_plans = [live_plan(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
+    images = [render_plan(SCENE, image_plan) for image_plan in image_plans]
     blobs, default_blobs = blob_detector(), blob_detector(DEFAULT_BLOB_STEP)
 
     def start(i: int) -> Poses:
@@ -146,7 +146,7 @@ def _image_times() -> _ImageTimes:
 
     def solve(detector: cv2.SimpleBlobDetector, i: int) -> None:
         found = blob_centers(detector, images[i])
-        solve_pnp(CAMERA, PEN, nearest(found, _true_centers(shots[i])))
+        solve_pnp(CAMERA, PEN, nearest(found, _true_centers(image_plans[i])))
 
     def render(i: int) -> Image:
         return render_plan(SCENE, live_plan(SCENE, i, i / FRAME_RATE))
@@ -185,8 +185,8 @@ def _predicted(earlier: Poses, last: Poses) -> tuple[FloatArray, FloatArray]:
     return R, t
 
 
-def _true_centers(shot: ImagePlan) -> FloatArray:
-    leds, normals = leds_in_camera(PEN, shot.rotation, shot.translation)
+def _true_centers(image_plan: ImagePlan) -> FloatArray:
+    leds, normals = leds_in_camera(PEN, image_plan.rotation, image_plan.translation)
     return ellipse_centers(CAMERA, leds, normals, PEN.diameter / 2)
 
 

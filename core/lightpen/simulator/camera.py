@@ -293,7 +293,7 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or "Mono8"
         times = end - self._exposure * np.array([1.0, 0.5, 0.0])
         scene = _with_gain(self.scene, settings)
-        image = render_plan(scene, self._shot(scene, seq, times))
+        image = render_plan(scene, self._image_plan(scene, seq, times))
         return Frame(
             image=sealed(image),
             seq=seq,
@@ -304,7 +304,7 @@ class SimulatedCamera:
             bits=BITS[pixel_format],
         )
 
-    def _shot(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
+    def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
         """Return what is seen in the exposure between the first and the last time."""
         held = self.operator.held(times)
         rotations, translations = _poses(scene, held)

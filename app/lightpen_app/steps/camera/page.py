@@ -84,7 +84,7 @@ class CameraPage(Rearranged, Page):
         self._stray.cover_requested.connect(self._on_cover_requested)
         self._exposure.exposure_changed.connect(self._live.set_exposure)
         self._exposure.gain_changed.connect(self._live.set_gain)
-        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.run.changed.connect(self._remark_swing)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
@@ -93,7 +93,7 @@ class CameraPage(Rearranged, Page):
         self._live.failed.connect(self._on_failed)
 
         self._retranslate()
-        self._on_bench_changed()
+        self._on_workbench_changed()
 
     @override
     def title(self) -> str:
@@ -187,7 +187,7 @@ class CameraPage(Rearranged, Page):
 
     # What is chosen
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         now = self._workbench.preparation
         self._source.set_value(now.source)
         self._intrinsics.set_value(now.camera_file)

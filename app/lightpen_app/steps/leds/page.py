@@ -89,11 +89,11 @@ class LedsPage(Rearranged, Page):
         self._space.led_chosen.connect(self._table.set_chosen)
         self._space.move_requested.connect(self._on_move_requested)
         self._watch.value_changed.connect(self._on_match_changed)
-        self._workbench.changed.connect(self._on_bench_changed)
+        self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.live.image_shown.connect(self._on_image_shown)
         self._workbench.live.connection_changed.connect(self._on_connection_changed)
 
-        self._on_bench_changed()
+        self._on_workbench_changed()
 
     @override
     def title(self) -> str:
@@ -182,7 +182,7 @@ class LedsPage(Rearranged, Page):
             return lack_text(lack)
         return ""
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         preparation = self._workbench.preparation
         file = preparation.pen_file
         if file is not self._in_use:

@@ -109,7 +109,7 @@ class StartPage(Rearranged, Page):
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
         self._interrupted.search_requested.connect(self._search_interrupted)
-        workbench.changed.connect(self._on_bench_changed)
+        workbench.changed.connect(self._on_workbench_changed)
 
         self._show_changes(None, self._shown)
         self._retranslate()
@@ -230,7 +230,7 @@ class StartPage(Rearranged, Page):
 
     # What is shown
 
-    def _on_bench_changed(self) -> None:
+    def _on_workbench_changed(self) -> None:
         before, now = self._shown, self._workbench.preparation
         self._shown = now
         self._show_changes(before, now)

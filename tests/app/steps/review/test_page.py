@@ -92,8 +92,8 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
     with RecordWriter.create(folder / "swing", preparation.header()) as writer:
         for i in range(N_IMAGES):
             R, t = swing.rotations[i], swing.translations[i]
-            shot = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
-            image = render_plan(small_scene, shot)
+            image_plan = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
+            image = render_plan(small_scene, image_plan)
             seen = look(image, camera, pen)
             writer.append(image, seen.pixels, seen.rotation, seen.translation, 0.1 * i)
     return folder / "swing"
