@@ -118,14 +118,16 @@ def _rendered(plan: ScenePlan) -> ImageSource:
     """Return the images of a scene, each rendered when it is asked for."""
 
     def loaders() -> Iterator[Callable[[], Image]]:
-        for shot in plan.shots:
-            yield partial(render_plan, plan.scene, shot)
+        for image_plan in plan.image_plans:
+            yield partial(render_plan, plan.scene, image_plan)
 
-    return ImageSource(tuple(str(shot.index) for shot in plan.shots), (), loaders)
+    return ImageSource(
+        tuple(str(image_plan.index) for image_plan in plan.image_plans), (), loaders
+    )
 
 
 def _flags(plan: ScenePlan) -> list[tuple[str, ...]]:
-    return [shot.flags for shot in plan.shots]
+    return [image_plan.flags for image_plan in plan.image_plans]
 
 
 def _spoilt(flags: tuple[str, ...]) -> str:
@@ -136,9 +138,9 @@ def _spoilt(flags: tuple[str, ...]) -> str:
 def _on_their_leds(plan: ScenePlan, calibration: Calibration) -> BoolArray:
     """Return which labelled centres lie on the disc of a lit LED of that name."""
     scene = plan.scene
-    R = np.array([shot.rotation for shot in plan.shots])
-    t = np.array([shot.translation for shot in plan.shots])
-    lit = np.array([shot.view.gains > 0 for shot in plan.shots])
+    R = np.array([image_plan.rotation for image_plan in plan.image_plans])
+    t = np.array([image_plan.translation for image_plan in plan.image_plans])
+    lit = np.array([image_plan.view.gains > 0 for image_plan in plan.image_plans])
     discs = disc_images(
         scene.camera, *leds_in_camera(scene.pen, R, t), scene.pen.diameter / 2
     )

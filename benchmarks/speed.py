@@ -25,7 +25,7 @@ from lightpen.detection.observations import observe_centers
 from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.estimation.calibrate import calibrate
-from lightpen.estimation.joint import extend_joint, fit_joint
+from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.two_stage import fit_two_stage
 from lightpen.formats.observation_files import Centers
@@ -129,8 +129,8 @@ def _row(what: str, time_ms: float, limit: str, others: str = "") -> Row:
 
 
 def _image_times() -> _ImageTimes:
-    shots = [live_plan(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
-    images = [render_plan(SCENE, shot) for shot in shots]
+    image_plans = [live_plan(SCENE, i, i / FRAME_RATE) for i in range(N_IMAGES)]
+    images = [render_plan(SCENE, image_plan) for image_plan in image_plans]
     blobs, default_blobs = blob_detector(), blob_detector(DEFAULT_BLOB_STEP)
 
     def start(i: int) -> Poses:
@@ -146,7 +146,7 @@ def _image_times() -> _ImageTimes:
 
     def solve(detector: cv2.SimpleBlobDetector, i: int) -> None:
         found = blob_centers(detector, images[i])
-        solve_pnp(CAMERA, PEN, nearest(found, _true_centers(shots[i])))
+        solve_pnp(CAMERA, PEN, nearest(found, _true_centers(image_plans[i])))
 
     def render(i: int) -> Image:
         return render_plan(SCENE, live_plan(SCENE, i, i / FRAME_RATE))
@@ -185,8 +185,8 @@ def _predicted(earlier: Poses, last: Poses) -> tuple[FloatArray, FloatArray]:
     return R, t
 
 
-def _true_centers(shot: ImagePlan) -> FloatArray:
-    leds, normals = leds_in_camera(PEN, shot.rotation, shot.translation)
+def _true_centers(image_plan: ImagePlan) -> FloatArray:
+    leds, normals = leds_in_camera(PEN, image_plan.rotation, image_plan.translation)
     return ellipse_centers(CAMERA, leds, normals, PEN.diameter / 2)
 
 
@@ -224,6 +224,7 @@ def _fit_times() -> _FitTimes:
     pivot = fit_pivot(poses.rotations, poses.translations, poses.covariances)
     R, tip, cone = poses.rotations, pivot.tip_pen, pivot.pivot_cam
     but_one = fit_joint(CAMERA, PEN, pixels[:-1], R[:-1], tip, cone)
+    found = np.concatenate([but_one.rotations, R[-1:]])
 
     def two_stage() -> None:
         paper = fit_paper_poses(CAMERA, PEN, pixels, R, poses.translations)
@@ -233,7 +234,10 @@ def _fit_times() -> _FitTimes:
         joint=median_ms(lambda: fit_joint(CAMERA, PEN, pixels, R, tip, cone), REPEATS),
         calibration=median_ms(lambda: calibrate(CAMERA, PEN, seen), REPEATS),
         extend=median_ms(
-            lambda: extend_joint(CAMERA, PEN, pixels, but_one, R[-1:]), REPEATS
+            lambda: fit_joint(
+                CAMERA, PEN, pixels, found, but_one.tip_pen, but_one.cone_cam
+            ),
+            REPEATS,
         ),
         two_stage=median_ms(two_stage, REPEATS),
     )

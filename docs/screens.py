@@ -113,7 +113,7 @@ class Stage:
         self._application = application
         application.setCursorFlashTime(0)  # a cursor that blinks is not the same twice
         self._scene = Scene(n_images=N_SHOWN)
-        self._shots = plan_scene(self._scene).shots
+        self._image_plans = plan_scene(self._scene).image_plans
         settings = Settings(DATA / "lightpen.ini")
         settings.set_preferences(Preferences())
         store_result(DATA / "results", _earlier_result())
@@ -201,7 +201,7 @@ class Stage:
         self._wait_until(lambda: run.status.solution is not None)
 
     def _show_image(self, index: int) -> None:
-        image = sealed(render_plan(self._scene, self._shots[index]))
+        image = sealed(render_plan(self._scene, self._image_plans[index]))
         frame = Frame(image, seq=index, host_ts_ns=round(index * PERIOD * 1e9))
         now = self._workbench.preparation
         assert now.camera is not None
@@ -275,8 +275,8 @@ def _record(folder: Path, preparation: Preparation) -> None:
     scene = Scene(n_images=N_RECORDED, seed=3)
     header = replace(preparation.header(), created=NOW)
     with RecordWriter.create(folder, header) as writer:
-        for index, shot in enumerate(plan_scene(scene).shots):
-            image = render_plan(scene, shot)
+        for index, image_plan in enumerate(plan_scene(scene).image_plans):
+            image = render_plan(scene, image_plan)
             seen = look(image, scene.camera, scene.pen)
             writer.append(
                 image, seen.pixels, seen.rotation, seen.translation, index * PERIOD

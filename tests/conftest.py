@@ -201,6 +201,7 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
 
     from lightpen.cameras.clock import SkippingClock
     from lightpen.detection.sighting import look
+    from lightpen.formats.opened_files import CameraFile, PenFile
     from lightpen.model.limits import SwingLimits
     from lightpen.record.names import Names
     from lightpen.record.writing import RecordWriter
@@ -210,7 +211,6 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
     from lightpen.swing.capture import capture_image
-    from lightpen.formats.opened_files import CameraFile, PenFile
     from lightpen.swing.preparation import Preparation
     from lightpen.swing.state import (
         start_swing,

@@ -25,16 +25,15 @@ from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sounds import Mute, find_sounds
+from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.steps.page import Page
-from lightpen_app.steps.services import Services
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
-MakePages: TypeAlias = Callable[[Services], Sequence[Page]]
+MakePages: TypeAlias = Callable[[Workbench, Sounds], Sequence[Page]]
 
 
 class Wizard(QObject):
@@ -72,8 +71,8 @@ class Wizard(QObject):
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
         self.workbench = Workbench(settings, folder, around, self)
-        services = Services(self.workbench, self._sounds)
-        self.window = MainWindow(make_pages(services), settings, self._preferences)
+        pages = make_pages(self.workbench, self._sounds)
+        self.window = MainWindow(pages, settings, self._preferences)
         self.window.setMinimumSize(LEAST_SIZE)
         self.crash_hook = CrashHook(folder / "crashes", self)
 

@@ -22,7 +22,6 @@ PACKAGES = (
     "PySide6_Essentials",
     "pyqtgraph",
     "numpy",
-    "scipy",
     "opencv-python-headless",
 )
 MAX_REPORTS = 20  # of one run; a bug in a paint event would fill the disk

@@ -38,9 +38,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import Wizard
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts, style_sheet
-from lightpen_app.steps.services import Services
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
@@ -118,11 +116,6 @@ def workbench(
     workbench.use_sample_files()
     yield workbench
     workbench.shut_down()
-
-
-@pytest.fixture
-def services(workbench: Workbench) -> Services:
-    return Services(workbench, Silence())
 
 
 # The whole wizard, used as an operator uses it

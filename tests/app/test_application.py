@@ -14,11 +14,12 @@ from typing_extensions import override
 
 from lightpen_app.application import Wizard
 from lightpen_app.look.languages import Language
+from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import LIGHT, Appearance, colors_of
 from lightpen_app.shell.main_window import LEAST_SIZE
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Workbench
 
 OPENING = """
 import sys
@@ -34,9 +35,9 @@ def tell():
     print(window.width(), window.height(), corner.x(), corner.y())
     QApplication.quit()
 
-def pages(services):
+def pages(workbench, sounds):
     QTimer.singleShot(500, tell)
-    return make_pages(services)
+    return make_pages(workbench, sounds)
 
 sys.exit(run(pages))
 """
@@ -60,7 +61,7 @@ class Only(Page):
         return MainAction("Continue")
 
 
-def only_page(services: Services) -> Sequence[Page]:
+def only_page(workbench: Workbench, sounds: Sounds) -> Sequence[Page]:
     return [Only()]
 
 

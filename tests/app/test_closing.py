@@ -53,9 +53,9 @@ def close():
     print("closing", flush=True)
     QApplication.closeAllWindows()
 
-def pages(services):
+def pages(workbench, sounds):
     QTimer.singleShot(500, close)
-    return make_pages(services)
+    return make_pages(workbench, sounds)
 
 sys.exit(run(pages))
 """
@@ -97,9 +97,9 @@ def swing(workbench):
     if sys.argv[2]:
         QApplication.closeAllWindows()
 
-def pages(services):
-    QTimer.singleShot(500, lambda: swing(services.workbench))
-    return make_pages(services)
+def pages(workbench, sounds):
+    QTimer.singleShot(500, lambda: swing(workbench))
+    return make_pages(workbench, sounds)
 
 sys.exit(run(pages))
 """

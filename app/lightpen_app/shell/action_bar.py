@@ -4,9 +4,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.shell.room import Room
 from lightpen_app.steps.page import MainAction
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.rearranged import Room
 from lightpen_app.widgets.translated import Translated
 
 MAIN_WIDTH = 22 * GRID + 34  # px; with the padding and the border

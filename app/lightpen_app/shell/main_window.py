@@ -10,7 +10,6 @@ from PySide6.QtGui import (
     QGuiApplication,
     QIcon,
     QKeyEvent,
-    QResizeEvent,
 )
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -36,19 +35,19 @@ from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.placement import FRAME, fitted_place
-from lightpen_app.shell.room import Room
 from lightpen_app.shell.sidebar import Sidebar
 from lightpen_app.shell.step_states import Status, Step, list_steps
 from lightpen_app.steps.page import Page
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.settings import Preferences, Settings
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
 
 
-class MainWindow(QMainWindow):
+class MainWindow(Rearranged, QMainWindow):
     """Shows one page at a time and leads from step to step.
 
     Keys: Enter and PageDown press the main button, PageUp goes back, Space pauses,
@@ -73,6 +72,8 @@ class MainWindow(QMainWindow):
         waits for what is still under way.
     """
 
+    # Less is what a screen of 1920 x 1080 drawn at 200 % has.
+    narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     preferences_changed = Signal(object)
     closing = Signal()
 
@@ -91,7 +92,6 @@ class MainWindow(QMainWindow):
         self._pages = tuple(pages)
         self._settings = settings
         self._now = 0
-        self._room = Room()
         self._notice_is_of_page = False
         self._asks = True
 
@@ -246,14 +246,6 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        room = Room.of(event.size())
-        if room != self._room:
-            self._room = room
-            self._use_room()
-
-    @override
     def closeEvent(self, event: QCloseEvent) -> None:
         questions = [page.unsaved() for page in self._pages if page.unsaved()]
         if self._asks and questions and not self._confirmed("\n\n".join(questions)):
@@ -342,6 +334,7 @@ class MainWindow(QMainWindow):
         if fitted != place:
             self.setGeometry(fitted)
 
+    @override
     def _use_room(self) -> None:
         """Arrange what is about the page as the size of the window allows."""
         self._area.set_room(self._room)

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.shell.notice_bar import NoticeBar
-from lightpen_app.shell.room import Room
+from lightpen_app.widgets.rearranged import Room
 
 
 class PageArea(QFrame):

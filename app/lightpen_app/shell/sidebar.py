@@ -6,11 +6,11 @@ from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.shell.room import Room
 from lightpen_app.shell.step_list import StepList
 from lightpen_app.shell.step_states import Step
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.rearranged import Room
 from lightpen_app.widgets.translated import Translated
 
 WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID

@@ -7,10 +7,7 @@ the thing that delivers images. One thread makes all calls of an open one, see
 
 from dataclasses import dataclass, fields
 from math import isnan
-from typing import Any, Protocol
-
-import numpy as np
-import numpy.typing as npt
+from typing import Protocol
 
 from lightpen.arrays import Image
 from lightpen.errors import LightpenError
@@ -59,7 +56,7 @@ class Frame:
     Attributes
     ----------
     image : (H, W) array
-        Read-only and nobody else's memory, see `own_image` and `sealed`.
+        Read-only and nobody else's memory, see `sealed`.
     seq : int
         Number given by the camera. It ascends over the life of the `ImageCamera`; a gap
         is an image that got lost.
@@ -85,12 +82,7 @@ class Frame:
 
     def __post_init__(self) -> None:
         if self.image.flags.writeable:
-            raise ValueError("`image` must be read-only; use `own_image` or `sealed`.")
-
-
-def own_image(pixels: npt.NDArray[Any]) -> Image:
-    """Return a read-only copy of grey values, safe when a driver reuses its buffer."""
-    return sealed(np.array(pixels, order="C"))
+            raise ValueError("`image` must be read-only; use `sealed`.")
 
 
 def sealed(image: Image) -> Image:
@@ -170,10 +162,6 @@ class Caps:
         That are offered, the usual one first.
     exposure_us, gain_db, frame_rate : Range or None
         None if it cannot be set.
-    has_trigger : bool
-        Whether it can wait for `ImageCamera.trigger`.
-    has_timestamps : bool
-        Whether its images carry the time of its own clock.
     waits : bool
         Whether no image is lost when nobody reads, as with a file.
     n_images : int or None
@@ -186,8 +174,6 @@ class Caps:
     exposure_us: Range | None = None
     gain_db: Range | None = None
     frame_rate: Range | None = None
-    has_trigger: bool = False
-    has_timestamps: bool = False
     waits: bool = False
     n_images: int | None = None
 
@@ -201,33 +187,12 @@ class CameraSettings:
     exposure_us, gain_db, frame_rate : float or None
         In a request None means: leave it. In an answer: the camera has no such thing.
     pixel_format : str or None
-    triggered : bool
-        Whether each image waits for `ImageCamera.trigger`.
     """
 
     exposure_us: float | None = None
     gain_db: float | None = None
     frame_rate: float | None = None
     pixel_format: str | None = None
-    triggered: bool = False
-
-
-@dataclass(frozen=True)
-class DeviceInfo:
-    """A device that was found.
-
-    Attributes
-    ----------
-    backend : str
-        Name of the backend that found it.
-    serial : str
-        By which that backend finds it again.
-    model : str
-    """
-
-    backend: str
-    serial: str
-    model: str
 
 
 class ImageCamera(Protocol):
@@ -264,7 +229,7 @@ class ImageCamera(Protocol):
         Raises
         ------
         ConfigError
-            The pixel format or the trigger is not offered.
+            The pixel format is not offered.
         """
 
     def set_exposure(self, exposure_us: float) -> float:
@@ -304,15 +269,6 @@ class ImageCamera(Protocol):
             There are no more.
         """
 
-    def trigger(self) -> None:
-        """Ask for one image.
-
-        Raises
-        ------
-        ConfigError
-            The camera has no trigger.
-        """
-
     def probe(self) -> None:
         """Do nothing if the device answers.
 
@@ -323,20 +279,3 @@ class ImageCamera(Protocol):
 
     def stats(self) -> Stats:
         """Return what became of the images so far; ``skipped`` is left at 0."""
-
-
-class Backend(Protocol):
-    """One way of getting at cameras. Its libraries are imported when it is used."""
-
-    @property
-    def name(self) -> str:
-        """Name for lists and settings."""
-
-    def available(self) -> str | None:
-        """Return why it cannot be used on this machine, or None if it can."""
-
-    def discover(self) -> tuple[DeviceInfo, ...]:
-        """Look for devices; never while one of them delivers images."""
-
-    def camera(self, serial: str) -> ImageCamera:
-        """Return the camera of that serial number, not yet opened."""

@@ -12,7 +12,6 @@ from lightpen.cameras.protocol import (
     CameraSettings,
     Caps,
     ConfigError,
-    DeviceInfo,
     DeviceLost,
     DeviceNotFound,
     EndOfImages,
@@ -118,8 +117,6 @@ class ReplayCamera:
                 f"The recorded images are {pixel_format}, not "
                 f"{settings.pixel_format}. Choose {pixel_format}."
             )
-        if settings.triggered:
-            raise _no_trigger()
         if settings.frame_rate is not None:
             self._frame_rate = FRAME_RATE.nearest(settings.frame_rate)
         return CameraSettings(frame_rate=self._frame_rate, pixel_format=pixel_format)
@@ -160,10 +157,6 @@ class ReplayCamera:
         frame = self._decode(self._next_loader())
         self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
         return frame
-
-    def trigger(self) -> None:
-        """Refuse: the images are taken."""
-        raise _no_trigger()
 
     def probe(self) -> None:
         """Do nothing: files are looked at when they are read."""
@@ -242,24 +235,6 @@ class ReplayCamera:
         return not is_there or self._n_unread >= len(self._source.names)
 
 
-class ReplayBackend:
-    """Recorded images among the ways of getting at cameras."""
-
-    name = "recorded"
-
-    def available(self) -> str | None:
-        """Return None: it always can be used."""
-        return None
-
-    def discover(self) -> tuple[DeviceInfo, ...]:
-        """Return nothing: the user names the images."""
-        return ()
-
-    def camera(self, serial: str) -> ReplayCamera:
-        """Return the images of a folder, a pattern or a video, not yet opened."""
-        return ReplayCamera(serial)
-
-
 def _first_image(source: ImageSource, where: str) -> Image:
     for loader in source.open():
         return loader()
@@ -283,11 +258,4 @@ def _check_like_first(image: Image, name: str, caps: Caps) -> None:
 def _already_taken(what: str) -> ConfigError:
     return ConfigError(
         f"The {what} of recorded images cannot be changed. Choose a live camera."
-    )
-
-
-def _no_trigger() -> ConfigError:
-    return ConfigError(
-        "Recorded images cannot be triggered. Switch the trigger off, or choose a "
-        "live camera."
     )

@@ -40,7 +40,6 @@ BUSY_PAUSE = 0.5  # s
 # A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
 LONGEST_BUSY = 4.0  # s
 BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
-REQUEST_PAUSE = 0.5  # s between probes of a camera that waits for a trigger
 LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # Of the images since measuring began, skipped by a computer that is too slow; fewer
 # are skipped when something else holds it up once.
@@ -146,7 +145,6 @@ class CameraWorker:
         self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
         self._heard_ns = 0
-        self._n_triggered = 0
 
     @property
     def serial(self) -> str:
@@ -176,7 +174,6 @@ class CameraWorker:
             The camera did not come back from a call within ``timeout_s``.
         """
         self._stopping.set()
-        self._requests.put(_wake)
         self._queue.end()
         if self._thread.ident is None:
             return
@@ -214,10 +211,6 @@ class CameraWorker:
         """
         return self._queue.take(timeout_s)
 
-    def configure(self, settings: CameraSettings) -> None:
-        """Ask for other settings; images come anew, those of a file from the first."""
-        self._requests.put(lambda: self._configure(settings))
-
     def set_exposure(self, exposure_us: float) -> None:
         """Ask for another exposure while images come."""
         self._requests.put(lambda: self._set_exposure(exposure_us))
@@ -225,10 +218,6 @@ class CameraWorker:
     def set_gain(self, gain_db: float) -> None:
         """Ask for another gain while images come."""
         self._requests.put(lambda: self._set_gain(gain_db))
-
-    def trigger(self) -> None:
-        """Ask for one image of a triggered camera."""
-        self._requests.put(self._trigger)
 
     def _run(self) -> None:
         try:
@@ -247,11 +236,8 @@ class CameraWorker:
     def _serve(self) -> None:
         """Run the camera for one image, or reconnect."""
         try:
-            self._serve_requests(waits=self._awaits_trigger)
-            if self._awaits_trigger:
-                self._camera.probe()
-            elif not self._stopping.is_set():
-                self._read()
+            self._serve_requests()
+            self._read()
         except DeviceLost as error:
             self._on_event(Troubled(error))
             self._reconnect()
@@ -269,7 +255,6 @@ class CameraWorker:
             self._hear()
             self._change(Connection.STREAMING)
             self._deliver(frame)
-        self._n_triggered = max(self._n_triggered - 1, 0)
 
     def _deliver(self, frame: Frame) -> None:
         if self._mailbox.put(frame):
@@ -348,41 +333,22 @@ class CameraWorker:
     def _connect(self) -> None:
         self._camera.open()
         self._caps = self._camera.caps
-        self._begin(self._settings)
-
-    def _begin(self, settings: CameraSettings) -> None:
-        self._applied = self._camera.configure(settings)
-        self._settings = settings
+        self._applied = self._camera.configure(self._settings)
         self._camera.start()
-        self._n_triggered = 0
         self._hear()
         self._on_event(SettingsApplied(self._applied))
         self._change(Connection.STREAMING)
 
-    @property
-    def _awaits_trigger(self) -> bool:
-        return self._applied.triggered and self._n_triggered == 0
-
-    def _serve_requests(self, waits: bool) -> None:
-        """Fulfil what was asked for; ``waits`` a little for the first request."""
+    def _serve_requests(self) -> None:
         while True:
             try:
-                request = self._requests.get(waits, REQUEST_PAUSE)
+                request = self._requests.get_nowait()
             except Empty:
                 return
-            waits = False
             try:
                 request()
             except ConfigError as error:
                 self._on_event(Troubled(error))
-
-    def _configure(self, settings: CameraSettings) -> None:
-        self._camera.stop()
-        try:
-            self._begin(settings)
-        except ConfigError as error:
-            self._on_event(Troubled(error))
-            self._begin(self._settings)
 
     def _set_exposure(self, exposure_us: float) -> None:
         applied = self._camera.set_exposure(exposure_us)
@@ -398,11 +364,6 @@ class CameraWorker:
         self._applied = applied
         self._on_event(SettingsApplied(applied))
 
-    def _trigger(self) -> None:
-        self._camera.trigger()
-        self._n_triggered += 1
-        self._hear()
-
     def _change(self, connection: Connection) -> None:
         if connection is not self._connection:
             self._connection = connection
@@ -412,10 +373,6 @@ class CameraWorker:
 def is_too_slow(n_missed: int, n_offered: int) -> bool:
     """Return whether so many images were missed that it was not one hold-up."""
     return n_missed >= max(LEAST_SKIPPED, SKIPPED_SHARE * n_offered)
-
-
-def _wake() -> None:
-    """Do nothing: the request that ends a wait for requests."""
 
 
 def _too_slow(n_missed: int, n_offered: int) -> FramesSkipped:

@@ -18,7 +18,13 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import FloatArray, Image, IntArray
-from lightpen.detection.discs import MIN_SIZE, Box, Disc, bounding_box, measure_disc
+from lightpen.detection.disc_moments import (
+    MIN_SIZE,
+    Box,
+    Disc,
+    bounding_box,
+    measure_disc,
+)
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter

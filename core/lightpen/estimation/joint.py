@@ -144,34 +144,6 @@ def fit_joint(
     return _fit_from(state, used)
 
 
-def extend_joint(
-    camera: Camera,
-    pen: Pen,
-    pixels: FloatArray,
-    joint: JointFit,
-    rotations: FloatArray,
-) -> JointFit:
-    """Add images to a joint fit, starting from what it has found.
-
-    Parameters
-    ----------
-    camera : Camera
-    pen : Pen
-    pixels : (N + K, L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen. The N images of
-        ``joint`` come first.
-    joint : JointFit
-    rotations : (K, 3, 3) array
-        Of cam_from_pen, rough, of the new images.
-
-    Returns
-    -------
-    JointFit
-    """
-    start = np.concatenate([joint.rotations, rotations])
-    return fit_joint(camera, pen, pixels, start, joint.tip_pen, joint.cone_cam)
-
-
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """The model around one state.

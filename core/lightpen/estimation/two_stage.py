@@ -126,14 +126,7 @@ def propagated_covariance(
 ) -> FloatArray:
     """Return the covariance of the two-stage solution by those of the poses.
 
-    Parameters
-    ----------
-    rotations : (N, 3, 3) array
-        Of cam_from_pen.
-    covariances : (N, 6, 6) array
-        Of each pose's (theta, dt), rad and mm.
-    tip_pen : (3,) array
-        mm.
+    Its arguments are those of `lightpen.estimation.pivot.tip_covariances`.
 
     Returns
     -------

@@ -6,10 +6,14 @@ tags that name a type of a program, anchors and aliases, document type definitio
 entities are refused, and so are keys given twice and deep nesting.
 """
 
+import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NoReturn, TypeAlias
+from xml.parsers import expat
+
+import yaml
 
 from lightpen.errors import FileError
 from lightpen.formats.files import quoted
@@ -27,14 +31,6 @@ _YAML_TAGS = {
     )
 }
 _YAML_DIRECTIVE = r"%YAML[: ].*"
-_PLAIN_HEAD = r"(?:%YAML(?::1\.0| 1\.2)\n)?---\n"
-_PLAIN_ENTRY = (
-    r"(?a)([A-Za-z]\w*): (?:"
-    r'(?:([+-]?\w[\w.]*(?:[+-]\w+)?)|"([^"\\\n]*)")\n'
-    r"|!!opencv-matrix\n( +)rows: (\d+)\n\4cols: (\d+)\n\4dt: (\w+)\n"
-    r"\4data: \[([\w.+\-, \n]*)\]\n)"
-)
-_PLAIN_CELL = r"(?a:[+-]?[\w.]+(?:[+-]\w+)?)"
 
 
 def parse_document(text: str, name: str) -> dict[str, Tree]:
@@ -58,7 +54,7 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
     elif start in ("{", "["):
         tree = parse_json(text, name)
     else:
-        tree = _parse_plain_yaml(text) or parse_yaml(text, name)
+        tree = parse_yaml(text, name)
     if not isinstance(tree, dict):
         raise FileError(
             f"{name} begins with {quoted(text.strip())}, which names no values. "
@@ -69,7 +65,6 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
 
 def parse_json(text: str, name: str) -> Tree:
     """Return the tree of a JSON text; see `parse_document`."""
-    import json
 
     def entries(pairs: list[tuple[str, Tree]]) -> dict[str, Tree]:
         mapping: dict[str, Tree] = {}
@@ -103,8 +98,6 @@ def parse_yaml(text: str, name: str) -> Tree:
 
     The directive ``%YAML:1.0`` of OpenCV, which is no valid YAML, is skipped.
     """
-    import yaml
-
     loader = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
     if text.startswith("%YAML"):
         text = re.sub(_YAML_DIRECTIVE, "", text, count=1)
@@ -129,8 +122,6 @@ def parse_xml(text: str, name: str) -> Tree:
     Elements with children become mappings, or sequences if the children are named
     ``_``; see `parse_document`.
     """
-    from xml.parsers import expat
-
     builder = _XmlBuilder(name)
     parser = expat.ParserCreate()
     parser.buffer_text = True
@@ -153,35 +144,7 @@ def parse_xml(text: str, name: str) -> Tree:
     return builder.root
 
 
-def _parse_plain_yaml(text: str) -> dict[str, Tree] | None:
-    """Return the tree of a YAML file as OpenCV itself writes it, or None.
-
-    Such a file needs no YAML parser, whose import takes longer than all the reading.
-    What looks different in any way is left to `parse_yaml`.
-    """
-    head = re.match(_PLAIN_HEAD, text)
-    place = head.end() if head else 0
-    tree: dict[str, Tree] = {}
-    pattern = re.compile(_PLAIN_ENTRY)
-    while place < len(text):
-        entry = pattern.match(text, place)
-        if not entry or entry[1] in tree:
-            return None
-        key, plain, quotation, indent, rows, cols, dt, data = entry.groups()
-        if indent is None:
-            tree[key] = plain if quotation is None else quotation
-        else:
-            cells = [cell.strip() for cell in data.split(",")]
-            if not all(re.fullmatch(_PLAIN_CELL, cell) for cell in cells):
-                return None
-            tree[key] = {"rows": rows, "cols": cols, "dt": dt, "data": [*cells]}
-        place = entry.end()
-    return tree
-
-
 def _yaml_document(events: Iterator[Any], name: str) -> Tree:
-    import yaml
-
     tree: Tree = None
     for event in events:
         if isinstance(event, yaml.DocumentStartEvent):
@@ -194,8 +157,6 @@ def _yaml_document(events: Iterator[Any], name: str) -> Tree:
 
 
 def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree:
-    import yaml
-
     _check_yaml_event(event, name)
     if isinstance(event, yaml.ScalarEvent):
         return str(event.value)
@@ -222,8 +183,6 @@ def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree
 
 
 def _check_yaml_event(event: Any, name: str) -> None:
-    import yaml
-
     line = event.start_mark.line + 1
     if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
         raise FileError(

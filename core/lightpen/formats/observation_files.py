@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, write_whole
+from lightpen.formats.files import MEGABYTE
 from lightpen.formats.tables import Table, read_table
 from lightpen.model.rigid import nearest_rotation
 
@@ -109,25 +109,6 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     grid = np.full((len(frames), n_leds, 2), np.nan)
     grid[place, led_of_row - 1] = pixels
     return Centers(frames, grid, path)
-
-
-def write_centers(centers: Centers, path: Path) -> None:
-    """Write LED centres as a table, to be read back to the last digit.
-
-    Frames without any LED leave no trace in the file.
-
-    Raises
-    ------
-    FileError
-        The file cannot be written.
-    """
-    seen = np.isfinite(centers.pixels).all(axis=2)
-    frames = np.broadcast_to(centers.frames[:, None], seen.shape)[seen].tolist()
-    leds = (np.nonzero(seen)[1] + 1).tolist()
-    pixels = centers.pixels[seen].tolist()
-    rows = zip(frames, leds, pixels, strict=True)
-    text = "".join(f"{frame},{led},{x!r},{y!r}\n" for frame, led, (x, y) in rows)
-    write_whole(path, f"frame,led,x_px,y_px\n{text}".encode())
 
 
 def read_poses(path: Path) -> PoseTable:

@@ -10,10 +10,9 @@ it is instead.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
@@ -56,7 +55,7 @@ class What(StrEnum):
     SHIFTED = "shifted"  # LED, by
     SHIFTED_EITHER = "shifted either"  # two LEDs, of which one is; by
     UNSEEN = "unseen"  # LED
-    UNKNOWN_LED = "stranger"  # by: its place in the pen frame
+    UNKNOWN_LED = "unknown LED"  # by: its place in the pen frame
     MISFIT = "misfit"
 
 
@@ -217,7 +216,7 @@ class _Located:
     pixels: FloatArray  # (N, L, 2)
     shifts: dict[int, Shift]  # by LED number
     unseen: list[int]  # LED numbers
-    strangers: FloatArray  # (P, 3), points on the pen that are no LED of the file
+    unknown: FloatArray  # (P, 3), points on the pen that are no LED of the file
 
     def leds(self, pen: Pen) -> FloatArray:
         """Return the places of all LEDs, (L, 3)."""
@@ -230,13 +229,13 @@ class _Located:
 def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
     """Find LEDs far off their places among the spots left over, then small shifts."""
     missing, poses = seen.missing, seen.poses
-    strangers = find_unknown_leds(camera, poses, seen.left_over)
-    owners = _owners(pen.leds[missing], strangers.points)
+    unknown = find_unknown_leds(camera, poses, seen.left_over)
+    owners = _owners(pen.leds[missing], unknown.points)
     leds, pixels = pen.leds.copy(), seen.pixels.copy()
     for led, owner in zip(missing, owners, strict=True):
         if owner >= 0:
-            leds[led] = strangers.points[owner]
-            pixels[:, led] = strangers.pixels[:, owner]
+            leds[led] = unknown.points[owner]
+            pixels[:, led] = unknown.pixels[:, owner]
     guess = replace(pen, leds=leds)
     found = find_shifts(camera, guess, pixels, poses.rotations, poses.translations)
     shifts = {shift.led: shift for shift in found}
@@ -250,7 +249,7 @@ def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
         pixels,
         shifts,
         sorted(unseen - set(shifts)),
-        np.delete(strangers.points, owned, axis=0),
+        np.delete(unknown.points, owned, axis=0),
     )
 
 
@@ -316,10 +315,29 @@ def _owners(leds: FloatArray, points: FloatArray) -> list[int]:
         return [-1] * n_leds
     gaps = np.abs(leds[:, None] - points)
     costs = (gaps > SAME).sum(axis=2) + 1e-6 * gaps.sum(axis=2)
+    if n_leds <= n_points:
+        return _cheapest_columns(costs)
     owners = [-1] * n_leds
-    for led, point in zip(*linear_sum_assignment(costs), strict=True):
-        owners[led] = int(point)
+    for point, led in enumerate(_cheapest_columns(costs.T)):
+        owners[led] = point
     return owners
+
+
+def _cheapest_columns(costs: FloatArray) -> list[int]:
+    """Return a column for each row, none twice, that cost least together.
+
+    Of its n cheapest columns, a row always finds one that the other n - 1 rows leave
+    free. All these choices are tried, as unknown LEDs, and with them rows, are few.
+    """
+    rows = costs.tolist()
+    cheapest = np.argsort(costs, axis=1)[:, : len(rows)].tolist()
+    choices = (each for each in product(*cheapest) if len(set(each)) == len(each))
+    return list(
+        min(
+            choices,
+            key=lambda each: sum(row[k] for row, k in zip(rows, each, strict=True)),
+        )
+    )
 
 
 def _residuals(camera: Camera, pen: Pen, located: _Located, start: Poses) -> FloatArray:
@@ -362,7 +380,7 @@ def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
         findings.append(Finding(what, leds, shift.by, is_sure))
     findings += [Finding(What.UNSEEN, (led,)) for led in located.unseen]
     findings += [
-        Finding(What.UNKNOWN_LED, by=triple(point)) for point in located.strangers
+        Finding(What.UNKNOWN_LED, by=triple(point)) for point in located.unknown
     ]
     return tuple(findings)
 

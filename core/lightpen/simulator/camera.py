@@ -5,7 +5,6 @@ of full scale when one is doubled and the other halved, but then fewer electrons
 up and the image is noisier.
 """
 
-from collections import deque
 from dataclasses import replace
 from math import ceil
 from typing import Literal
@@ -19,7 +18,6 @@ from lightpen.cameras.protocol import (
     Caps,
     ConfigError,
     DeviceBusy,
-    DeviceInfo,
     DeviceLost,
     DeviceNotFound,
     Frame,
@@ -99,7 +97,6 @@ class SimulatedCamera:
         self._is_open = self._is_streaming = False
         self._n_unplugged = 0
         self._next_end = 0.0  # of the exposure of the next image
-        self._triggers: deque[float] = deque()
 
     @property
     def serial(self) -> str:
@@ -119,8 +116,6 @@ class SimulatedCamera:
             exposure_us=EXPOSURE_US,
             gain_db=GAIN_DB,
             frame_rate=FRAME_RATE,
-            has_trigger=True,
-            has_timestamps=True,
             waits=not self._clock.is_real,
         )
 
@@ -165,7 +160,6 @@ class SimulatedCamera:
             gain_db=_applied(GAIN_DB, settings.gain_db, now.gain_db),
             frame_rate=_applied(FRAME_RATE, settings.frame_rate, now.frame_rate),
             pixel_format=pixel_format,
-            triggered=settings.triggered,
         )
         return self._settings
 
@@ -188,7 +182,6 @@ class SimulatedCamera:
         self.probe()
         if not self._is_streaming:
             self._is_streaming = True
-            self._triggers.clear()
             self._next_end = self._now + self._period
 
     def stop(self) -> None:
@@ -202,15 +195,6 @@ class SimulatedCamera:
         frame = self._take_image()
         self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
         return frame
-
-    def trigger(self) -> None:
-        """Ask for one image."""
-        self._check_streaming()
-        if not self._settings.triggered:
-            raise ConfigError(
-                "The simulated camera runs freely. Switch its trigger on first."
-            )
-        self._triggers.append(self._now + self._exposure)
 
     def probe(self) -> None:
         """Do nothing if the camera answers."""
@@ -269,7 +253,7 @@ class SimulatedCamera:
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
             raise FrameTimeout(
                 f"The simulated camera {self._serial} sent no image for "
-                f"{timeout_s:.1f} s. Check its cable and its trigger."
+                f"{timeout_s:.1f} s. Check its cable."
             )
         self._clock.wait(end - self._now)
 
@@ -278,8 +262,6 @@ class SimulatedCamera:
         if self._is_cut_off:
             return None
         stalled_until = self.faults.now().stalled_until
-        if self._settings.triggered:
-            return max(self._triggers[0], stalled_until) if self._triggers else None
         if self._next_end < stalled_until:
             self._next_end = stalled_until + self._period
         n_late = ceil((self._now - self._next_end) / self._period - N_BUFFERED)
@@ -294,11 +276,8 @@ class SimulatedCamera:
 
     def _take_image(self) -> Frame:
         self._lose(self.faults.take_lost())
-        if self._settings.triggered:
-            end = self._triggers.popleft()
-        else:
-            end = self._next_end
-            self._next_end += self._period
+        end = self._next_end
+        self._next_end += self._period
         seq = self._next_seq
         self._next_seq += 1
         if self.faults.take_spoilt():
@@ -314,7 +293,7 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or "Mono8"
         times = end - self._exposure * np.array([1.0, 0.5, 0.0])
         scene = _with_gain(self.scene, settings)
-        image = render_plan(scene, self._shot(scene, seq, times))
+        image = render_plan(scene, self._image_plan(scene, seq, times))
         return Frame(
             image=sealed(image),
             seq=seq,
@@ -325,7 +304,7 @@ class SimulatedCamera:
             bits=BITS[pixel_format],
         )
 
-    def _shot(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
+    def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
         """Return what is seen in the exposure between the first and the last time."""
         held = self.operator.held(times)
         rotations, translations = _poses(scene, held)
@@ -342,24 +321,6 @@ class SimulatedCamera:
         gains[[led - 1 for led in held.covered]] = 0
         view = View(*shown, gains, self._lamps)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
-
-
-class SimulatedBackend:
-    """The simulated pen among the ways of getting at cameras."""
-
-    name = "simulated"
-
-    def available(self) -> str | None:
-        """Return None: it always can be used."""
-        return None
-
-    def discover(self) -> tuple[DeviceInfo, ...]:
-        """Return the one camera there is."""
-        return (DeviceInfo(self.name, SERIAL, "Simulated pen"),)
-
-    def camera(self, serial: str) -> SimulatedCamera:
-        """Return the camera, not yet opened."""
-        return SimulatedCamera(serial=serial)
 
 
 def _applied(

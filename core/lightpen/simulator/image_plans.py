@@ -82,14 +82,14 @@ class ScenePlan:
         The pen as its geometry was measured.
     gains : (L,) array
         Brightness of each LED.
-    shots : tuple of ImagePlan
+    image_plans : tuple of ImagePlan
     """
 
     scene: Scene
     swing: Swing
     measured_pen: Pen
     gains: FloatArray
-    shots: tuple[ImagePlan, ...]
+    image_plans: tuple[ImagePlan, ...]
 
 
 def plan_scene(scene: Scene) -> ScenePlan:
@@ -120,17 +120,17 @@ def plan_scene(scene: Scene) -> ScenePlan:
     measured = perturbed_pen(scene.pen, scene.led_noise, geometry)
     measured_pen = replace(measured, leds=np.round(measured.leds, LED_DECIMALS))
     gains = led_gains(scene)
-    shots = []
+    image_plans = []
     for index in range(scene.n_images):
         flags = tuple(name for name, frames in hit.items() if frames[index])
-        shots.append(_plan_image(scene, swing, gains, index, flags))
-    return ScenePlan(scene, swing, measured_pen, gains, tuple(shots))
+        image_plans.append(_plan_image(scene, swing, gains, index, flags))
+    return ScenePlan(scene, swing, measured_pen, gains, tuple(image_plans))
 
 
-def render_plan(scene: Scene, shot: ImagePlan) -> Image:
-    """Return the image of a shot, the same every time."""
-    light = render_view(scene.camera, scene.pen, shot.view, shot.optics)
-    return expose(light, scene.sensor, _stream(scene, _NOISE, shot.index))
+def render_plan(scene: Scene, image_plan: ImagePlan) -> Image:
+    """Return the image that is planned, the same every time."""
+    light = render_view(scene.camera, scene.pen, image_plan.view, image_plan.optics)
+    return expose(light, scene.sensor, _stream(scene, _NOISE, image_plan.index))
 
 
 def live_plan(
@@ -209,11 +209,15 @@ def _plan_image(
         optics = replace(optics, psf_sigma=AWAY_SIGMA)
     still = replace(scene, optics=_disturbed_optics(optics, flags, rng))
     turn = _turn_that_moves(still, rotation, translation, moved, rng)
-    shot = _plan_in_motion(still, index, rotation, translation, turn)
+    image_plan = _plan_in_motion(still, index, rotation, translation, turn)
     view = _disturbed_view(
-        replace(shot.view, gains=gains), _discs(scene, shot), scene.camera, flags, rng
+        replace(image_plan.view, gains=gains),
+        _discs(scene, image_plan),
+        scene.camera,
+        flags,
+        rng,
     )
-    return replace(shot, view=view, flags=flags)
+    return replace(image_plan, view=view, flags=flags)
 
 
 def _disturbed_optics(
@@ -254,8 +258,10 @@ def _disturbed_view(
     return view
 
 
-def _discs(scene: Scene, shot: ImagePlan) -> Ellipses:
-    leds, normals = leds_in_camera(scene.pen, shot.rotation, shot.translation)
+def _discs(scene: Scene, image_plan: ImagePlan) -> Ellipses:
+    leds, normals = leds_in_camera(
+        scene.pen, image_plan.rotation, image_plan.translation
+    )
     return disc_images(scene.camera, leds, normals, scene.pen.diameter / 2)
 
 
@@ -296,7 +302,7 @@ def _plan_in_motion(
     translation: FloatArray,
     turn: FloatArray,
 ) -> ImagePlan:
-    """Return the shot of a pen that turns about its tip during the exposure."""
+    """Return the plan of a pen that turns about its tip during the exposure."""
     moved = _pixels_moved(scene, rotation, translation, turn)
     n_times = 1
     if moved > STILL:

@@ -22,11 +22,11 @@ References
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import erfc, sqrt
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
@@ -208,16 +208,14 @@ class _BlurTables(NamedTuple):
 @lru_cache(maxsize=32)
 def _blur_tables(sigma: float) -> _BlurTables:
     half = int(np.ceil((REACH * sigma + 1) * STEPS_PER_PIXEL))
-    offsets = np.arange(-half, half + 1) / STEPS_PER_PIXEL
-    right, left = (offsets + 0.5) / sigma, (offsets - 0.5) / sigma
-    pixel = ndtr(right) - ndtr(left)
-    step = sigma * (_integral_of_ndtr(right) - _integral_of_ndtr(left))
+    reach = half + STEPS_PER_PIXEL // 2  # of the right or left edge of a pixel
+    z = np.arange(-reach, reach + 1) / (STEPS_PER_PIXEL * sigma)
+    normal = 0.5 * np.array([erfc(-each / sqrt(2)) for each in z.tolist()])
+    density = np.exp(-0.5 * z * z) / sqrt(2 * np.pi)
+    integral = sigma * (z * normal + density)
+    pixel = normal[STEPS_PER_PIXEL:] - normal[:-STEPS_PER_PIXEL]
+    step = integral[STEPS_PER_PIXEL:] - integral[:-STEPS_PER_PIXEL]
     return _BlurTables(pixel.astype(np.float32), step.astype(np.float32))
-
-
-def _integral_of_ndtr(z: FloatArray) -> FloatArray:
-    density = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
-    return np.asarray(z * ndtr(z) + density)
 
 
 def _look_up(table: LightArray, nodes: FloatArray, size: int) -> LightArray:

@@ -80,7 +80,9 @@ def write_scene(
     write_pen(anonymous, folder / "leds.csv")
     with ThreadPoolExecutor(N_THREADS) as pool:
         encoded = _in_order(
-            pool, lambda shot: _png(render_plan(scene, shot)), plan.shots
+            pool,
+            lambda image_plan: _png(render_plan(scene, image_plan)),
+            plan.image_plans,
         )
         for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
             write_whole(images / name, data)
@@ -151,7 +153,7 @@ def scene_truth(plan: ScenePlan) -> Json:
         },
         "notes": NOTES,
         "seed": scene.seed,
-        "frames": [_shot_truth(plan, shot) for shot in plan.shots],
+        "frames": [_image_truth(plan, image_plan) for image_plan in plan.image_plans],
     }
 
 
@@ -179,13 +181,13 @@ def _no_folder(folder: Path, error: OSError) -> FileError:
 def _in_order(
     pool: ThreadPoolExecutor,
     encode: Callable[[ImagePlan], bytes],
-    shots: tuple[ImagePlan, ...],
+    image_plans: tuple[ImagePlan, ...],
 ) -> Iterator[bytes]:
     """Yield the results in order, with only a few images in memory at a time."""
     ahead: list[Future[bytes]] = []
     try:
-        for shot in shots:
-            ahead.append(pool.submit(encode, shot))
+        for image_plan in image_plans:
+            ahead.append(pool.submit(encode, image_plan))
             if len(ahead) > N_THREADS:
                 yield ahead.pop(0).result()
         while ahead:
@@ -232,8 +234,8 @@ def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Jso
     }
 
 
-def _shot_truth(plan: ScenePlan, shot: ImagePlan) -> Json:
-    scene, swing, index = plan.scene, plan.swing, shot.index
+def _image_truth(plan: ScenePlan, image_plan: ImagePlan) -> Json:
+    scene, swing, index = plan.scene, plan.swing, image_plan.index
     tilt, direction, roll = np.degrees(
         [
             swing.postures.tilts[index],
@@ -242,13 +244,13 @@ def _shot_truth(plan: ScenePlan, shot: ImagePlan) -> Json:
         ]
     )
     gaps = rim_gaps(
-        scene.camera, scene.pen, shot.rotation[None], shot.translation[None]
+        scene.camera, scene.pen, image_plan.rotation[None], image_plan.translation[None]
     )
     return {
         "file": f"images/frame_{index + 1:04d}.png",
-        "R": shot.rotation.tolist(),
-        "T": shot.translation.tolist(),
-        "rvec": vector_from_rotation(shot.rotation).tolist(),
+        "R": image_plan.rotation.tolist(),
+        "T": image_plan.translation.tolist(),
+        "rvec": vector_from_rotation(image_plan.rotation).tolist(),
         "tip_cam": swing.tips_cam[index].tolist(),
         "posture": {
             "tilt_deg": tilt,
@@ -256,32 +258,32 @@ def _shot_truth(plan: ScenePlan, shot: ImagePlan) -> Json:
             "roll_deg": roll,
         },
         "min_gap_px": float(gaps[0]),
-        "flags": list(shot.flags),
+        "flags": list(image_plan.flags),
         "tip_in_cone": not swing.slipped[index],
-        "exposure": shot.optics.exposure,
-        "psf_gauss_sigma_px": shot.optics.psf_sigma,
-        "defocus_radius_px": shot.optics.defocus_radius,
+        "exposure": image_plan.optics.exposure,
+        "psf_gauss_sigma_px": image_plan.optics.psf_sigma,
+        "defocus_radius_px": image_plan.optics.defocus_radius,
         "lamps": [
             {
                 "center": lamp.center.tolist(),
                 "semi_axes": list(lamp.semi_axes),
                 "level": lamp.level,
             }
-            for lamp in shot.view.lamps
+            for lamp in image_plan.view.lamps
         ],
-        "leds": _led_truths(scene, shot),
+        "leds": _led_truths(scene, image_plan),
     }
 
 
-def _led_truths(scene: Scene, shot: ImagePlan) -> list[Json]:
-    camera, pen, view = scene.camera, scene.pen, shot.view
-    leds, normals = leds_in_camera(pen, shot.rotation, shot.translation)
+def _led_truths(scene: Scene, image_plan: ImagePlan) -> list[Json]:
+    camera, pen, view = scene.camera, scene.pen, image_plan.view
+    leds, normals = leds_in_camera(pen, image_plan.rotation, image_plan.translation)
     ellipses = disc_images(camera, leds, normals, pen.diameter / 2)
     rims = disc_rims(
         camera, leds[None], normals[None], pen.diameter / 2, scene.optics.psf_sigma
     )
     insides = measure_insides(rims)
-    levels = view.gains * led_levels(leds, normals, shot.optics)
+    levels = view.gains * led_levels(leds, normals, image_plan.optics)
     hidden = [hidden_fraction(camera, rim, view.fingers) for rim in rims.nodes]
     projected = camera.project(leds)
     cosines = -np.einsum("li,li->l", leds, normals) / np.linalg.norm(leds, axis=-1)

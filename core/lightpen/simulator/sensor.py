@@ -12,10 +12,10 @@ those that do not read the most likely number are drawn, at exponential gaps.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.simulator.render import Light
@@ -154,7 +154,8 @@ def _blank(shape: tuple[int, ...], sensor: Sensor) -> Image:
 @lru_cache(maxsize=1)
 def _normal_table() -> LightArray:
     """Return equally likely values of a standard normal variable."""
-    values = ndtri((np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE)
+    chances = (np.arange(TABLE_SIZE) + 0.5) / TABLE_SIZE
+    values = np.array([NormalDist().inv_cdf(chance) for chance in chances.tolist()])
     return np.asarray(values / values.std(), dtype=np.float32)
 
 
@@ -203,6 +204,7 @@ def _dark_distribution(
     low = max(int(np.floor(mean - 7 * sigma)), 0)
     high = min(int(np.ceil(mean + 7 * sigma)), sensor.full_scale)
     values = np.arange(low, max(high, low) + 1)
-    upper = ndtr((values + 0.5 - mean) / max(sigma, 1e-12))
+    charges = NormalDist(mean, max(sigma, 1e-12))
+    upper = np.array([charges.cdf(value + 0.5) for value in values.tolist()])
     upper[-1] = 1
     return values, np.diff(upper, prepend=0.0)

@@ -12,13 +12,12 @@ import pytest
 
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import (
-    Backend,
     CameraSettings,
     ConfigError,
     FrameTimeout,
     ImageCamera,
 )
-from lightpen.cameras.replay import ReplayBackend, ReplayCamera
+from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import (
     CameraWorker,
     Connection,
@@ -26,7 +25,7 @@ from lightpen.cameras.worker import (
     WorkerEvent,
 )
 from lightpen.model.camera import Camera
-from lightpen.simulator.camera import SimulatedBackend, SimulatedCamera
+from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 
 SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)
@@ -74,7 +73,6 @@ SOURCES = (
     Source("replayed folder", replayed_folder),
     Source("replayed video", replayed_video),
 )
-BACKENDS: tuple[Backend, ...] = (SimulatedBackend(), ReplayBackend())
 
 
 @pytest.fixture(params=SOURCES, ids=lambda source: source.name)
@@ -139,7 +137,6 @@ def test_frames_are_as_the_camera_says(streaming: ImageCamera) -> None:
     assert frame.image.shape == (caps.height, caps.width)
     assert frame.pixel_format in caps.pixel_formats
     assert frame.image.itemsize == (1 if frame.bits == 8 else 2)
-    assert (frame.device_ts_ns is not None) == caps.has_timestamps
     assert (frame.exposure_us is not None) == (caps.exposure_us is not None)
 
 
@@ -243,29 +240,6 @@ def test_gain_changes_while_images_come_or_is_refused(streaming: ImageCamera) ->
     streaming.read(TIMEOUT)
 
 
-def test_a_triggered_camera_sends_one_image_a_trigger(camera: ImageCamera) -> None:
-    camera.open()
-    if not camera.caps.has_trigger:
-        with pytest.raises(ConfigError, match="trigger"):
-            camera.configure(CameraSettings(triggered=True))
-        with pytest.raises(ConfigError, match="trigger"):
-            camera.trigger()
-        return
-    assert camera.configure(CameraSettings(triggered=True)).triggered
-    camera.start()
-    with pytest.raises(FrameTimeout):
-        camera.read(0.2)
-    camera.trigger()
-    camera.read(TIMEOUT)
-    with pytest.raises(FrameTimeout):
-        camera.read(0.2)
-
-
-def test_a_free_running_camera_refuses_the_trigger(streaming: ImageCamera) -> None:
-    with pytest.raises(ConfigError, match="trigger"):
-        streaming.trigger()
-
-
 def test_a_sound_camera_answers_the_probe(streaming: ImageCamera) -> None:
     streaming.probe()
     streaming.read(TIMEOUT)
@@ -291,14 +265,3 @@ def test_a_worker_runs_the_camera_and_closes_it(camera: ImageCamera) -> None:
     assert (np.diff([frame.seq for frame in frames]) > 0).all()
     with pytest.raises(ValueError, match="open"):
         camera.probe()
-
-
-@pytest.mark.parametrize("backend", BACKENDS, ids=lambda backend: backend.name)
-def test_a_backend_opens_what_it_discovers(backend: Backend) -> None:
-    assert backend.available() is None
-    for device in backend.discover():
-        assert device.backend == backend.name
-        camera = backend.camera(device.serial)
-        assert camera.serial == device.serial
-        camera.open()
-        camera.close()

@@ -22,7 +22,7 @@ from lightpen.cameras.protocol import (
     FrameTimeout,
     ImageCamera,
     Stats,
-    own_image,
+    sealed,
 )
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import (
@@ -141,11 +141,6 @@ class SpiedCamera(SimulatedCamera):
         return super().read(timeout_s)
 
     @override
-    def trigger(self) -> None:
-        self.note()
-        super().trigger()
-
-    @override
     def probe(self) -> None:
         self.note()
         super().probe()
@@ -254,7 +249,7 @@ def benches() -> Iterator[Benches]:
 
 
 def frame(seq: int) -> Frame:
-    return Frame(own_image(np.zeros((2, 2), np.uint8)), seq, host_ts_ns=0)
+    return Frame(sealed(np.zeros((2, 2), np.uint8)), seq, host_ts_ns=0)
 
 
 @pytest.fixture
@@ -280,8 +275,6 @@ def test_all_calls_of_the_camera_come_from_one_thread(benches: Benches) -> None:
     workbench.worker.start()
     workbench.worker.set_exposure(500)
     workbench.worker.set_gain(6)
-    workbench.worker.configure(CameraSettings(triggered=True))
-    workbench.worker.trigger()
     workbench.wait_for_frames(1)
     camera.faults.unplug()
     workbench.wait_until(Connection.LOST)
@@ -557,19 +550,6 @@ def test_impossible_settings_at_first_end_the_worker(benches: Benches) -> None:
     assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
 
 
-def test_impossible_settings_later_leave_those_in_force(benches: Benches) -> None:
-    workbench, _ = benches.spied(CameraSettings(gain_db=3))
-    workbench.worker.start()
-    workbench.wait_for_frames(1)
-    workbench.worker.configure(CameraSettings(gain_db=6, pixel_format="BayerRG8"))
-    trouble = workbench.wait_for_trouble(ConfigError)
-    applied = workbench.events.all[workbench.wait_for(SettingsApplied, after=trouble)]
-    workbench.wait_for_frames(2)
-
-    assert isinstance(applied, SettingsApplied)
-    assert applied.settings.gain_db == 3
-
-
 def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> None:
     workbench, camera = benches.spied()
     camera.faults.spoil_frames(1)
@@ -579,47 +559,6 @@ def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> Non
 
     assert workbench.worker.stats.incomplete == 1
     assert Connection.LOST not in workbench.events.connections()
-
-
-def test_a_triggered_camera_sends_images_only_when_asked(benches: Benches) -> None:
-    workbench, _ = benches.spied(CameraSettings(triggered=True))
-    workbench.worker.measure(True)
-    workbench.worker.start()
-    workbench.wait_until(Connection.STREAMING)
-    with pytest.raises(FrameTimeout):
-        workbench.worker.next_frame(0.3)
-    workbench.worker.trigger()
-    workbench.worker.trigger()
-    seqs = [workbench.worker.next_frame(TIMEOUT).seq for _ in range(2)]
-    with pytest.raises(FrameTimeout):
-        workbench.worker.next_frame(0.3)
-
-    assert seqs == [0, 1]
-    assert workbench.events.connections() == [Connection.OPENING, Connection.STREAMING]
-
-
-def test_a_triggered_camera_that_is_unplugged_is_found_lost(benches: Benches) -> None:
-    camera = SimulatedCamera(SCENE)
-    workbench = benches.make(camera, settings=CameraSettings(triggered=True))
-    workbench.worker.start()
-    workbench.wait_until(Connection.STREAMING)
-    camera.faults.unplug()
-    workbench.wait_until(Connection.LOST)
-
-
-def test_new_settings_let_a_recording_begin_anew(
-    benches: Benches, recording: Path
-) -> None:
-    workbench = benches.make(
-        ReplayCamera(str(recording)), settings=CameraSettings(frame_rate=50)
-    )
-    workbench.worker.start()
-    workbench.wait_for_frames(3)
-    workbench.worker.configure(CameraSettings(frame_rate=1000))
-    workbench.wait_for(SettingsApplied, after=workbench.wait_for(SettingsApplied) + 1)
-    workbench.wait_for(Ended)
-
-    assert workbench.worker.stats.delivered > N_IMAGES
 
 
 def test_stopping_ends_a_worker_whose_reader_is_gone(

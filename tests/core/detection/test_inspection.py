@@ -27,7 +27,7 @@ NOTHING = detect_spots(np.zeros((512, 512), dtype=np.uint8))
 
 def image(exposure: float = 1.0) -> Image:
     scene = Scene(n_images=1, optics=Optics(exposure=exposure))
-    return render_plan(scene, plan_scene(scene).shots[0])
+    return render_plan(scene, plan_scene(scene).image_plans[0])
 
 
 def lamps(*centers: tuple[float, float], radius: float = 8.0) -> Spots:

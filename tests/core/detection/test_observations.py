@@ -34,7 +34,7 @@ def plan() -> ScenePlan:
 
 @pytest.fixture(scope="module")
 def images(plan: ScenePlan) -> list[Image]:
-    return [render_plan(SCENE, shot) for shot in plan.shots]
+    return [render_plan(SCENE, image_plan) for image_plan in plan.image_plans]
 
 
 def damaged() -> Image:

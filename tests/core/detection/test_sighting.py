@@ -16,19 +16,21 @@ SCENE = Scene()
 
 
 def seen(time: float) -> tuple[Image, ImagePlan]:
-    shot = live_plan(SCENE, 0, time)
-    return render_plan(SCENE, shot), shot
+    image_plan = live_plan(SCENE, 0, time)
+    return render_plan(SCENE, image_plan), image_plan
 
 
 def test_the_pen_is_found_from_nothing() -> None:
-    image, shot = seen(1.0)
+    image, image_plan = seen(1.0)
     sighting = look(image, SCENE.camera, SCENE.pen)
 
     assert sighting.has_pose
     assert sighting.n_leds == SCENE.pen.n_leds
-    np.testing.assert_allclose(sighting.rotation, shot.rotation, atol=2e-4)
+    np.testing.assert_allclose(sighting.rotation, image_plan.rotation, atol=2e-4)
     deviations = np.sqrt(np.diag(sighting.cofactors)[3:]) * sighting.sigma
-    assert (np.abs(sighting.translation - shot.translation) < 5 * deviations).all()
+    assert (
+        np.abs(sighting.translation - image_plan.translation) < 5 * deviations
+    ).all()
 
 
 def test_tracked_and_found_from_nothing_are_the_same() -> None:
@@ -43,9 +45,9 @@ def test_tracked_and_found_from_nothing_are_the_same() -> None:
 
 def test_a_jump_is_found_although_the_last_image_misleads() -> None:
     before = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
-    image, shot = seen(4.0)
+    image, image_plan = seen(4.0)
     sighting = look(image, SCENE.camera, SCENE.pen, before=before)
-    np.testing.assert_allclose(sighting.rotation, shot.rotation, atol=2e-4)
+    np.testing.assert_allclose(sighting.rotation, image_plan.rotation, atol=2e-4)
 
 
 def test_masked_light_is_not_seen() -> None:
@@ -77,21 +79,21 @@ def test_another_pen_is_not_taken_for_this_one() -> None:
     ("n_seen", "reason"), [(0, Reason.EMPTY), (3, Reason.TOO_FEW_LEDS)]
 )
 def test_too_few_centres_give_no_pose(n_seen: int, reason: Reason) -> None:
-    image, shot = seen(1.0)
+    image, image_plan = seen(1.0)
     pixels = look(image, SCENE.camera, SCENE.pen).pixels
     pixels[n_seen:] = np.nan
     sighting = sight_centers(
-        SCENE.camera, SCENE.pen, pixels, shot.rotation, shot.translation
+        SCENE.camera, SCENE.pen, pixels, image_plan.rotation, image_plan.translation
     )
     assert sighting.reason is reason
 
 
 def test_the_covariance_is_that_of_the_pose_for_the_noise_of_one_pixel() -> None:
-    image, shot = seen(1.0)
+    image, image_plan = seen(1.0)
     sighting = look(image, SCENE.camera, SCENE.pen)
     poses = fit_poses(
         *(SCENE.camera, SCENE.pen, sighting.pixels[None]),
-        *(shot.rotation[None], shot.translation[None]),
+        *(image_plan.rotation[None], image_plan.translation[None]),
     )
     np.testing.assert_allclose(
         sighting.cofactors * sighting.sigma**2, poses.covariances[0], rtol=1e-3

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.joint import ContactModel, JointFit, extend_joint, fit_joint
+from lightpen.estimation.joint import ContactModel, JointFit, fit_joint
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     Swing,
@@ -154,8 +154,9 @@ def test_images_added_one_by_one_give_the_fit_of_all() -> None:
         truth.cone_cam,
     )
     for n in range(41, 46):
-        growing = extend_joint(
-            CAMERA, PEN, pixels[:n], growing, truth.rotations[n - 1 : n]
+        starts = np.concatenate([growing.rotations, truth.rotations[n - 1 : n]])
+        growing = fit_joint(
+            CAMERA, PEN, pixels[:n], starts, growing.tip_pen, growing.cone_cam
         )
 
     np.testing.assert_allclose(growing.tip_pen, fit(truth, pixels).tip_pen, atol=1e-6)

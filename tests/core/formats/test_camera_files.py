@@ -3,8 +3,6 @@
 import contextlib
 import json
 import random
-import subprocess
-import sys
 from datetime import date
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +15,6 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats import documents
 from lightpen.formats.camera_files import read_camera, write_camera
 from lightpen.model.camera import Camera
 
@@ -650,32 +647,6 @@ def test_damaged_files_are_read_or_refused(tmp_path: Path, text: str) -> None:
             found = read_camera(path)
             assert np.all(np.isfinite(found.intrinsics))
             assert len(found.distortion) in (5, 8)
-
-
-@given(st.data())
-def test_the_fast_reader_of_plain_files_agrees_with_yaml(data: st.DataObject) -> None:
-    characters = list(OPENCV)
-    for _ in range(data.draw(st.integers(0, 4))):
-        place = data.draw(st.integers(0, len(characters) - 1))
-        characters[place] = data.draw(st.sampled_from("\n :,-+.[]\"'#&*!?|>%@x1e"))
-    text = "".join(characters)
-    tree = documents._parse_plain_yaml(text)
-    if tree is not None:
-        assert documents.parse_yaml(text, "cam.yaml") == tree
-
-
-def test_a_plain_file_is_read_without_importing_yaml(tmp_path: Path) -> None:
-    path = saved(tmp_path, OPENCV)
-    program = (
-        "import sys\nfrom pathlib import Path\n"
-        "from lightpen.formats.camera_files import read_camera\n"
-        f"read_camera(Path({str(path)!r}))\n"
-        "print('yaml' in sys.modules, 'xml.parsers' in sys.modules)"
-    )
-    result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
-    assert result.stdout.split() == ["False", "False"]
 
 
 def test_the_shared_camera_is_read(shared_data: Path) -> None:

@@ -31,12 +31,12 @@ def seen(points: FloatArray, n_views: int = 10) -> tuple[Poses, list[FloatArray]
 def test_lights_on_the_pen_are_found_with_their_spots() -> None:
     poses, spots = seen(POINTS)
 
-    strangers = find_unknown_leds(CAMERA, poses, spots)
+    unknown = find_unknown_leds(CAMERA, poses, spots)
 
-    order = np.argsort(strangers.points[:, 1])[::-1]
-    np.testing.assert_allclose(strangers.points[order], POINTS, atol=0.1)
-    assert strangers.pixels.shape == (10, 2, 2)
-    assert np.isfinite(strangers.pixels).all()
+    order = np.argsort(unknown.points[:, 1])[::-1]
+    np.testing.assert_allclose(unknown.points[order], POINTS, atol=0.1)
+    assert unknown.pixels.shape == (10, 2, 2)
+    assert np.isfinite(unknown.pixels).all()
 
 
 def test_a_lamp_that_stands_still_is_no_light_on_the_pen() -> None:
@@ -55,7 +55,7 @@ def test_too_few_views_tell_nothing() -> None:
 def test_without_spots_left_over_there_are_none() -> None:
     poses, _ = seen(POINTS)
 
-    strangers = find_unknown_leds(CAMERA, poses, [np.zeros((0, 2))] * 10)
+    unknown = find_unknown_leds(CAMERA, poses, [np.zeros((0, 2))] * 10)
 
-    assert strangers.points.shape == (0, 3)
-    assert strangers.pixels.shape == (10, 0, 2)
+    assert unknown.points.shape == (0, 3)
+    assert unknown.pixels.shape == (10, 0, 2)

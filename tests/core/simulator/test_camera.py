@@ -219,19 +219,6 @@ def test_a_live_camera_loses_images_when_more_wait_than_it_buffers(
     assert camera.stats().missed == n_lost
 
 
-def test_a_triggered_image_is_exposed_at_its_trigger() -> None:
-    clock = SkippingClock()
-    camera = seated_camera(clock=clock)
-    camera.configure(CameraSettings(exposure_us=5000, triggered=True))
-    camera.start()
-    clock.wait(3.0)
-    camera.trigger()
-    (frame,) = read(camera, 1)
-
-    assert frame.device_ts_ns == pytest.approx(3.0e9, abs=10)
-    assert frame.host_ts_ns == pytest.approx(3.005e9, abs=10)
-
-
 def test_lost_images_leave_a_gap_and_are_counted() -> None:
     camera = streaming_camera()
     (before,) = read(camera, 1)

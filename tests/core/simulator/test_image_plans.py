@@ -17,7 +17,8 @@ def test_same_seed_gives_the_same_images_in_any_order() -> None:
     one, two = plan_scene(scene), plan_scene(scene)
     for index in (7, 2):
         np.testing.assert_array_equal(
-            render_plan(scene, one.shots[index]), render_plan(scene, two.shots[index])
+            render_plan(scene, one.image_plans[index]),
+            render_plan(scene, two.image_plans[index]),
         )
     np.testing.assert_array_equal(one.measured_pen.leds, two.measured_pen.leds)
 
@@ -31,21 +32,21 @@ def test_other_seed_gives_another_swing() -> None:
 def test_each_disturbance_hits_its_fraction_of_the_images() -> None:
     plan = plan_scene(Scene(n_images=100, seed=5, disturbances=HARD))
     for name, fraction in vars(HARD).items():
-        n_hit = sum(name in shot.flags for shot in plan.shots)
+        n_hit = sum(name in image_plan.flags for image_plan in plan.image_plans)
         assert n_hit == round(100 * fraction), name
 
 
 def test_spoilt_images_suffer_nothing_else() -> None:
     plan = plan_scene(Scene(n_images=100, seed=6, disturbances=HARD))
-    for shot in plan.shots:
-        if {"empty", "blurred_away"} & set(shot.flags):
-            assert len(shot.flags) == 1
-        assert not {"saturated", "dim"} <= set(shot.flags)
+    for image_plan in plan.image_plans:
+        if {"empty", "blurred_away"} & set(image_plan.flags):
+            assert len(image_plan.flags) == 1
+        assert not {"saturated", "dim"} <= set(image_plan.flags)
 
 
 def test_clean_scene_is_undisturbed() -> None:
     plan = plan_scene(Scene(n_images=10))
-    assert not any(shot.flags for shot in plan.shots)
+    assert not any(image_plan.flags for image_plan in plan.image_plans)
     assert not plan.swing.slipped.any()
     assert SCENES["clean"] == Disturbances()
 
@@ -53,45 +54,49 @@ def test_clean_scene_is_undisturbed() -> None:
 def test_slipped_images_have_their_tip_out_of_the_cone() -> None:
     scene = Scene(n_images=30, seed=7, disturbances=Disturbances(slipped=0.5))
     plan = plan_scene(scene)
-    flagged = np.array(["slipped" in shot.flags for shot in plan.shots])
+    flagged = np.array(
+        ["slipped" in image_plan.flags for image_plan in plan.image_plans]
+    )
     np.testing.assert_array_equal(plan.swing.slipped, flagged)
     distances = np.linalg.norm(plan.swing.tips_cam - PAPER_CONE, axis=1)
     assert (distances[flagged] >= SLIP[0] - 1e-9).all()
     assert (distances[flagged] <= SLIP[1] + 1e-9).all()
-    for shot, tip in zip(plan.shots, plan.swing.tips_cam, strict=True):
-        at = shot.rotation @ scene.tip_pen + shot.translation
+    for image_plan, tip in zip(plan.image_plans, plan.swing.tips_cam, strict=True):
+        at = image_plan.rotation @ scene.tip_pen + image_plan.translation
         np.testing.assert_allclose(at, tip, atol=1e-9)
 
 
 def test_missing_leds_are_dark_and_one_to_four() -> None:
     wanted = Disturbances(missing=1.0)
     plan = plan_scene(Scene(n_images=30, seed=8, disturbances=wanted))
-    n_off = [int((shot.view.gains == 0).sum()) for shot in plan.shots]
+    n_off = [int((image_plan.view.gains == 0).sum()) for image_plan in plan.image_plans]
     assert set(n_off) == {1, 2, 3, 4}
-    shot = plan.shots[0]
-    image = render_plan(plan.scene, shot)
-    leds, _ = leds_in_camera(plan.scene.pen, shot.rotation, shot.translation)
+    image_plan = plan.image_plans[0]
+    image = render_plan(plan.scene, image_plan)
+    leds, _ = leds_in_camera(
+        plan.scene.pen, image_plan.rotation, image_plan.translation
+    )
     columns, rows = np.rint(CAMERA.project(leds)).astype(int).T
-    np.testing.assert_array_equal(image[rows, columns] < 10, shot.view.gains == 0)
+    np.testing.assert_array_equal(image[rows, columns] < 10, image_plan.view.gains == 0)
 
 
 def test_pen_of_six_leds_keeps_at_least_four() -> None:
     scene = Scene(
         n_images=30, pen=SAMPLE_PENS["six"](), disturbances=Disturbances(missing=1.0)
     )
-    for shot in plan_scene(scene).shots:
-        assert (shot.view.gains > 0).sum() >= 4
+    for image_plan in plan_scene(scene).image_plans:
+        assert (image_plan.view.gains > 0).sum() >= 4
 
 
 def test_empty_image_holds_noise_only() -> None:
     scene = Scene(n_images=1, disturbances=Disturbances(empty=1.0))
-    image = render_plan(scene, plan_scene(scene).shots[0])
+    image = render_plan(scene, plan_scene(scene).image_plans[0])
     assert image.max() <= 2
 
 
 def test_image_blurred_away_has_no_edges() -> None:
     scene = Scene(n_images=1, disturbances=Disturbances(blurred_away=1.0))
-    image = render_plan(scene, plan_scene(scene).shots[0]).astype(float)
+    image = render_plan(scene, plan_scene(scene).image_plans[0]).astype(float)
     assert image.max() > 10
     # A disc in focus rises by 100 in one pixel.
     smooth = image.reshape(512, 4, 612, 4).mean(axis=(1, 3))
@@ -108,7 +113,7 @@ def test_dim_and_saturated_images_differ_in_exposure_only() -> None:
         )
     )
     peaks = [
-        np.percentile(render_plan(scene, plan_scene(scene).shots[0]), 99.8)
+        np.percentile(render_plan(scene, plan_scene(scene).image_plans[0]), 99.8)
         for scene in (plain, dim, saturated)
     ]
     assert 170 < peaks[0] < 215
@@ -121,13 +126,15 @@ def test_clutter_and_fingers_leave_most_leds_whole() -> None:
     scene = Scene(n_images=12, seed=9, disturbances=wanted)
     clean = replace(scene, disturbances=Disturbances())
     n_touched = []
-    for shot in plan_scene(scene).shots:
-        assert shot.view.lamps
-        [_] = shot.view.fingers
-        leds, _ = leds_in_camera(scene.pen, shot.rotation, shot.translation)
+    for image_plan in plan_scene(scene).image_plans:
+        assert image_plan.view.lamps
+        [_] = image_plan.view.fingers
+        leds, _ = leds_in_camera(scene.pen, image_plan.rotation, image_plan.translation)
         columns, rows = np.rint(CAMERA.project(leds)).astype(int).T
-        image = render_plan(scene, shot).astype(float)
-        alone = replace(shot, view=replace(shot.view, lamps=(), glares=(), fingers=()))
+        image = render_plan(scene, image_plan).astype(float)
+        alone = replace(
+            image_plan, view=replace(image_plan.view, lamps=(), glares=(), fingers=())
+        )
         free = render_plan(clean, alone).astype(float)
         n_touched.append(int((np.abs(image - free)[rows, columns] > 40).sum()))
     assert max(n_touched) <= 4
@@ -136,16 +143,16 @@ def test_clutter_and_fingers_leave_most_leds_whole() -> None:
 
 def test_live_swing_keeps_the_tip_in_the_cone_and_moves_on() -> None:
     scene = Scene(seed=11)
-    shots = [live_plan(scene, index, index / 20) for index in range(40)]
-    for shot in shots:
-        tips = shot.view.rotations @ scene.tip_pen + shot.view.translations
+    image_plans = [live_plan(scene, index, index / 20) for index in range(40)]
+    for image_plan in image_plans:
+        tips = image_plan.view.rotations @ scene.tip_pen + image_plan.view.translations
         np.testing.assert_allclose(tips, np.tile(PAPER_CONE, (len(tips), 1)), atol=1e-9)
     steps = [
         np.linalg.norm(after.rotation - before.rotation)
-        for before, after in pairwise(shots)
+        for before, after in pairwise(image_plans)
     ]
     assert 1e-3 < np.median(steps) < 0.1
-    image = render_plan(scene, shots[3])
+    image = render_plan(scene, image_plans[3])
     assert image.shape == (CAMERA.height, CAMERA.width)
     assert image.max() > 150
 

@@ -71,8 +71,8 @@ def test_set_holds_camera_pen_images_and_truth(tmp_path: Path) -> None:
     assert names == ["frame_0001.png", "frame_0002.png", "frame_0003.png"]
     image = read_png(folder / "images/frame_0002.png")
     assert image.shape == (512, 612)
-    shot = plan.shots[1]
-    light = render_view(SMALL.camera, SMALL.pen, shot.view, shot.optics)
+    image_plan = plan.image_plans[1]
+    light = render_view(SMALL.camera, SMALL.pen, image_plan.view, image_plan.optics)
     difference = image.astype(float) - quantize(light, SMALL.sensor)
     # Shot noise of a bright pixel is 2.3 DN.
     assert np.abs(difference).max() < 14
@@ -156,9 +156,11 @@ def test_truth_of_hidden_missing_and_saturated_leds() -> None:
     )
     plan = plan_scene(scene)
     n_hidden = 0
-    for frame, shot in zip(scene_truth(plan)["frames"], plan.shots, strict=True):
-        light = render_view(scene.camera, scene.pen, shot.view, shot.optics)
-        for led, gain in zip(frame["leds"], shot.view.gains, strict=True):
+    for frame, image_plan in zip(
+        scene_truth(plan)["frames"], plan.image_plans, strict=True
+    ):
+        light = render_view(scene.camera, scene.pen, image_plan.view, image_plan.optics)
+        for led, gain in zip(frame["leds"], image_plan.view.gains, strict=True):
             x, y = np.rint(led["proj"]).astype(int)
             level = light.levels[y, x]
             hidden = led["occluded_fraction"]

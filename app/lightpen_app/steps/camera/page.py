@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -30,33 +29,33 @@ from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.live_markers import mask_markers, stray_markers
 from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.work.job import Job
 from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
 
 SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
-NARROW = 120 * GRID  # px; a page of less width has its panels all at the side
 
 
-class CameraPage(Page):
+class CameraPage(Rearranged, Page):
     """The step Camera.
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "camera"
+    narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
-        self._live = services.workbench.live
+        self._workbench = workbench
+        self._live = workbench.live
         self._is_shown = False
-        self._is_narrow = False
         self._settings = CameraSettings()  # in force
         self._trouble = ""  # the last, of the camera or of a swing
         self._sentence = ""  # why no images come
@@ -142,14 +141,6 @@ class CameraPage(Page):
             self._reading.cancel()
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        is_narrow = event.size().width() < NARROW
-        if is_narrow != self._is_narrow:
-            self._is_narrow = is_narrow
-            self._use_width()
-
-    @override
     def _retranslate(self) -> None:
         self._remark_swing()
         self._show_connection()
@@ -174,24 +165,25 @@ class CameraPage(Page):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._images, 0, 0)
         layout.addLayout(foot, 1, 0)
-        self._use_width()  # before the side: the order of the Tab key
+        self._use_room()  # before the side: the order of the Tab key
         layout.addWidget(scroll, 0, 1, 2, 1)
         layout.setRowStretch(0, 1)
         layout.setColumnStretch(0, 1)
 
-    def _use_width(self) -> None:
+    @override
+    def _use_room(self) -> None:
         """Put exposure and focus below the image, or at the side of a narrow page."""
-        if self._is_narrow:
+        is_narrow = self._room.is_narrow
+        if is_narrow:
             self._panels.insertWidget(0, self._exposure)
             self._panels.insertWidget(1, self._focus)
         else:
             self._foot.addWidget(self._exposure, 3)
             self._foot.addWidget(self._focus, 2)
-        space = 2 * GRID if self._is_narrow else 3 * GRID
-        self._layout.setHorizontalSpacing(space)
+        self._layout.setHorizontalSpacing(2 * GRID if is_narrow else 3 * GRID)
         # The layout spaces out an empty foot, too.
-        self._layout.setVerticalSpacing(0 if self._is_narrow else 2 * GRID)
-        self._side.setFixedWidth(NARROW_SIDE_WIDTH if self._is_narrow else SIDE_WIDTH)
+        self._layout.setVerticalSpacing(0 if is_narrow else 2 * GRID)
+        self._side.setFixedWidth(NARROW_SIDE_WIDTH if is_narrow else SIDE_WIDTH)
 
     # What is chosen
 

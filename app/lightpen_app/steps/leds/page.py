@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
@@ -25,18 +24,16 @@ from lightpen_app.steps.leds.match_watch import PenWatch
 from lightpen_app.steps.leds.pen_view import PenPicture
 from lightpen_app.steps.leds.table_panel import Changes, LedTablePanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 
-NARROW = 110 * GRID  # px; a page of less width has two panels side by side, not three
-LOW = 62 * GRID  # px; a page of less height scrolls
 
-
-class LedsPage(Page):
+class LedsPage(Rearranged, Page):
     """Opens, shows, mends and saves the LED file.
 
     The table shows a draft. The live match follows it at once; a swing needs a file, so
@@ -44,16 +41,17 @@ class LedsPage(Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "leds"
+    narrow_below = 110 * GRID  # px; then two panels are side by side, not three
+    low_below = 62 * GRID  # px; then it scrolls
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
+        self._workbench = workbench
         self._is_shown = False
-        self._is_narrow = False
         self._in_use: PenFile | None = None
         self._draft = self._opened = PenDraft()
         self._is_foreign = False  # opened from a file that cannot be used
@@ -75,7 +73,7 @@ class LedsPage(Page):
         self._panels = panels = QHBoxLayout()
         panels.setSpacing(2 * GRID)
         panels.addWidget(self._table, 40)
-        self._use_width()
+        self._use_room()
         panels.addWidget(self._match, 31)
         self._rows.addWidget(self._file)
         self._rows.addLayout(panels, 1)
@@ -153,21 +151,14 @@ class LedsPage(Page):
         self._watch.stop()
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._content.set_squeezed(event.size().height() >= LOW)
-        is_narrow = event.size().width() < NARROW
-        if is_narrow != self._is_narrow:
-            self._is_narrow = is_narrow
-            self._use_width()
-
-    @override
     def _retranslate(self) -> None:
         self._refresh()
 
-    def _use_width(self) -> None:
+    @override
+    def _use_room(self) -> None:
         """Put the pen in space between the others, or below them on a narrow page."""
-        if self._is_narrow:
+        self._content.set_squeezed(not self._room.is_low)
+        if self._room.is_narrow:
             self._rows.addWidget(self._space)
         else:
             self._panels.insertWidget(1, self._space, 29)

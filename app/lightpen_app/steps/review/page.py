@@ -1,7 +1,6 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
 from PySide6.QtCore import QTimer, Slot
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -36,35 +35,35 @@ from lightpen_app.steps.review.plots_panel import (
 )
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.work.workbench import Workbench
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
-NARROW = 112 * GRID  # px; a page of less width has the result in a tab
 TAB_WIDTH = 64 * GRID  # of the result in a tab
 
 
-class ReviewPage(Page):
+class ReviewPage(Rearranged, Page):
     """The step Review.
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
     """
 
     key = "review"
+    narrow_below = 112 * GRID  # px; then it has the result in a tab
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = services.workbench
+        self._workbench = workbench
         self._doubts = ReviewDoubts(self)
-        self._run = services.workbench.run
-        self._is_narrow = False
+        self._run = workbench.run
         self._solution: Solution | None = None
         self._last: Result | None = None
         self._told: tuple[object, ...] = ()
@@ -195,14 +194,6 @@ class ReviewPage(Page):
         self._images.shut_down()
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        is_narrow = event.size().width() < NARROW
-        if is_narrow != self._is_narrow:
-            self._is_narrow = is_narrow
-            self._use_width()
-
-    @override
     def _retranslate(self) -> None:
         names = (
             self.tr("Images"),
@@ -212,7 +203,7 @@ class ReviewPage(Page):
         )
         for tab, name in zip(self._tab_of.values(), names, strict=True):
             self._tabs.setTabText(self._tabs.indexOf(tab), name)
-        if self._is_narrow:
+        if self._room.is_narrow:
             self._tabs.setTabText(0, self.tr("Result"))
         self._scroll.setAccessibleName(self.tr("Result"))
         self._tabs.setAccessibleName(self.tr("Details"))
@@ -250,7 +241,7 @@ class ReviewPage(Page):
 
         self._columns = columns = QHBoxLayout()
         columns.setSpacing(2 * GRID)
-        self._use_width()  # before the tabs: the order of the Tab key
+        self._use_room()  # before the tabs: the order of the Tab key
         columns.addWidget(self._tabs, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -261,10 +252,11 @@ class ReviewPage(Page):
         layout.addWidget(self._remarks)
         layout.addLayout(columns, 1)
 
-    def _use_width(self) -> None:
+    @override
+    def _use_room(self) -> None:
         """Put the result beside the tabs, or make it the first of a narrow page."""
         side = self._result_side
-        if self._is_narrow:
+        if self._room.is_narrow:
             side.setFixedWidth(TAB_WIDTH)
             self._tabs.insertTab(0, side, self.tr("Result"))
             self._tabs.setCurrentIndex(0)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from PySide6.QtCore import QTimer
-from PySide6.QtGui import QResizeEvent, QShowEvent
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
@@ -23,36 +23,41 @@ from lightpen.swing.preparation import (
 )
 from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.job import Job, Report
+from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 
-NARROW = 100 * GRID  # px; a page of less width has one column
 TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
 
-class StartPage(Page):
+class StartPage(Rearranged, Page):
     """Names, limits, the last result of the pen and tip, and interrupted swings.
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
+    sounds : Sounds
     """
 
     key = "start"
+    narrow_below = 100 * GRID  # px; then it has one column
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        workbench = self._workbench = services.workbench
+        self._workbench = workbench
         self._shown = workbench.preparation
         self._looked_up = ("", "")
         self._lookup: Job | None = None
@@ -64,8 +69,8 @@ class StartPage(Page):
         self._names = NamesForm()
         self._limits = LimitsForm()
         self._interrupted = InterruptedPanel()
-        self._last = LastResultPanel(services.workbench.around.now)
-        self._sound_test = SoundTest(services.sounds)
+        self._last = LastResultPanel(workbench.around.now)
+        self._sound_test = SoundTest(sounds)
         self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
         self._searching = QTimer(self, singleShot=True, interval=0)
 
@@ -77,7 +82,6 @@ class StartPage(Page):
         left.addStretch(1)
         self._right = right = QVBoxLayout()
         right.setSpacing(2 * GRID)
-        right.addWidget(self._interrupted)
         right.addWidget(self._last)
         right.addWidget(self._sound_test)
         right.addStretch(1)
@@ -85,6 +89,7 @@ class StartPage(Page):
         self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
         columns.setContentsMargins(0, 0, 0, 0)
         columns.setSpacing(3 * GRID)
+        self._use_room()  # before the columns: the order of the Tab key
         columns.addLayout(left, 5)
         columns.addLayout(right, 4)
         scroll = PageScroll()
@@ -155,17 +160,15 @@ class StartPage(Page):
                 job.cancel()
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
+    def _use_room(self) -> None:
         direction = QBoxLayout.Direction
-        is_narrow = event.size().width() < NARROW
+        is_narrow = self._room.is_narrow
         self._columns.setDirection(
             direction.TopToBottom if is_narrow else direction.LeftToRight
         )
         # What waits for an answer comes first.
         column = self._left if is_narrow else self._right
-        if column.indexOf(self._interrupted) < 0:
-            column.insertWidget(0, self._interrupted)
+        column.insertWidget(0, self._interrupted)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

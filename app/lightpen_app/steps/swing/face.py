@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QHBoxLayout,
@@ -23,17 +22,17 @@ from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 PROGRESS_STEPS = 1000
-NARROW, LOW = 100 * GRID, 56 * GRID  # px; less has its plots below the dial
 PLOTS_HEIGHT = 32 * GRID  # px, there
 ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 
 
-class SwingFace(Translated, QWidget):
+class SwingFace(Rearranged, Translated, QWidget):
     """Shows a swing at one moment.
 
     Parameters
@@ -46,12 +45,14 @@ class SwingFace(Translated, QWidget):
     dial : LeaningDial
     """
 
+    narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
+
     def __init__(
         self, buttons: Sequence[QPushButton], parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
         self._value = OperatorValue()
-        self._is_small = False
+        self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
         self._instruction = FittedText(TextSize.HUGE)
@@ -123,13 +124,8 @@ class SwingFace(Translated, QWidget):
         self._scroll.height_changed.connect(self._hold_first_row)
 
         self._verdict.hide()
-        self._use_room(QSize())
+        self._use_room()
         self._retranslate()
-
-    @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._use_room(event.size())
 
     def value(self) -> OperatorValue:
         """Return what is shown."""
@@ -166,12 +162,14 @@ class SwingFace(Translated, QWidget):
         self._image.set_message(self.tr("No image yet."))
         self._progress.setAccessibleName(self.tr("Progress"))
 
-    def _use_room(self, size: QSize) -> None:
+    @property
+    def _is_small(self) -> bool:
+        return self._room.is_narrow or self._room.is_low
+
+    @override
+    def _use_room(self) -> None:
         """Put the plots beside the dial, or below it where there is little room."""
-        is_small = size.width() < NARROW or size.height() < LOW
-        if is_small == self._is_small:
-            return
-        self._is_small = is_small
+        is_small = self._is_small
         if is_small:
             self._side.addWidget(self._banner, 1, 0, 1, 2)
             self._body.addWidget(self._plots, 1, 0, 1, 2)

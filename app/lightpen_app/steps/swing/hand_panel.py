@@ -1,7 +1,6 @@
 """Buttons for the simulated operator, where the pen is simulated."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 from typing_extensions import override
 
@@ -9,15 +8,15 @@ from lightpen.model.posture import Posture
 from lightpen.simulator.hand import Operator
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import LiveView
 
 SLIP_MM, SLIP_S = 0.5, 1.5
 COVER_S = 2.0
-NARROW = 100 * GRID  # px; a panel of less width has its buttons closer together
 
 
-class HandPanel(Translated, QFrame):
+class HandPanel(Rearranged, Translated, QFrame):
     """Lets the simulated operator do things; hidden with a real pen.
 
     Parameters
@@ -31,11 +30,13 @@ class HandPanel(Translated, QFrame):
         From now on the pen is not where the user wanted it last.
     """
 
+    narrow_below = 100 * GRID  # px; then its buttons are closer together
     led_by_itself = Signal()
 
     def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("area", "panel")
+        self._room = NO_ROOM  # so that its least size at first widens no window
         self._live = live
         self._led: Operator | None = None  # who was told to seat the tip and follow
 
@@ -54,7 +55,6 @@ class HandPanel(Translated, QFrame):
         # Layout
         self._layout = layout = QHBoxLayout(self)
         layout.setContentsMargins(GRID, GRID // 2, GRID, GRID // 2)
-        layout.setSpacing(GRID // 2)
         layout.addWidget(self._follow)
         layout.addStretch(1)
         for button in self._commands():
@@ -71,14 +71,13 @@ class HandPanel(Translated, QFrame):
         self._cover.clicked.connect(self._on_cover_clicked)
         live.connection_changed.connect(self._on_connection_changed)
 
+        self._use_room()
         self._retranslate()
         self._on_connection_changed()
 
     @override
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        is_narrow = event.size().width() < NARROW
-        self._layout.setSpacing(GRID // 2 if is_narrow else GRID)
+    def _use_room(self) -> None:
+        self._layout.setSpacing(GRID // 2 if self._room.is_narrow else GRID)
 
     def lean(self, posture: Posture) -> None:
         """Hold the pen as the user wants, who leads it from now on."""

@@ -13,10 +13,9 @@ from lightpen.swing.rules import stillness
 from lightpen.swing.shortfall import Shortfall, measure_shortfall, missing
 from lightpen.swing.state import Happening, Pause, Phase, SwingEvent, SwingState
 from lightpen_app.look.phrases import lack_text, phrase
-from lightpen_app.look.sounds import Sound
+from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.steps.swing.face import SwingFace
 from lightpen_app.steps.swing.hand_panel import HandPanel
 from lightpen_app.steps.swing.live_sight import SwingSight
@@ -25,6 +24,7 @@ from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PLOTTING_MS = 40  # from one plot to the next
@@ -46,14 +46,17 @@ class SwingPage(Page):
 
     Parameters
     ----------
-    services : Services
+    workbench : Workbench
+    sounds : Sounds
     """
 
     key = "swing"
 
-    def __init__(self, services: Services, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        self._workbench, self._sounds = services.workbench, services.sounds
+        self._workbench, self._sounds = workbench, sounds
         self._run, self._live = self._workbench.run, self._workbench.live
         self._runner = self._run.runner
         self._sight = SwingSight(self._run, self)

@@ -33,7 +33,7 @@ SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted o
 MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion
 AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
 
-# Of 0, 1/2, 1, ... 511; a table, as importing scipy takes longer than labelling.
+# Of 0, 1/2, 1, ... 511: a table, as lgamma takes one number at a time.
 LOG_FACTORIALS = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
 
 

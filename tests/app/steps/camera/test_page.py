@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.cameras.protocol import CameraSettings, Frame, own_image
+from lightpen.cameras.protocol import CameraSettings, Frame, sealed
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
@@ -47,7 +47,6 @@ from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
@@ -143,8 +142,8 @@ class Seen:
 
 
 @pytest.fixture
-def page(qtbot: QtBot, services: Services) -> Iterator[CameraPage]:
-    page = CameraPage(services)
+def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
+    page = CameraPage(workbench)
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -771,7 +770,7 @@ def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
     for i in range(SEARCHED_IMAGES):
         image = np.zeros((256, 512), np.uint8)
         cv2.circle(image, (60 + 40 * i, 128), 9, 200, cv2.FILLED)
-        frame = Frame(own_image(image), i, 0)
+        frame = Frame(sealed(image), i, 0)
         panel.feed(LiveImage(frame, detect_spots(frame.image), None))
 
     assert panel.outcome().text.startswith("What shines moves")

@@ -41,7 +41,6 @@ from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.pen_view import PenView
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
@@ -150,8 +149,8 @@ class Seen:
 
 
 @pytest.fixture
-def seen(qtbot: QtBot, services: Services) -> Iterator[Seen]:
-    page = LedsPage(services)
+def seen(qtbot: QtBot, workbench: Workbench) -> Iterator[Seen]:
+    page = LedsPage(workbench)
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -888,9 +887,9 @@ def test_nothing_is_compared_while_another_page_is_shown(
 
 
 def test_it_can_be_used_by_keys_alone(
-    qtbot: QtBot, services: Services, settings: Settings
+    qtbot: QtBot, workbench: Workbench, settings: Settings
 ) -> None:
-    page = LedsPage(services)
+    page = LedsPage(workbench)
     window = MainWindow((page,), settings, Preferences())
     qtbot.addWidget(window)
     window.show()

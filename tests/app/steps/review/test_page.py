@@ -57,7 +57,6 @@ from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import ResidualView
 from lightpen_app.steps.review.result_panel import ResultPanel
 from lightpen_app.steps.review.tip_readout import TipReadout
-from lightpen_app.steps.services import Services
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.work.workbench import Workbench
@@ -90,8 +89,8 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
     with RecordWriter.create(folder / "swing", preparation.header()) as writer:
         for i in range(N_IMAGES):
             R, t = swing.rotations[i], swing.translations[i]
-            shot = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
-            image = render_plan(small_scene, shot)
+            image_plan = ImagePlan(i, still_view(pen, R, t), small_scene.optics, R, t)
+            image = render_plan(small_scene, image_plan)
             seen = look(image, camera, pen)
             writer.append(image, seen.pixels, seen.rotation, seen.translation, 0.1 * i)
     return folder / "swing"
@@ -102,13 +101,13 @@ class Bed:
     """Shows the page of a swing that was solved."""
 
     qtbot: QtBot
-    services: Services
+    workbench: Workbench
     swing: Path
     pages: list[ReviewPage]
 
     def solve(self, limit: float = 0.05) -> Workbench:
         """Solve the swing, with a limit of U, mm."""
-        workbench = self.services.workbench
+        workbench = self.workbench
         folder = workbench.run.records_folder / "swing"
         header = json.loads((folder / "header.json").read_text("utf-8"))
         header["settings"]["max_uncertainty_mm"] = limit
@@ -124,7 +123,7 @@ class Bed:
 
     def show(self) -> ReviewPage:
         """Show the page."""
-        page = ReviewPage(self.services)
+        page = ReviewPage(self.workbench)
         self.pages.append(page)
         self.qtbot.addWidget(page)
         page.resize(1000, 600)
@@ -134,11 +133,11 @@ class Bed:
 
 
 @pytest.fixture
-def bed(qtbot: QtBot, services: Services, recorded: Path) -> Iterator[Bed]:
+def bed(qtbot: QtBot, workbench: Workbench, recorded: Path) -> Iterator[Bed]:
     """Lay a recorded swing ready."""
-    folder = services.workbench.run.records_folder / "swing"
+    folder = workbench.run.records_folder / "swing"
     shutil.copytree(recorded, folder)
-    bed = Bed(qtbot, services, folder, [])
+    bed = Bed(qtbot, workbench, folder, [])
     yield bed
     for page in bed.pages:
         page.shut_down()
@@ -247,9 +246,9 @@ def slip(swing: Path) -> None:
 
 
 def test_the_step_is_closed_until_the_pen_was_swung(
-    qtbot: QtBot, services: Services
+    qtbot: QtBot, workbench: Workbench
 ) -> None:
-    page = ReviewPage(services)
+    page = ReviewPage(workbench)
     qtbot.addWidget(page)
 
     assert page.why_closed() == "Swing the pen first."
@@ -364,7 +363,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
 
 
 def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
-    folder = bed.services.workbench.run.records_folder / "swing"
+    folder = bed.workbench.run.records_folder / "swing"
     header = json.loads((folder / "header.json").read_text("utf-8"))
     header["nominal_tip_mm"] = [3.0, -90.0, -20.0]
     (folder / "header.json").write_text(json.dumps(header), "utf-8")
@@ -379,7 +378,7 @@ def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
     put_in_force(workbench, tip(workbench))
     (file,) = workbench.run.results_folder.glob("*.json")
     file.write_text("{")
-    page = ReviewPage(bed.services)
+    page = ReviewPage(bed.workbench)
     bed.pages.append(page)
     bed.qtbot.addWidget(page)
     with bed.qtbot.waitSignal(page.notice_raised) as told:

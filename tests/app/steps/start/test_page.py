@@ -40,7 +40,6 @@ from lightpen.swing.preparation import (
 from lightpen_app.look.sounds import Mute, Silence, Sound, Sounds
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
@@ -59,7 +58,7 @@ class Opened:
     """A Start page on the screen, driven as an operator does."""
 
     def __init__(self, qtbot: QtBot, workbench: Workbench, sounds: Sounds) -> None:
-        self.page = StartPage(Services(workbench, sounds))
+        self.page = StartPage(workbench, sounds)
         self.subjects: list[str] = []
         self.notices: list[str] = []
         self.statuses: list[str] = []
@@ -699,7 +698,7 @@ def test_the_page_is_there_before_the_swings_are_looked_for(
     qtbot: QtBot, workbench: Workbench
 ) -> None:
     interrupted(workbench, "a")
-    page = StartPage(Services(workbench, Silence()))
+    page = StartPage(workbench, Silence())
     qtbot.addWidget(page)
     page.entered()
     QThreadPool.globalInstance().waitForDone()
@@ -1275,7 +1274,7 @@ class Next(Page):
 def window(
     qtbot: QtBot, workbench: Workbench, settings: Settings
 ) -> Iterator[MainWindow]:
-    page = StartPage(Services(workbench, Silence()))
+    page = StartPage(workbench, Silence())
     window = MainWindow([page, Next()], settings, Preferences())
     qtbot.addWidget(window)
     window.show()

@@ -40,7 +40,6 @@ from lightpen_app.look.phrases import grade_text, phrase
 from lightpen_app.look.sounds import Sound
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.services import Services
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
 from lightpen_app.steps.swing.page import SwingPage
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -101,7 +100,7 @@ class Desk:
     def __init__(self, workbench: Workbench, settings: Settings) -> None:
         self.workbench, self.run = workbench, workbench.run
         self.recorder = Recorder()
-        self.page = SwingPage(Services(workbench, self.recorder))
+        self.page = SwingPage(workbench, self.recorder)
         pages = (Blank("leds"), self.page, Blank("review"))
         self.window = MainWindow(pages, settings, Preferences())
         workbench.troubled.connect(self.window.show_notice)

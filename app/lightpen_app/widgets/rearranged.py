@@ -1,0 +1,60 @@
+"""Widgets that are arranged otherwise where they have little room."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QWidget
+from typing_extensions import override
+
+from lightpen_app.look.theme import GRID
+
+if TYPE_CHECKING:
+    _Base = QWidget
+else:  # a class of Qt's cannot be a base twice
+    _Base = object
+
+
+@dataclass(frozen=True)
+class Room:
+    """Whether a widget is short of room, in width and in height."""
+
+    is_narrow: bool = False
+    is_low: bool = False
+
+    @property
+    def margin(self) -> int:
+        """What is left free at the left and right of a page, px."""
+        return 2 * GRID if self.is_narrow else 4 * GRID
+
+
+NO_ROOM = Room(is_narrow=True, is_low=True)
+
+
+class Rearranged(_Base):
+    """Put before the base of a widget, it arranges the widget anew as its room changes.
+
+    The widget itself does so once in its constructor.
+
+    Attributes
+    ----------
+    narrow_below, low_below : int
+        px; with less width or height it is short of room.
+    """
+
+    narrow_below = 0
+    low_below = 0
+    _room = Room()
+
+    def _use_room(self) -> None:
+        """Arrange what is shown as `_room` allows."""
+        raise NotImplementedError
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        size = event.size()
+        room = Room(size.width() < self.narrow_below, size.height() < self.low_below)
+        if room != self._room:
+            self._room = room
+            self._use_room()

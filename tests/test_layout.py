@@ -1,0 +1,91 @@
+"""Tests of where things stand: what `lint-imports` checks covers all that there is."""
+
+import ast
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = {
+    "lightpen": ROOT / "core" / "lightpen",
+    "lightpen_app": ROOT / "app" / "lightpen_app",
+}
+
+
+def names_given_twice(folders: Iterable[Path]) -> dict[str, list[str]]:
+    """Return the public classes that share their name, each with its modules."""
+    modules = defaultdict(list)
+    for folder in folders:
+        for path in sorted(folder.rglob("*.py")):
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    modules[node.name].append(str(path.relative_to(folder.parent)))
+    return {name: places for name, places in modules.items() if len(places) > 1}
+
+
+def parts_of(folder: Path) -> set[str]:
+    """Return the modules and packages that stand directly in a package."""
+    return {
+        path.stem
+        for path in folder.iterdir()
+        if path.suffix == ".py" or (path / "__init__.py").exists()
+    } - {"__init__"}
+
+
+def layers_of(contract: dict[str, Any]) -> set[str]:
+    """Return the names in the layers of a contract, and those it leaves out."""
+    lines = " ".join(contract["layers"]).replace("|", " ").replace(":", " ")
+    return {*lines.split(), *contract.get("exhaustive_ignores", ())}
+
+
+@pytest.fixture(scope="module")
+def contracts() -> list[dict[str, Any]]:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    found: list[dict[str, Any]] = tomllib.loads(text)["tool"]["importlinter"][
+        "contracts"
+    ]
+    return found
+
+
+def test_a_class_is_found_by_its_name_alone() -> None:
+    assert names_given_twice(PACKAGES.values()) == {}
+
+
+def test_a_name_given_twice_is_noticed(tmp_path: Path) -> None:
+    for module in ("one", "other"):
+        (tmp_path / f"{module}.py").write_text("class Verdict: ...\nclass _Own: ...\n")
+
+    assert set(names_given_twice([tmp_path])) == {"Verdict"}
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_package_has_its_place_in_the_order_of_imports(
+    contracts: list[dict[str, Any]], package: str
+) -> None:
+    (contract,) = (each for each in contracts if each.get("containers") == [package])
+
+    assert layers_of(contract) == parts_of(PACKAGES[package])
+
+
+def test_every_step_is_among_those_that_know_no_other(
+    contracts: list[dict[str, Any]],
+) -> None:
+    (contract,) = (each for each in contracts if each["type"] == "independence")
+    folder = PACKAGES["lightpen_app"] / "steps"
+    steps = {path.name for path in folder.iterdir() if (path / "__init__.py").exists()}
+
+    assert set(contract["modules"]) == {f"lightpen_app.steps.{step}" for step in steps}
+
+
+def test_a_package_without_a_place_is_noticed(tmp_path: Path) -> None:
+    for name in ("model", "formats", "forgotten"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
+    (tmp_path / "cli.py").touch()
+    contract = {"layers": ["cli", "formats | model"]}
+
+    assert parts_of(tmp_path) - layers_of(contract) == {"forgotten"}
