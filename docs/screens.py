@@ -125,8 +125,6 @@ class Stage:
         workbench.live.open(
             StillCamera(self._scene, around.clock), CameraSettings(), around.clock
         )
-        self._n_swings = 0
-        workbench.live.swing_changed.connect(self._on_swing_changed)
         self.wizard.window.show()
 
     def close(self) -> None:
@@ -181,8 +179,10 @@ class Stage:
 
     def _fill_swing(self) -> None:
         swing = _swing(self._workbench.preparation.swing_setup(), self._scene)
-        self._wait_until(lambda: self._n_swings > 0)  # of the page's own beginning
-        self._workbench.live.swing_changed.emit(swing)
+        run = self._workbench.run
+        self._show_image(0)
+        self._wait_until(lambda: run.status.state is not None)  # of its own beginning
+        run.on_swing(replace(run.status, state=swing), ())
         for index in range(N_SHOWN):
             self._show_image(index)
         refreshed = QDeadlineTimer(2 * REFRESH_MS)
@@ -218,9 +218,6 @@ class Stage:
     def _wait_until(self, condition: Callable[[], bool]) -> None:
         while not condition():
             self._settle()
-
-    def _on_swing_changed(self) -> None:
-        self._n_swings += 1
 
     def _settle(self) -> None:
         self._application.sendPostedEvents(None, QEvent.Type.DeferredDelete)

@@ -57,7 +57,7 @@ class LiveImage:
     sighting: Sighting | None
 
 
-class Listener(Protocol):
+class LiveListener(Protocol):
     """Who is told, on the thread that looks or on that of the camera."""
 
     def on_image(self, image: LiveImage) -> None:
@@ -76,7 +76,7 @@ class Live:
         Not open yet. Nobody else may call it any more.
     settings : CameraSettings
         To be applied when it is opened.
-    listener : Listener
+    listener : LiveListener
     runner : SwingRunner
         Takes every image.
     clock : Clock, optional
@@ -87,7 +87,7 @@ class Live:
         self,
         camera: ImageCamera,
         settings: CameraSettings,
-        listener: Listener,
+        listener: LiveListener,
         runner: SwingRunner,
         clock: Clock | None = None,
     ) -> None:

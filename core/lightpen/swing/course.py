@@ -45,7 +45,7 @@ from lightpen.swing.rules import (
 )
 from lightpen.swing.serial_queue import Act, Report, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
-from lightpen.swing.status import Activity, Listener, SwingStatus
+from lightpen.swing.status import Activity, SwingListener, SwingStatus
 
 T = TypeVar("T")
 
@@ -75,7 +75,7 @@ class SwingCourse:
         Folder that a new swing's record is made in.
     archive : Archive
         Of the accepted results.
-    listener : Listener
+    listener : SwingListener
     now : callable
         Returns date and time with the time zone.
     start : Start
@@ -85,7 +85,7 @@ class SwingCourse:
         self,
         records: Path,
         archive: Archive,
-        listener: Listener,
+        listener: SwingListener,
         now: Callable[[], datetime],
         start: Start,
     ) -> None:

@@ -20,7 +20,7 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable
 from lightpen.swing.serial_queue import SerialQueue
 from lightpen.swing.state import SwingSetup
-from lightpen.swing.status import Listener, SwingStatus
+from lightpen.swing.status import SwingListener, SwingStatus
 
 
 class SwingRunner:
@@ -35,7 +35,7 @@ class SwingRunner:
         Folder that a new swing's record is made in.
     archive : Archive
         Of the accepted results.
-    listener : Listener
+    listener : SwingListener
     now : callable
         Returns date and time with the time zone.
     """
@@ -44,7 +44,7 @@ class SwingRunner:
         self,
         records: Path,
         archive: Archive,
-        listener: Listener,
+        listener: SwingListener,
         now: Callable[[], datetime] = lambda: datetime.now().astimezone(),
     ) -> None:
         self._queue = SerialQueue("swing", lambda: self._course.recover())

@@ -85,7 +85,7 @@ class SwingStatus:
         return self.state is not None and self.state.pause is Pause.BY_USER
 
 
-class Listener(Protocol):
+class SwingListener(Protocol):
     """Who is told, on the threads of a runner; must return soon."""
 
     def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
