@@ -13,8 +13,6 @@ from typing import TypeAlias, Union
 Value: TypeAlias = Union[str, int, float, "Sentence", tuple["Sentence", ...]]
 Translate: TypeAlias = Callable[[str], str]
 
-COMMA = ", "  # between the sentences or words of one value
-
 
 def in_english(template: str) -> str:
     """Return a template as it is written."""
@@ -59,9 +57,12 @@ def sentence(code: str, template: str, /, **values: Value) -> Sentence:
     return Sentence(code, template, values)
 
 
+COMMA = sentence("list.comma", ", ")  # between the sentences or words of one value
+
+
 def _worded(value: Value, translate: Translate) -> str | int | float:
     if isinstance(value, Sentence):
         return value.text(translate)
     if isinstance(value, tuple):
-        return translate(COMMA).join(each.text(translate) for each in value)
+        return COMMA.text(translate).join(each.text(translate) for each in value)
     return value

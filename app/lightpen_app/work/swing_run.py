@@ -12,7 +12,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade, Verdict, judge
 from lightpen.live.looking import Swinging
-from lightpen.messages import Code, Message
+from lightpen.messages import no_tip
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names, new_folder
 from lightpen.record.reading import open_record, recorded_limits, recorded_names
@@ -22,6 +22,7 @@ from lightpen.record.unfinished import (
     discard_swing,
 )
 from lightpen.record.writing import RecordWriter, note_taken_out
+from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
     Preparation,
 )
@@ -411,7 +412,7 @@ class SwingRun(QObject):
             self._keep_solution(sentence)
             return
         self._job = None
-        self._conclude(Message(Code.NO_TIP, (sentence,)), passed=False)
+        self._conclude(no_tip(sentence), passed=False)
 
     def _keep_solution(self, sentence: str) -> None:
         """Leave the images as they were, and say why they cannot be as wanted."""
@@ -432,7 +433,7 @@ class SwingRun(QObject):
         if trouble:
             self.relieved.emit(trouble)
 
-    def _conclude(self, reason: Message, passed: bool) -> None:
+    def _conclude(self, reason: Sentence, passed: bool) -> None:
         state = self._state
         assert state is not None
         first = state.phase is not Phase.VERDICT

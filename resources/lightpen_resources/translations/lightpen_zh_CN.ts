@@ -1475,20 +1475,8 @@
         <translation>接受之前，结果不会生效。</translation>
     </message>
     <message>
-        <source>Next: accept the tip. The old one stays in force until then.</source>
-        <translation>下一步：接受测头。在此之前旧数据一直有效。</translation>
-    </message>
-    <message>
-        <source>Next: capture more images; those of this swing are kept.</source>
-        <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
-    </message>
-    <message>
-        <source>Next: repeat the swing with the tip pressed in.</source>
-        <translation>下一步：压紧测头，重做摆动。</translation>
-    </message>
-    <message>
-        <source>Next: check the intrinsics file and the LED file, then repeat.</source>
-        <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+        <source>{0} The old one stays in force until then.</source>
+        <translation>{0}在此之前旧数据一直有效。</translation>
     </message>
     <message>
         <source>Swing the pen first.</source>
@@ -2216,42 +2204,197 @@
     </message>
 </context>
 <context>
-    <name>phrases</name>
+    <name>core</name>
     <message>
-        <source>Show the pen</source>
-        <translation>请出示光笔</translation>
+        <source>, </source>
+        <translation>、</translation>
     </message>
     <message>
         <source>Hold it so that the camera sees its LEDs.</source>
         <translation>握住光笔，使相机能看到 LED。</translation>
     </message>
     <message>
-        <source>Seat the tip</source>
-        <translation>测头就位</translation>
+        <source>Images dropped: {n_dropped}. Press the tip into the cone again.</source>
+        <translation>已丢弃 {n_dropped} 幅图像。请把测头重新压入锥孔。</translation>
+    </message>
+    <message>
+        <source>Images kept: {n_kept} of at least {needed}.</source>
+        <translation>已保留 {n_kept} 幅图像，至少需要 {needed} 幅。</translation>
+    </message>
+    <message>
+        <source>Images of the upright pen still needed: {n_images}.</source>
+        <translation>还需 {n_images} 幅光笔竖直的图像。</translation>
+    </message>
+    <message>
+        <source>It rests {distance:.2f} mm from where it was. Put it back into the cone; check that the cone is clamped.</source>
+        <translation>测头偏离原位 {distance:.2f} mm。请放回锥孔，并检查锥孔是否夹紧。</translation>
+    </message>
+    <message>
+        <source>Keep the tip pressed into the cone.</source>
+        <translation>保持测头压紧在锥孔中。</translation>
+    </message>
+    <message>
+        <source>LED {led} sits {distance:.2f} mm off its place in the LED file. Is this the LED file of this pen?</source>
+        <translation>LED {led} 偏离 LED 文件中的位置 {distance:.2f} mm。这是该光笔的 LED 文件吗？</translation>
+    </message>
+    <message>
+        <source>LEDs seen: {seen}, needed: {needed}. A finger may cover them; or lean back a little.</source>
+        <translation>看到 {seen} 个 LED，需要 {needed} 个。可能被手指遮住；或稍微往回倾斜。</translation>
+    </message>
+    <message>
+        <source>Next: accept the tip.</source>
+        <translation>下一步：接受测头。</translation>
+    </message>
+    <message>
+        <source>Next: capture more images; those of this swing are kept.</source>
+        <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
+    </message>
+    <message>
+        <source>Next: check the intrinsics file and the LED file, then repeat.</source>
+        <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: repeat the swing with the tip pressed in.</source>
+        <translation>下一步：压紧测头，重做摆动。</translation>
+    </message>
+    <message>
+        <source>Odd and even images put the tip {difference:.4f} mm apart, {usual:.4f} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
+        <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
     <message>
-        <source>Seat and swing</source>
-        <translation>就位并摆动</translation>
-    </message>
-    <message>
         <source>Press the tip into the cone and swing the pen gently.</source>
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
     </message>
     <message>
-        <source>Seated</source>
-        <translation>已就位</translation>
+        <source>The LED file is off by {sigma:.3f} mm a coordinate, which alone makes U (k = 2) {uncertainty:.4f} mm. Is this the LED file of this pen? More images hardly help.</source>
+        <translation>LED 文件每个坐标的误差约为 {sigma:.3f} mm，仅此就使 U (k = 2) 达到 {uncertainty:.4f} mm。这是该光笔的 LED 文件吗？增加图像作用不大。</translation>
+    </message>
+    <message>
+        <source>The LEDs are smeared. Swing the pen slowly.</source>
+        <translation>LED 有拖影。请慢慢摆动光笔。</translation>
+    </message>
+    <message>
+        <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
+        <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
+    </message>
+    <message>
+        <source>The pen is lifted. Put the tip back to go on.</source>
+        <translation>光笔已抬起。放回测头即可继续。</translation>
+    </message>
+    <message>
+        <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
+        <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
+    </message>
+    <message>
+        <source>The swing is paused.</source>
+        <translation>摆动已暂停。</translation>
+    </message>
+    <message>
+        <source>The tip is being computed. Put the pen down.</source>
+        <translation>正在计算测头。可以放下光笔。</translation>
     </message>
     <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
     </message>
     <message>
-        <source>Starts in {0}</source>
-        <translation>{0} 秒后开始</translation>
+        <source>To YOUR right: it tells the program where you stand.</source>
+        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
+    </message>
+    <message>
+        <source>Too little tilt {sides}. Lean the pen further that way. Images still needed: about {n_images}.</source>
+        <translation>{sides}倾斜不足。请朝该方向再倾斜一些：约需 {n_images} 幅图像。</translation>
+    </message>
+    <message>
+        <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
+        <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. Capture more images in postures that differ.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>away from the camera</source>
+        <translation>远离相机方向</translation>
+    </message>
+    <message>
+        <source>away to the left</source>
+        <translation>远离相机偏左</translation>
+    </message>
+    <message>
+        <source>away to the right</source>
+        <translation>远离相机偏右</translation>
+    </message>
+    <message>
+        <source>to most sides</source>
+        <translation>向多数方向</translation>
+    </message>
+    <message>
+        <source>to the left</source>
+        <translation>向左</translation>
+    </message>
+    <message>
+        <source>to the right</source>
+        <translation>向右</translation>
+    </message>
+    <message>
+        <source>towards the camera</source>
+        <translation>朝向相机方向</translation>
+    </message>
+    <message>
+        <source>towards the camera to the left</source>
+        <translation>朝向相机偏左</translation>
+    </message>
+    <message>
+        <source>towards the camera to the right</source>
+        <translation>朝向相机偏右</translation>
+    </message>
+    <message>
+        <source>{n_dropped} of {n_images} images do not take part. Repeat the swing if the tip slipped.</source>
+        <translation>{n_images} 幅图像中有 {n_dropped} 幅未参与计算。若测头滑动过，请重做摆动。</translation>
+    </message>
+    <message>
+        <source>{noise:.3f} px in this image, {usual:.3f} px in the others. A finger or a reflection may cover part of an LED.</source>
+        <translation>本图像 {noise:.3f} px，其他图像 {usual:.3f} px。LED 可能被手指或反光遮住一部分。</translation>
+    </message>
+    <message>
+        <source>{why}</source>
+        <translation>{why}</translation>
+    </message>
+</context>
+<context>
+    <name>phrases</name>
+    <message>
+        <source>Show the pen</source>
+        <translation>请出示光笔</translation>
+    </message>
+    <message>
+        <source>Seat the tip</source>
+        <translation>测头就位</translation>
+    </message>
+    <message>
+        <source>Seat and swing</source>
+        <translation>就位并摆动</translation>
+    </message>
+    <message>
+        <source>Seated</source>
+        <translation>已就位</translation>
+    </message>
+    <message>
+        <source>{0} Review has their reasons.</source>
+        <translation>{0}原因见“复核”步骤。</translation>
+    </message>
+    <message>
+        <source>{0} Accept it at the screen.</source>
+        <translation>{0}请在屏幕前接受。</translation>
     </message>
     <message>
         <source>Keep the tip pressed into the cone.</source>
@@ -2260,10 +2403,6 @@
     <message>
         <source>Lean RIGHT</source>
         <translation>向右倾斜</translation>
-    </message>
-    <message>
-        <source>To YOUR right: it tells the program where you stand.</source>
-        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
     </message>
     <message>
         <source>Follow the arrow</source>
@@ -2278,16 +2417,8 @@
         <translation>慢一点</translation>
     </message>
     <message>
-        <source>The LEDs are smeared. Swing the pen slowly.</source>
-        <translation>LED 有拖影。请慢慢摆动光笔。</translation>
-    </message>
-    <message>
         <source>LEDs do not fit</source>
         <translation>LED 不匹配</translation>
-    </message>
-    <message>
-        <source>{0} px in this image, {1} px in the others. A finger or a reflection may cover part of an LED.</source>
-        <translation>本图像 {0} px，其他图像 {1} px。LED 可能被手指或反光遮住一部分。</translation>
     </message>
     <message>
         <source>Tip slipped</source>
@@ -2298,24 +2429,12 @@
         <translation>看不到光笔</translation>
     </message>
     <message>
-        <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
-        <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
-    </message>
-    <message>
         <source>Paused</source>
         <translation>已暂停</translation>
     </message>
     <message>
-        <source>The pen is lifted. Put the tip back to go on.</source>
-        <translation>光笔已抬起。放回测头即可继续。</translation>
-    </message>
-    <message>
         <source>Tip not in place</source>
         <translation>测头不在原位</translation>
-    </message>
-    <message>
-        <source>It rests {0} mm from where it was. Put it back into the cone; check that the cone is clamped.</source>
-        <translation>测头偏离原位 {0} mm。请放回锥孔，并检查锥孔是否夹紧。</translation>
     </message>
     <message>
         <source>Press Space to go on.</source>
@@ -2326,8 +2445,8 @@
         <translation>采集完毕</translation>
     </message>
     <message>
-        <source>The tip is being computed. Put the pen down.</source>
-        <translation>正在计算测头。可以放下光笔。</translation>
+        <source>Starts in {seconds}</source>
+        <translation>{seconds} 秒后开始</translation>
     </message>
     <message>
         <source>More images</source>
@@ -2342,72 +2461,24 @@
         <translation>竖直握住</translation>
     </message>
     <message>
-        <source>LEDs seen: {0}, needed: {1}. A finger may cover them; or lean back a little.</source>
-        <translation>看到 {0} 个 LED，需要 {1} 个。可能被手指遮住；或稍微往回倾斜。</translation>
-    </message>
-    <message>
-        <source>Images dropped: {0}. Press the tip into the cone again.</source>
-        <translation>已丢弃 {0} 幅图像。请把测头重新压入锥孔。</translation>
-    </message>
-    <message>
-        <source>Images kept: {0} of at least {1}.</source>
-        <translation>已保留 {0} 幅图像，至少需要 {1} 幅。</translation>
-    </message>
-    <message>
-        <source>Too little tilt {1}. Lean the pen further that way. Images still needed: about {0}.</source>
-        <translation>{1}倾斜不足。请朝该方向再倾斜一些：约需 {0} 幅图像。</translation>
-    </message>
-    <message>
-        <source>Images of the upright pen still needed: {0}.</source>
-        <translation>还需 {0} 幅光笔竖直的图像。</translation>
-    </message>
-    <message>
         <source>Not known yet</source>
         <translation>尚未确定</translation>
-    </message>
-    <message>
-        <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
-        <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
     </message>
     <message>
         <source>Not certain enough</source>
         <translation>不确定度过大</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {0} mm, the limit {1} mm. Capture more images in postures that differ.</source>
-        <translation>测头的 U (k = 2) 为 {0} mm，限值 {1} mm。请以不同姿态继续采集。</translation>
-    </message>
-    <message>
         <source>Halves differ</source>
         <translation>奇偶结果不一致</translation>
-    </message>
-    <message>
-        <source>Odd and even images put the tip {0} mm apart, {1} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
-        <translation>奇数与偶数图像求得的测头相差 {0} mm，通常为 {1} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
         <source>Many images dropped</source>
         <translation>丢弃图像过多</translation>
     </message>
     <message>
-        <source>{0} of {1} images do not take part. Review has their reasons; repeat the swing if the tip slipped.</source>
-        <translation>{1} 幅图像中有 {0} 幅未参与计算。原因见“复核”步骤；若测头滑动过，请重做摆动。</translation>
-    </message>
-    <message>
-        <source>The LED file is off by {0} mm a coordinate, which alone makes U (k = 2) {1} mm. Is this the LED file of this pen? More images hardly help.</source>
-        <translation>LED 文件每个坐标的误差约为 {0} mm，仅此就使 U (k = 2) 达到 {1} mm。这是该光笔的 LED 文件吗？增加图像作用不大。</translation>
-    </message>
-    <message>
         <source>LED out of place</source>
         <translation>LED 位置不符</translation>
-    </message>
-    <message>
-        <source>LED {0} sits {1} mm off its place in the LED file. Is this the LED file of this pen?</source>
-        <translation>LED {0} 偏离 LED 文件中的位置 {1} mm。这是该光笔的 LED 文件吗？</translation>
-    </message>
-    <message>
-        <source>The residuals are {0} px, {1} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
-        <translation>残差为 {0} px，通常不超过 {1} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
     <message>
         <source>No tip found</source>
@@ -2416,10 +2487,6 @@
     <message>
         <source>Good</source>
         <translation>良好</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the tip is {0} mm. Accept it at the screen.</source>
-        <translation>测头的 U (k = 2) 为 {0} mm。请在屏幕前接受。</translation>
     </message>
     <message>
         <source>Enter the name of the station.</source>
@@ -2640,14 +2707,6 @@
     <message>
         <source>Turn it clockwise, seen from above.</source>
         <translation>从上方看，顺时针转动。</translation>
-    </message>
-    <message>
-        <source>to most sides</source>
-        <translation>向多数方向</translation>
-    </message>
-    <message>
-        <source>, </source>
-        <translation>、</translation>
     </message>
     <message>
         <source>1 image</source>

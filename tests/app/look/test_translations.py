@@ -115,7 +115,7 @@ def test_every_text_is_translated(tmp_path: Path) -> None:
     fresh = tmp_path / CHINESE.name
     fresh.write_bytes(CHINESE.read_bytes())
 
-    TOOL.collect(fresh, APPLICATION)
+    TOOL.collect(fresh, TOOL.SOURCES)
 
     assert untranslated(fresh) == []
 
@@ -126,7 +126,7 @@ def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
     )
     fresh = tmp_path / CHINESE.name
 
-    TOOL.collect(fresh, tmp_path)
+    TOOL.collect(fresh, [tmp_path])
 
     assert untranslated(fresh) == ["Page: New text"]
 
@@ -152,9 +152,9 @@ def test_the_compiled_translations_are_fresh(ts_file: Path, tmp_path: Path) -> N
 
 def test_a_translation_keeps_the_places_of_the_values() -> None:
     for _, source, translation in messages(CHINESE):
-        places = sorted(re.findall(r"\{\d*\}|%n", source))
+        places = sorted(re.findall(r"\{[^{}]*\}|%n", source))
         for text in texts_of(translation):
-            assert sorted(re.findall(r"\{\d*\}|%n", text)) == places, source
+            assert sorted(re.findall(r"\{[^{}]*\}|%n", text)) == places, source
 
 
 def test_the_language_changes_while_a_widget_is_shown(

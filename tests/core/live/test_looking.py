@@ -390,7 +390,7 @@ def test_a_paused_swing_keeps_nothing_until_it_is_resumed(stage: Stage) -> None:
     n_images = len(stage.record().images)
     stage.audience.wait_for_images(40)
     assert stage.audience.state.pause is Pause.BY_USER
-    assert stage.audience.state.message.code is Code.PAUSED
+    assert stage.audience.state.message.code == Code.PAUSED
     assert len(stage.record().images) == n_images
 
     live.resume()

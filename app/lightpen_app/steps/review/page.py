@@ -21,6 +21,7 @@ from lightpen.record.results import Result, last_result
 from lightpen.record.solving import Solution
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, phrase
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
 from lightpen_app.steps.page import MainAction, Page
@@ -127,18 +128,11 @@ class ReviewPage(Rearranged, Page):
             return self.tr("Next: start the next calibration, or close the program.")
         if self._run.verdict is None:
             return self.tr("Nothing is in force until it is accepted.")
-        return {
-            NextStep.ACCEPT: self.tr(
-                "Next: accept the tip. The old one stays in force until then."
-            ),
-            NextStep.CAPTURE_MORE: self.tr(
-                "Next: capture more images; those of this swing are kept."
-            ),
-            NextStep.REPEAT: self.tr("Next: repeat the swing with the tip pressed in."),
-            NextStep.CHECK_FILES: self.tr(
-                "Next: check the intrinsics file and the LED file, then repeat."
-            ),
-        }[self._run.verdict.next_step]
+        next_step = self._run.verdict.next_step
+        text = worded(next_step.sentence)
+        if next_step is NextStep.ACCEPT:
+            text = self.tr("{0} The old one stays in force until then.").format(text)
+        return text
 
     @override
     def is_complete(self) -> bool:

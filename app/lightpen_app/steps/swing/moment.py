@@ -161,13 +161,13 @@ class SwingWords(QObject):
                 "it, then press Space."
             )
             return Phrase(told.short, hint)
-        if message.code is Code.SHOW_PEN and moment.is_simulated:
+        if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat, and lean the pen by "
                 "dragging the dial."
             )
             return Phrase(told.short, hint)
-        if message.code is Code.FOLLOW_ARROW and state.target and heading is not None:
+        if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
             return lean_phrase(state.target, _posture(moment), heading)
         return told
 
@@ -231,7 +231,7 @@ class SwingWords(QObject):
     def _count(self, moment: Moment) -> str:
         state, n_kept = moment.state, moment.state.n_kept
         if state.phase is Phase.COUNTDOWN:
-            return str(state.message.arguments[0])
+            return str(state.message.values["seconds"])
         if state.phase in ENDED:
             return n_images_text(n_kept)
         if not isfinite(state.kept.uncertainty):
