@@ -6,7 +6,7 @@ chosen, and puts the same values in. A sentence names no command and no button, 
 shown by both: who shows it may add what to do there, by its code.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias, Union
 
@@ -47,6 +47,14 @@ class Sentence:
         """
         words = {name: _worded(value, translate) for name, value in self.values.items()}
         return translate(self.template).format(**words)
+
+    def parts(self) -> Iterator["Sentence"]:
+        """Return the sentence and all that are in it."""
+        yield self
+        for value in self.values.values():
+            for each in value if isinstance(value, tuple) else (value,):
+                if isinstance(each, Sentence):
+                    yield from each.parts()
 
     def __str__(self) -> str:
         return self.text()

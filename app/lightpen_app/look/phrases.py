@@ -100,19 +100,6 @@ _LACKS: dict[Lack, str] = {
         "phrases", "Save or discard the changes of the LED table."
     ),
 }
-_REASONS: dict[Reason, str] = {
-    Reason.NONE: "",
-    Reason.UNREADABLE: QT_TRANSLATE_NOOP("phrases", "unreadable"),
-    Reason.WRONG_SIZE: QT_TRANSLATE_NOOP("phrases", "wrong size"),
-    Reason.EMPTY: QT_TRANSLATE_NOOP("phrases", "no LED seen"),
-    Reason.BLURRED: QT_TRANSLATE_NOOP("phrases", "blurred"),
-    Reason.TOO_FEW_LEDS: QT_TRANSLATE_NOOP("phrases", "too few LEDs"),
-    Reason.NOT_THE_PEN: QT_TRANSLATE_NOOP("phrases", "spots do not fit the pen"),
-    Reason.AMBIGUOUS: QT_TRANSLATE_NOOP("phrases", "ambiguous"),
-    Reason.MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-    Reason.SLIPPED: QT_TRANSLATE_NOOP("phrases", "tip slipped"),
-    Reason.TAKEN_OUT: QT_TRANSLATE_NOOP("phrases", "taken out"),
-}
 # A word for a sign to stand beside, read from a distance.
 _PHASES: dict[Phase, str] = {
     Phase.WAIT: QT_TRANSLATE_NOOP("phrases", "WAITING"),
@@ -225,7 +212,7 @@ def lack_text(lack: Lack) -> str:
 
 def reason_text(reason: Reason) -> str:
     """Return why an image does not take part, a few words; empty for one that does."""
-    return _translated(_REASONS[reason])
+    return worded(reason.words) if reason else ""
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:

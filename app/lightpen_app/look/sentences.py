@@ -7,9 +7,9 @@ from lightpen.sentences import Sentence
 CONTEXT = "core"
 
 
-def worded(sentence: Sentence) -> str:
-    """Return the words of a sentence of the core."""
-    return sentence.text(_translated)
+def worded(sentence: Sentence | None) -> str:
+    """Return the words of a sentence of the core; empty if there is none."""
+    return "" if sentence is None else sentence.text(_translated)
 
 
 def _translated(template: str) -> str:

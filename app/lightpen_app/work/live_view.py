@@ -39,6 +39,7 @@ from lightpen.simulator.hand import Operator
 from lightpen.swing.rules import Transition, finish, pause, resume
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingState
 from lightpen_app.look.pooling import pooled
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
 
 CLOSING_TIME = 10.0  # s for all that is under way; a dead camera may take 8
@@ -251,7 +252,7 @@ class LiveView(QObject):
             try:
                 then()
             except LightpenError as error:
-                self.troubled.emit(str(error))
+                self.troubled.emit(worded(error.sentence))
 
     def set_following(self, follows: bool) -> None:
         """Let the simulated operator do what the swing asks for, or leave it."""
@@ -263,7 +264,7 @@ class LiveView(QObject):
         try:
             live.stop()
         except DeviceLost as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
         else:
             teller.deleteLater()
 
@@ -323,11 +324,11 @@ class LiveView(QObject):
             case SettingsApplied(settings):
                 self.settings_applied.emit(settings)
             case Failed(error):
-                self.failed.emit(str(error))
+                self.failed.emit(worded(error.sentence))
             case Troubled(trouble):
-                self.troubled.emit(str(trouble))
+                self.troubled.emit(worded(trouble.sentence))
             case LightpenError():
-                self._trouble = str(what)
+                self._trouble = worded(what.sentence)
                 self.troubled.emit(self._trouble)
 
     def _on_happened(self, event: SwingEvent) -> None:

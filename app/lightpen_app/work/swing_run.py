@@ -33,6 +33,7 @@ from lightpen.swing.state import (
     SwingSetup,
     SwingState,
 )
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import LiveView
 
@@ -288,7 +289,7 @@ class SwingRun(QObject):
             try:
                 writer.conclude(verdict.grade)
             except FileError as error:  # the swing is offered again, which is no harm
-                self._trouble_with(str(error))
+                self._trouble_with(worded(error.sentence))
         self.changed.emit()
         return result
 
@@ -370,7 +371,7 @@ class SwingRun(QObject):
             writer = RecordWriter.resume(open_record(folder))
         except FileError as error:
             self.abandon()
-            self._trouble_with(str(error))
+            self._trouble_with(worded(error.sentence))
             return
         self._live.swing(replace(left, writer=writer))
 
@@ -379,7 +380,7 @@ class SwingRun(QObject):
         try:
             self.go_on(swing)
         except FileError as error:
-            self._on_unread(str(error))
+            self._on_unread(worded(error.sentence))
 
     def _on_unread(self, sentence: str) -> None:
         self._reading = None
@@ -394,7 +395,7 @@ class SwingRun(QObject):
             try:
                 note_taken_out(self._record_folder, solution.taken_out)
             except FileError as error:
-                self._keep_solution(str(error))
+                self._keep_solution(worded(error.sentence))
                 return
         self._relieve()
         self._job, self._solution, self._result = None, solution, None

@@ -22,6 +22,7 @@ from lightpen.swing.preparation import (
     SourceChoice,
     SourceKind,
 )
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
@@ -98,7 +99,7 @@ class Workbench(QObject):
             try:
                 self.use_sample_files()
             except FileError as error:
-                self.troubled.emit(str(error))
+                self.troubled.emit(worded(error.sentence))
         self.open_camera()
 
     def stations(self) -> tuple[str, ...]:
@@ -192,13 +193,13 @@ class Workbench(QObject):
             try:
                 camera_file = CameraFile.read(Path(station.camera_file))
             except LightpenError as error:
-                self.troubled.emit(str(error))
+                self.troubled.emit(worded(error.sentence))
         if station.pen_file:
             try:
                 units = station.pen_units or None
                 pen_file = PenFile.read(Path(station.pen_file), units)
             except LightpenError as error:
-                self.troubled.emit(str(error))
+                self.troubled.emit(worded(error.sentence))
         return camera_file, pen_file
 
     def _follow(self, before: Preparation) -> None:
@@ -230,7 +231,7 @@ class Workbench(QObject):
         try:
             self._settings.set_last_station(station)
         except LightpenError as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
 
     def _remember(self) -> None:
         now = self._preparation
@@ -266,7 +267,7 @@ class Workbench(QObject):
         try:
             self._settings.set_station(names.station, station)
         except LightpenError as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

@@ -16,6 +16,7 @@ from lightpen.estimation.pivot import PivotFit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.coverage import DIRECTION_NAMES
+from lightpen.sentences import Sentence, Value, sentence
 
 METHODS = ("joint", "two-stage")
 
@@ -88,7 +89,7 @@ def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> s
             "dropped": dict(_dropped(calibration)),
         },
         "methods": _methods(calibration),
-        "warnings": warnings_of(calibration),
+        "warnings": [_told(warning) for warning in warnings_of(calibration)],
         "uncertainty": _uncertainty(calibration),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
@@ -162,28 +163,42 @@ def calibration_text(
     lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
     warnings = warnings_of(calibration)
     if warnings:
-        lines += ["", *warnings]
+        lines += ["", *map(str, warnings)]
     return "\n".join(lines)
 
 
-def warnings_of(calibration: Calibration) -> list[str]:
+def warnings_of(calibration: Calibration) -> list[Sentence]:
     """Return what the user should look into, one sentence or two each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
     warnings = [
-        f"LED {led} was found in no image. A finger may cover it, it may be off, or "
-        "its place in the pen file may be wrong."
-        for led in np.flatnonzero(leds.n_seen == 0) + 1
+        sentence(
+            "warning.led-unseen",
+            "LED {led} was found in no image. A finger may cover it, it may be off, or "
+            "its place in the pen file may be wrong.",
+            led=int(led) + 1,
+        )
+        for led in np.flatnonzero(leds.n_seen == 0)
     ]
     warnings += [
-        f"LED {led} sits {np.linalg.norm(leds.displacement[led - 1]):.3f} mm off its "
-        "place in the pen file. Check the file, or measure the pen again."
+        sentence(
+            "warning.led-displaced",
+            "LED {led} sits {distance:.3f} mm off its place in the pen file. Check the "
+            "file, or measure the pen again.",
+            led=led,
+            distance=float(np.linalg.norm(leds.displacement[led - 1])),
+        )
         for led in leds.displaced
     ]
     if sigma > USUAL_SIGMA:
         warnings.append(
-            f"The residuals are large: {sigma:.2f} px, {USUAL_SIGMA} px or less is "
-            "usual. Check that the camera file is of this camera, lens and focus, and "
-            "the pen file of this pen: the uncertainty does not cover a wrong file."
+            sentence(
+                "warning.large-residuals",
+                "The residuals are large: {sigma:.2f} px, {usual} px or less is usual. "
+                "Check that the camera file is of this camera, lens and focus, and the "
+                "pen file of this pen: the uncertainty does not cover a wrong file.",
+                sigma=sigma,
+                usual=USUAL_SIGMA,
+            )
         )
     return warnings
 
@@ -283,6 +298,16 @@ def _dropped(calibration: Calibration) -> Counter[str]:
     return Counter(str(reason) for reason in calibration.reasons if reason)
 
 
+def _told(value: Value) -> Any:
+    """Return a sentence with its code and values, and these likewise."""
+    if isinstance(value, tuple):
+        return [_told(each) for each in value]
+    if not isinstance(value, Sentence):
+        return value
+    values = {name: _told(each) for name, each in value.values.items()}
+    return {"code": value.code, "text": str(value), "values": values}
+
+
 def _program() -> dict[str, str]:
     return {"name": "lightpen", "version": version("lightpen")}
 
@@ -375,7 +400,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
             "file": observations.names[i],
             "used": used,
             "reason": str(calibration.reasons[i]),
-            "detail": observations.details[i],
+            "detail": str(observations.details[i] or ""),
             "rms_px": rms,
             "tip_cam_mm": tip,
             "leds": [

@@ -39,6 +39,7 @@ from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write
 from lightpen.model.camera import Camera
 from lightpen.sentences import Sentence, sentence
 
+CAMERA_FILE = sentence("file.camera", "camera file")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
@@ -90,7 +91,7 @@ def read_camera(path: Path) -> Camera:
     FileError
         The file cannot be read, or is not the complete file of a pinhole camera.
     """
-    text = read_text(path, sentence("file.camera", "camera file"), CAMERA_FILE_LIMIT)
+    text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
     name = printable(path.name)
     entries = Entries.of(parse_document(text, name), name)
     chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]

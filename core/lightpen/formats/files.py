@@ -181,7 +181,7 @@ def write_whole(path: Path, data: bytes) -> None:
         other = sentence(
             "write.other-reason",
             "{reason}. Choose another folder or name.",
-            reason=_strerror(error),
+            reason=strerror(error),
         )
         raise FileError(
             sentence(
@@ -203,7 +203,7 @@ def unreadable(path: Path, what: Sentence, error: OSError) -> FileError:
             "read and that its disk is connected.",
             what=what,
             path=printable(str(path)),
-            reason=_strerror(error),
+            reason=strerror(error),
         )
     )
 
@@ -228,7 +228,7 @@ def sha256(path: Path) -> str:
                 "The file {path} cannot be read: {reason}. Check the name and that it "
                 "is yours to read.",
                 path=printable(str(path)),
-                reason=_strerror(error),
+                reason=strerror(error),
             )
         ) from error
 
@@ -247,6 +247,11 @@ def quoted(text: str) -> str:
     """Return the start of a file's content in quotes, fit to be shown to the user."""
     start = text[:EXCERPT_LENGTH]
     return f'"{printable(start)}{"..." if len(text) > len(start) else ""}"'
+
+
+def strerror(error: OSError) -> str:
+    """Return what the system says of an error."""
+    return error.strerror or type(error).__name__
 
 
 def _check_readable(
@@ -326,7 +331,3 @@ def _replace(target: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
-
-
-def _strerror(error: OSError) -> str:
-    return error.strerror or type(error).__name__

@@ -23,6 +23,7 @@ from lightpen.sentences import Sentence, sentence
 
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
+IMAGE_FILE = sentence("file.image", "image")
 MAX_FILE_SIZE = 512_000_000  # bytes
 MAX_PIXELS = 200_000_000
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
@@ -114,9 +115,7 @@ def read_image(path: Path) -> Image:
     FileError
         The file is missing, empty, too large, damaged or no image.
     """
-    return decode_image(
-        read_bytes(path, sentence("file.image", "image"), MAX_FILE_SIZE), path.name
-    )
+    return decode_image(read_bytes(path, IMAGE_FILE, MAX_FILE_SIZE), path.name)
 
 
 def decode_image(data: bytes, name: str) -> Image:

@@ -41,6 +41,7 @@ from lightpen.model.pen import (
 )
 from lightpen.sentences import Sentence, sentence
 
+PEN_FILE = sentence("file.pen", "pen file")
 PEN_FILE_LIMIT = MEGABYTE
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
 LARGEST_DIAMETER = 100.0  # mm
@@ -258,7 +259,7 @@ def _read(path: Path, units: str | None) -> _Content:
                 known=", ".join(UNITS),
             )
         )
-    text = read_text(path, sentence("file.pen", "pen file"), PEN_FILE_LIMIT)
+    text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)
     name = printable(path.name)
     if text.lstrip().startswith(("{", "[")):
         return _from_json(parse_json(text, name), units, name)
@@ -330,7 +331,7 @@ def _agreed_unit(stated: str, given: str | None, name: str) -> str:
             sentence(
                 "pen-file.no-units",
                 "{name} does not say which units its coordinates have. Name them, "
-                "such as mm, or in the header: led,x_mm,y_mm,z_mm.",
+                "or write them into the header: led,x_mm,y_mm,z_mm.",
                 name=name,
             )
         )

@@ -36,6 +36,7 @@ from lightpen.detection.sighting import Sighting, look
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import LightpenError
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import sentence
 from lightpen.swing.capture import capture_image
 from lightpen.swing.rules import Transition, finish, pause, resume
 from lightpen.swing.state import (
@@ -48,9 +49,10 @@ from lightpen.swing.state import (
 
 LONGEST_WAIT = 0.1  # s, after which wishes are served at the latest
 CAPTURE_ENDS = (Phase.SOLVING, Phase.VERDICT)
-CRASH_SENTENCE = (
+CRASHED = sentence(
+    "looking.crashed",
     "The program made a mistake of its own and looks at no more images. Open the "
-    "camera again."
+    "camera again.",
 )
 
 
@@ -242,7 +244,7 @@ class Live:
     def _give_up(self) -> None:
         """Tell of a bug and let go of the camera; the swing stays as it is."""
         self._has_crashed.set()
-        self._listener.on_camera(Failed(LightpenError(CRASH_SENTENCE)))
+        self._listener.on_camera(Failed(LightpenError(CRASHED)))
         self._serve_late()
         with suppress(DeviceLost):  # `stop` tells it
             self._worker.stop()

@@ -16,6 +16,7 @@ from lightpen.messages import (
     SOLVING,
     SWING_TO_SEAT,
     TOO_FAST,
+    Code,
     bad_fit,
     few_leds,
     starts_in,
@@ -86,6 +87,11 @@ def test_what_to_do_at_the_screen_is_told_there_alone() -> None:
     assert str(good) == "U (k = 2) of the tip is 0.0041 mm."
     assert phrase(good).hint == f"{good} Accept it at the screen."
     assert phrase(PAUSED).hint == "Press Space to go on."
+
+
+@pytest.mark.parametrize("code", list(Code))
+def test_every_message_has_a_few_words_to_be_read_from_afar(code: Code) -> None:
+    assert phrase(Sentence(code, "", {"seconds": 3})).short
 
 
 @pytest.mark.parametrize("message", DURING_A_SWING, ids=lambda each: each.code)

@@ -24,6 +24,7 @@ from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import IMAGES, Record, open_record
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
@@ -522,7 +523,7 @@ def test_what_fails_after_the_swing_was_abandoned_is_told(stage: Stage) -> None:
     live = stage.capture(1)
 
     def fail() -> None:
-        raise FileError("The disk is full.")
+        raise FileError(sentence("test.trouble", "The disk is full."))
 
     live.abandon(fail)
     stage.audience.wait_until(lambda: len(stage.audience.troubles) == 1)

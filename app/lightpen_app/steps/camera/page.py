@@ -21,6 +21,7 @@ from lightpen.errors import FileError
 from lightpen.simulator.hand import Doing
 from lightpen.swing.preparation import CameraFile, Lack, SourceChoice
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
@@ -225,7 +226,7 @@ class CameraPage(Rearranged, Page):
         try:
             self._workbench.use_sample_files()
         except FileError as error:
-            self._intrinsics.set_problem(str(error))
+            self._intrinsics.set_problem(worded(error.sentence))
 
     def _on_mask_requested(self, circles: FloatArray) -> None:
         now = self._workbench.preparation

@@ -15,6 +15,7 @@ from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
 from lightpen.pen_check.match import PenMatch
 from lightpen.swing.preparation import PenFile, SourceKind
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
@@ -213,8 +214,8 @@ class LedsPage(Rearranged, Page):
         in_use = None if self._is_pending else self._in_use
         self._check = check_draft(draft, None if in_use is None else in_use.pen)
         frame = self._check.frame
-        self._table.set_flaw(self._check.flaw)
-        self._file.set_problem("" if frame is None else frame.error)
+        self._table.set_flaw(worded(self._check.flaw))
+        self._file.set_problem("" if frame is None else worded(frame.error))
         self._match.set_has_frame(frame is None or not frame.error)
         preparation = self._workbench.preparation
         if preparation.has_unsaved_leds is not self._is_pending:
@@ -289,9 +290,9 @@ class LedsPage(Rearranged, Page):
                 self._file.set_problem("")
                 self._file.ask_units(path.name)
             else:
-                self._refuse(str(error))
+                self._refuse(worded(error.sentence))
         except FileError as error:
-            self._open_to_mend(path, units, str(error))
+            self._open_to_mend(path, units, worded(error.sentence))
         else:
             self._use(file)
 
@@ -325,7 +326,7 @@ class LedsPage(Rearranged, Page):
         try:
             self._workbench.use_sample_files()
         except FileError as error:
-            self._file.set_problem(str(error))
+            self._file.set_problem(worded(error.sentence))
         else:
             self._open_in_use()
 
@@ -337,7 +338,7 @@ class LedsPage(Rearranged, Page):
             write_pen(pen, path)
             file = PenFile.read(path)
         except LightpenError as error:
-            self._file.set_problem(str(error))
+            self._file.set_problem(worded(error.sentence))
             return
         self._use(file)
         words = self.tr("The LEDs are saved as {0} and in use.")

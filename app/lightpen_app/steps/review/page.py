@@ -163,7 +163,7 @@ class ReviewPage(Rearranged, Page):
         try:
             self._run.accept()
         except FileError as error:
-            self.notice_raised.emit(str(error))
+            self.notice_raised.emit(worded(error.sentence))
 
     @override
     def first_control(self) -> QWidget:
@@ -321,7 +321,7 @@ class ReviewPage(Rearranged, Page):
         try:
             return last_result(self._run.results_folder, names.pen, names.tip)
         except FileError as error:
-            self.notice_raised.emit(str(error))
+            self.notice_raised.emit(worded(error.sentence))
             return None
 
     def _refresh_words(self) -> None:
@@ -383,7 +383,7 @@ class ReviewPage(Rearranged, Page):
         try:
             self._run.set_aside()
         except FileError as error:
-            self.notice_raised.emit(str(error))
+            self.notice_raised.emit(worded(error.sentence))
             return
         self.step_requested.emit("swing")
 

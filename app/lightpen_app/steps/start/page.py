@@ -24,6 +24,7 @@ from lightpen.swing.preparation import (
 )
 from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import PARTED, shortened
@@ -354,7 +355,7 @@ class StartPage(Rearranged, Page):
         try:
             self._workbench.run.go_on(swing)
         except LightpenError as error:
-            self.notice_raised.emit(str(error))
+            self.notice_raised.emit(worded(error.sentence))
             return
         self.step_requested.emit("swing")
 

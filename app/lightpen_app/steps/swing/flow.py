@@ -6,6 +6,7 @@ from lightpen.cameras.worker import Connection
 from lightpen.errors import FileError, LightpenError
 from lightpen.swing.state import Pause
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.workbench import Workbench
 
 
@@ -104,7 +105,7 @@ class SwingFlow(QObject):
             else:
                 self._run.abandon()
         except FileError as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
             return
         self._refusal = ""
         self._go_on()
@@ -140,7 +141,7 @@ class SwingFlow(QObject):
         try:
             self._run.begin(self._workbench.preparation)
         except LightpenError as error:
-            self._refusal = str(error)
+            self._refusal = worded(error.sentence)
             self.troubled.emit(self._refusal)
             self.changed.emit()
             return
