@@ -15,7 +15,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 TRANSLATIONS = ROOT / "resources" / "lightpen_resources" / "translations"
-SOURCES = (ROOT / "app" / "lightpen_app", ROOT / "core" / "lightpen")
+APPLICATION = ROOT / "app" / "lightpen_app"
+CORE = ROOT / "core" / "lightpen"
+COMMAND_LINE = CORE / "cli.py"  # speaks English
 CORE_CONTEXT = "core"
 OPTIONS = {
     "lightpen_zh_CN.ts": [],
@@ -26,23 +28,23 @@ OPTIONS = {
 def main() -> None:
     """Update and compile every translation."""
     for name, options in OPTIONS.items():
-        collect(TRANSLATIONS / name, SOURCES, options)
+        collect(TRANSLATIONS / name, APPLICATION, CORE, options)
         compile_ts(TRANSLATIONS / name, TRANSLATIONS)
 
 
 def collect(
-    ts_file: Path, folders: Iterable[Path], options: Sequence[str] = ()
+    ts_file: Path, application: Path, core: Path, options: Sequence[str] = ()
 ) -> None:
-    """Add the texts of folders of Python files to a translation."""
-    sources = [path for folder in folders for path in sorted(folder.rglob("*.py"))]
+    """Add the texts of an application and its core to a translation."""
+    sources = sorted(application.rglob("*.py"))
     # Line numbers would change the file with every edit of the program.
     fixed = ["-locations", "none", "-no-obsolete", "-source-language", "en"]
     language = ts_file.stem.partition("_")[2]
     target = ["-target-language", language, "-ts", str(ts_file)]
     with tempfile.TemporaryDirectory() as scratch:
-        core = Path(scratch) / "core.py"
-        core.write_text(_marked(sources), "utf-8")
-        _run("lupdate", *fixed, *options, *map(str, [*sources, core]), *target)
+        marked = Path(scratch) / "core.py"
+        marked.write_text(_marked([*sources, *core.rglob("*.py")]), "utf-8")
+        _run("lupdate", *fixed, *options, *map(str, [*sources, marked]), *target)
 
 
 def templates(source: str) -> Iterator[str]:
@@ -65,7 +67,12 @@ def compile_ts(ts_file: Path, folder: Path) -> Path:
 
 def _marked(sources: Iterable[Path]) -> str:
     """Return Python text in which lupdate finds the templates of sentences."""
-    found = {text for path in sources for text in templates(path.read_text("utf-8"))}
+    found = {
+        text
+        for path in sources
+        if path != COMMAND_LINE
+        for text in templates(path.read_text("utf-8"))
+    }
     return "".join(
         f"QCoreApplication.translate({CORE_CONTEXT!r}, {text!r})\n"
         for text in sorted(found)
