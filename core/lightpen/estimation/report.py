@@ -16,7 +16,7 @@ from lightpen.estimation.pivot import PivotFit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.coverage import DIRECTION_NAMES
-from lightpen.sentences import Sentence, Value, sentence
+from lightpen.sentences import Sentence, sentence
 
 METHODS = ("joint", "two-stage")
 
@@ -89,7 +89,7 @@ def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> s
             "dropped": dict(_dropped(calibration)),
         },
         "methods": _methods(calibration),
-        "warnings": [_told(warning) for warning in warnings_of(calibration)],
+        "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
@@ -298,16 +298,6 @@ def _dropped(calibration: Calibration) -> Counter[str]:
     return Counter(str(reason) for reason in calibration.reasons if reason)
 
 
-def _told(value: Value) -> Any:
-    """Return a sentence with its code and values, and these likewise."""
-    if isinstance(value, tuple):
-        return [_told(each) for each in value]
-    if not isinstance(value, Sentence):
-        return value
-    values = {name: _told(each) for name, each in value.values.items()}
-    return {"code": value.code, "text": str(value), "values": values}
-
-
 def _program() -> dict[str, str]:
     return {"name": "lightpen", "version": version("lightpen")}
 
@@ -433,7 +423,9 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return arrays as lists, and what is not a number as null."""
+    """Return arrays as lists, what is not a number as null, sentences with codes."""
+    if isinstance(value, Sentence):
+        value = {"code": value.code, "text": str(value), "values": value.values}
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):
