@@ -35,6 +35,7 @@ from lightpen.live.sources import Surroundings
 from lightpen.record.names import Names
 from lightpen.record.results import Result, store_result
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
@@ -98,7 +99,7 @@ class StillCamera(SimulatedCamera):
     @override
     def read(self, timeout_s: float) -> NoReturn:
         Event().wait(timeout_s / 20)
-        raise FrameTimeout("No image was asked for.")
+        raise FrameTimeout(sentence("screens.no-image", "No image was asked for."))
 
 
 class Stage:

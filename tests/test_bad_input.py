@@ -555,10 +555,21 @@ def test_a_bad_pen_file_is_refused_by_name(
         (swap(5, 8), ["LEDs 5 and 8"]),
         (scale(1e-3, 1e-3, 1e-3), ["metres", "--units m"]),
         (scale(-1, 1, 1), ["mirrored", "in x"]),
+        (scale(-1, -1, 1), ["in the pen frame", r"lightpen pen RAW\.csv OUT\.csv"]),
         (rows(lambda table: table.reverse()), ["order"]),
         (rows(lambda table: table.append(table[-1])), ["LED 10"]),
     ],
-    ids=["empty", "letter", "back", "columns", "metres", "mirror", "order", "twice"],
+    ids=[
+        "empty",
+        "letter",
+        "back",
+        "columns",
+        "metres",
+        "mirror",
+        "turned",
+        "order",
+        "twice",
+    ],
 )
 def test_what_is_wrong_with_a_pen_file_is_said(
     edit: Edit, words: list[str], swing: Swing, lightpen: Run, tmp_path: Path
@@ -654,13 +665,15 @@ def test_a_pen_file_without_units_is_refused_and_asks_for_them(
     bare = "\n".join(",".join(line.split(",")[:4]) for line in text.splitlines()[1:])
     for content in (bare, "led,x,y,z\n" + bare):
         file.write_text(content, encoding="utf-8")
-        assert_refused(swing.calibrate(lightpen, pen=file), r"bad-pen\.csv", "unit")
+        outcome = swing.calibrate(lightpen, pen=file)
+        assert_refused(outcome, r"bad-pen\.csv", "unit", "--units mm")
 
 
 def test_units_that_contradict_the_pen_file_are_refused(
     swing: Swing, lightpen: Run
 ) -> None:
-    assert_refused(swing.calibrate(lightpen, "--units", "m"), "unit| mm|metre")
+    outcome = swing.calibrate(lightpen, "--units", "m")
+    assert_refused(outcome, "lengths in mm", "--units")
 
 
 BAD_CENTERS: dict[str, Edit] = {

@@ -21,10 +21,12 @@ from PySide6.QtWidgets import QApplication
 from lightpen.errors import LightpenError, UsageError
 from lightpen.estimation.report import calibration_text
 from lightpen.live.sources import Surroundings
+from lightpen.sentences import sentence
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
@@ -89,7 +91,7 @@ class Wizard(QObject):
         try:
             self._settings.set_preferences(preferences)
         except LightpenError as error:
-            self.window.show_notice(str(error))
+            self.window.show_notice(worded(error.sentence))
         self._sounds.muted = preferences.muted
         if preferences.language is not before.language:
             self._languages.set_language(preferences.language)
@@ -121,8 +123,11 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
     """
     if not has_display():
         raise UsageError(
-            "There is no display to open a window on. Start the program at a screen, "
-            "or give a command; lightpen --help lists them."
+            sentence(
+                "application.no-display",
+                "There is no display to open a window on. Start the program at a "
+                "screen, or give a command; lightpen --help lists them.",
+            )
         )
     application = make_application(arguments)
     with EndSignals(application) as signals:

@@ -47,11 +47,22 @@ from lightpen.record.reading import (
     unacknowledged_images,
 )
 from lightpen.record.solving import record_inputs, solve_record
+from lightpen.sentences import Sentence, sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 MAX_NAMED = 3  # images; of more the first is named
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
+# What to type about what the core says, by its codes.
+ADVICE = {
+    "pen-file.no-units": "Name them so: --units mm.",
+    "pen-file.contradicting-units": "It is given by --units.",
+    "pen.too-large": "Name them so: --units um.",
+    "pen.too-small": "Name them so: --units m.",
+    "pen.not-in-frame": "That is done by: lightpen pen RAW.csv OUT.csv.",
+    "pen.neither-framed-nor-handed": "That is done by: lightpen pen RAW.csv OUT.csv.",
+    "images.ambiguous": "They are given by --centers FILE.csv.",
+}
 
 
 ShowWindow: TypeAlias = Callable[[bool], int]
@@ -84,15 +95,21 @@ def main(
     try:
         status = run(options)
     except CalibrationError as error:
-        print(f"lightpen: {error}", file=sys.stderr)
+        _complain(error.sentence)
         return NO_TIP
     except LightpenError as error:
-        print(f"lightpen: {error}", file=sys.stderr)
+        _complain(error.sentence)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("lightpen: stopped.", file=sys.stderr)
         return BAD_INPUT
     return status
+
+
+def _complain(trouble: Sentence) -> None:
+    """Print what is wrong, and what to type about it."""
+    advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
+    print("lightpen:", trouble, *advice, file=sys.stderr)
 
 
 def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
@@ -260,7 +277,12 @@ class _Calibrated:
 @_printing
 def _calibrate(options: argparse.Namespace) -> None:
     if bool(options.images) == (options.centers is not None):
-        raise UsageError("Give either IMAGES or --centers FILE.csv.")
+        raise UsageError(
+            sentence(
+                "cli.images-or-centers",
+                "Give either IMAGES or --centers FILE.csv.",
+            )
+        )
     _require_other_file(options.json, options.camera, options.pen, options.centers)
     if len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
@@ -285,8 +307,13 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     given = [name for name, value in own.items() if value is not None]
     if given:
         raise UsageError(
-            f"{folder} is the record of a swing, which brings its own. Leave out "
-            f"{', '.join(given)}."
+            sentence(
+                "cli.record-brings-its-own",
+                "{folder} is the record of a swing, which brings its own. Leave out "
+                "{options}.",
+                folder=str(folder),
+                options=", ".join(given),
+            )
         )
     record = open_record(folder)
     _require_other_file(options.json, *record_files(record))
@@ -305,32 +332,51 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
     if not names:
         return
     if len(names) == 1:
-        text = (
-            f"{names[0]} is in the folder but not in the journal; it was not "
-            "acknowledged and takes no part."
+        note = sentence(
+            "record.image-unacknowledged",
+            "{image} is in the folder but not in the journal; it was not acknowledged "
+            "and takes no part.",
+            image=names[0],
+        )
+    elif len(names) <= MAX_NAMED:
+        note = sentence(
+            "record.images-unacknowledged",
+            "{images} are in the folder but not in the journal; they were not "
+            "acknowledged and take no part.",
+            images=", ".join(names),
         )
     else:
-        which = (
-            ", ".join(names)
-            if len(names) <= MAX_NAMED
-            else f"{len(names)} images, the first {names[0]},"
+        note = sentence(
+            "record.many-images-unacknowledged",
+            "{n_images} images, the first {first}, are in the folder but not in the "
+            "journal; they were not acknowledged and take no part.",
+            n_images=len(names),
+            first=names[0],
         )
-        text = (
-            f"{which} are in the folder but not in the journal; they were not "
-            "acknowledged and take no part."
-        )
-    print(f"lightpen: {text}", file=sys.stderr)
+    print("lightpen:", note, file=sys.stderr)
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
     """Return that an option is missing, and why the images are not a record."""
     missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
     if not missing:
-        return UsageError(f"{option} FILE is missing. Only a record needs none.")
+        return UsageError(
+            sentence(
+                "cli.option-missing",
+                "{option} FILE is missing. Only a record needs none.",
+                option=option,
+            )
+        )
     return UsageError(
-        f"{option} FILE is missing. Only a record needs none, and {images[0]} is not a "
-        f"whole one: it lacks {', '.join(missing)}. Restore what it lacks from a copy, "
-        "or give --camera FILE and --pen FILE."
+        sentence(
+            "cli.part-of-record-missing",
+            "{option} FILE is missing. Only a record needs none, and {folder} is "
+            "not a whole one: it lacks {missing}. Restore what it lacks from a "
+            "copy, or give --camera FILE and --pen FILE.",
+            option=option,
+            folder=images[0],
+            missing=", ".join(missing),
+        )
     )
 
 
@@ -417,8 +463,12 @@ def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
     for path in inputs:
         if path is not None and path.resolve() == record.resolve():
             raise UsageError(
-                f"--json {record} would replace the input file of that name. Give the "
-                "record another name."
+                sentence(
+                    "cli.json-over-input",
+                    "--json {record} would replace the input file of that name. "
+                    "Give the record another name.",
+                    record=str(record),
+                )
             )
 
 

@@ -12,10 +12,8 @@ class LightpenError(Exception):
         What was found, what is needed and what to do.
     """
 
-    def __init__(self, sentence: Sentence | str) -> None:
+    def __init__(self, sentence: Sentence) -> None:
         super().__init__(sentence)
-        if isinstance(sentence, str):
-            sentence = Sentence("", "{text}", {"text": sentence})
         self.sentence = sentence
 
 

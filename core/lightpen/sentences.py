@@ -6,14 +6,12 @@ chosen, and puts the same values in. A sentence names no command and no button, 
 shown by both: who shows it may add what to do there, by its code.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias, Union
 
 Value: TypeAlias = Union[str, int, float, "Sentence", tuple["Sentence", ...]]
 Translate: TypeAlias = Callable[[str], str]
-
-COMMA = ", "  # between the sentences or words of one value
 
 
 def in_english(template: str) -> str:
@@ -50,6 +48,14 @@ class Sentence:
         words = {name: _worded(value, translate) for name, value in self.values.items()}
         return translate(self.template).format(**words)
 
+    def parts(self) -> Iterator["Sentence"]:
+        """Return the sentence and all that are in it."""
+        yield self
+        for value in self.values.values():
+            for each in value if isinstance(value, tuple) else (value,):
+                if isinstance(each, Sentence):
+                    yield from each.parts()
+
     def __str__(self) -> str:
         return self.text()
 
@@ -59,9 +65,12 @@ def sentence(code: str, template: str, /, **values: Value) -> Sentence:
     return Sentence(code, template, values)
 
 
+COMMA = sentence("list.comma", ", ")  # between the sentences or words of one value
+
+
 def _worded(value: Value, translate: Translate) -> str | int | float:
     if isinstance(value, Sentence):
         return value.text(translate)
     if isinstance(value, tuple):
-        return translate(COMMA).join(each.text(translate) for each in value)
+        return COMMA.text(translate).join(each.text(translate) for each in value)
     return value

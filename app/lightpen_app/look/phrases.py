@@ -1,8 +1,7 @@
 """The words for what the core says in codes, in the language that is chosen."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,14 +9,15 @@ from PySide6.QtCore import QCoreApplication
 
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.verdict import Grade
-from lightpen.messages import Argument, Code, Message
+from lightpen.messages import MOST_SIDES, SIDES, Code
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
 from lightpen.model.posture import Posture
+from lightpen.sentences import COMMA, Sentence
 from lightpen.swing.preparation import Lack
 from lightpen.swing.state import Pause, Phase
+from lightpen_app.look.sentences import worded
 
 CONTEXT = "phrases"
-MANY_SIDES = 4  # of eight; more are not told one by one
 WORTH_A_TURN = math.radians(15)  # about the pen's own axis, to be told of
 
 if TYPE_CHECKING:
@@ -45,179 +45,41 @@ class Phrase:
 
 
 # lupdate finds the texts by this macro.
-_PHRASES: dict[Code, tuple[str, str]] = {
-    Code.SHOW_PEN: (
-        QT_TRANSLATE_NOOP("phrases", "Show the pen"),
-        QT_TRANSLATE_NOOP("phrases", "Hold it so that the camera sees its LEDs."),
-    ),
-    Code.SEAT_TIP: (
-        QT_TRANSLATE_NOOP("phrases", "Seat the tip"),
-        QT_TRANSLATE_NOOP("phrases", "Press the tip into the cone and keep it there."),
-    ),
-    Code.SWING_TO_SEAT: (
-        QT_TRANSLATE_NOOP("phrases", "Seat and swing"),
-        QT_TRANSLATE_NOOP(
-            "phrases", "Press the tip into the cone and swing the pen gently."
-        ),
-    ),
-    Code.HOLD_STILL: (
-        QT_TRANSLATE_NOOP("phrases", "Seated"),
-        QT_TRANSLATE_NOOP("phrases", "The tip rests in the cone. Keep it pressed in."),
-    ),
-    Code.STARTS_IN: (
-        QT_TRANSLATE_NOOP("phrases", "Starts in {0}"),
-        QT_TRANSLATE_NOOP("phrases", "Keep the tip pressed into the cone."),
-    ),
-    Code.LEAN_TO_YOUR_RIGHT: (
-        QT_TRANSLATE_NOOP("phrases", "Lean RIGHT"),
-        QT_TRANSLATE_NOOP(
-            "phrases", "To YOUR right: it tells the program where you stand."
-        ),
-    ),
-    Code.FOLLOW_ARROW: (
-        QT_TRANSLATE_NOOP("phrases", "Follow the arrow"),
-        QT_TRANSLATE_NOOP("phrases", "Keep the tip pressed into the cone."),
-    ),
-    Code.FEW_LEDS: (
-        QT_TRANSLATE_NOOP("phrases", "Show the LEDs"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "LEDs seen: {0}, needed: {1}. A finger may cover them; or lean back a "
-            "little.",
-        ),
-    ),
-    Code.TOO_FAST: (
-        QT_TRANSLATE_NOOP("phrases", "Slower"),
-        QT_TRANSLATE_NOOP("phrases", "The LEDs are smeared. Swing the pen slowly."),
-    ),
-    Code.BAD_FIT: (
-        QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "{0} px in this image, {1} px in the others. A finger or a reflection may "
-            "cover part of an LED.",
-        ),
-    ),
-    Code.TIP_SLIPPED: (
-        QT_TRANSLATE_NOOP("phrases", "Tip slipped"),
-        QT_TRANSLATE_NOOP(
-            "phrases", "Images dropped: {0}. Press the tip into the cone again."
-        ),
-    ),
-    Code.PEN_LOST: (
-        QT_TRANSLATE_NOOP("phrases", "Pen not seen"),
-        QT_TRANSLATE_NOOP(
-            "phrases", "Turn its LEDs to the camera; nothing is lost meanwhile."
-        ),
-    ),
-    Code.PEN_LIFTED: (
-        QT_TRANSLATE_NOOP("phrases", "Paused"),
-        QT_TRANSLATE_NOOP("phrases", "The pen is lifted. Put the tip back to go on."),
-    ),
-    Code.TIP_ELSEWHERE: (
-        QT_TRANSLATE_NOOP("phrases", "Tip not in place"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "It rests {0} mm from where it was. Put it back into the cone; check that "
-            "the cone is clamped.",
-        ),
-    ),
-    Code.PAUSED: (
-        QT_TRANSLATE_NOOP("phrases", "Paused"),
-        QT_TRANSLATE_NOOP("phrases", "Press Space to go on."),
-    ),
-    Code.SOLVING: (
-        QT_TRANSLATE_NOOP("phrases", "Captured"),
-        QT_TRANSLATE_NOOP("phrases", "The tip is being computed. Put the pen down."),
-    ),
-    Code.TOO_FEW_IMAGES: (
-        QT_TRANSLATE_NOOP("phrases", "More images"),
-        QT_TRANSLATE_NOOP("phrases", "Images kept: {0} of at least {1}."),
-    ),
-    Code.TOO_LITTLE_TILT: (
-        QT_TRANSLATE_NOOP("phrases", "Lean further"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "Too little tilt {1}. Lean the pen further that way. Images still "
-            "needed: about {0}.",
-        ),
-    ),
-    Code.NOT_UPRIGHT: (
-        QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
-        QT_TRANSLATE_NOOP("phrases", "Images of the upright pen still needed: {0}."),
-    ),
-    Code.UNKNOWN: (
-        QT_TRANSLATE_NOOP("phrases", "Not known yet"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "The images do not tell yet where the tip is. Lean the pen to all sides.",
-        ),
-    ),
-    Code.UNCERTAIN: (
-        QT_TRANSLATE_NOOP("phrases", "Not certain enough"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "U (k = 2) of the tip is {0} mm, the limit {1} mm. Capture more images in "
-            "postures that differ.",
-        ),
-    ),
-    Code.HALVES_DIFFER: (
-        QT_TRANSLATE_NOOP("phrases", "Halves differ"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "Odd and even images put the tip {0} mm apart, {1} mm is usual. The tip "
-            "may have moved: repeat the swing with the tip pressed in.",
-        ),
-    ),
-    Code.MANY_DROPPED: (
-        QT_TRANSLATE_NOOP("phrases", "Many images dropped"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "{0} of {1} images do not take part. Review has their reasons; repeat the "
-            "swing if the tip slipped.",
-        ),
-    ),
-    Code.LEDS_OFF: (
-        QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "The LED file is off by {0} mm a coordinate, which alone makes U (k = 2) "
-            "{1} mm. Is this the LED file of this pen? More images hardly help.",
-        ),
-    ),
-    Code.LED_DISPLACED: (
-        QT_TRANSLATE_NOOP("phrases", "LED out of place"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "LED {0} sits {1} mm off its place in the LED file. Is this the LED file "
-            "of this pen?",
-        ),
-    ),
-    Code.LEDS_MISFIT: (
-        QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-        QT_TRANSLATE_NOOP(
-            "phrases",
-            "The residuals are {0} px, {1} px or less is usual. Is this the LED file "
-            "of this pen, and the intrinsics file of this camera and lens?",
-        ),
-    ),
-    Code.NO_TIP: (QT_TRANSLATE_NOOP("phrases", "No tip found"), "{0}"),
-    Code.GOOD: (
-        QT_TRANSLATE_NOOP("phrases", "Good"),
-        QT_TRANSLATE_NOOP(
-            "phrases", "U (k = 2) of the tip is {0} mm. Accept it at the screen."
-        ),
-    ),
+_SHORTS: dict[Code, str] = {
+    Code.SHOW_PEN: QT_TRANSLATE_NOOP("phrases", "Show the pen"),
+    Code.SEAT_TIP: QT_TRANSLATE_NOOP("phrases", "Seat the tip"),
+    Code.SWING_TO_SEAT: QT_TRANSLATE_NOOP("phrases", "Seat and swing"),
+    Code.HOLD_STILL: QT_TRANSLATE_NOOP("phrases", "Seated"),
+    Code.STARTS_IN: QT_TRANSLATE_NOOP("phrases", "Starts in {seconds}"),
+    Code.LEAN_TO_YOUR_RIGHT: QT_TRANSLATE_NOOP("phrases", "Lean RIGHT"),
+    Code.FOLLOW_ARROW: QT_TRANSLATE_NOOP("phrases", "Follow the arrow"),
+    Code.FEW_LEDS: QT_TRANSLATE_NOOP("phrases", "Show the LEDs"),
+    Code.TOO_FAST: QT_TRANSLATE_NOOP("phrases", "Slower"),
+    Code.BAD_FIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+    Code.TIP_SLIPPED: QT_TRANSLATE_NOOP("phrases", "Tip slipped"),
+    Code.PEN_LOST: QT_TRANSLATE_NOOP("phrases", "Pen not seen"),
+    Code.PEN_LIFTED: QT_TRANSLATE_NOOP("phrases", "Paused"),
+    Code.TIP_ELSEWHERE: QT_TRANSLATE_NOOP("phrases", "Tip not in place"),
+    Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Paused"),
+    Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Captured"),
+    Code.TOO_FEW_IMAGES: QT_TRANSLATE_NOOP("phrases", "More images"),
+    Code.TOO_LITTLE_TILT: QT_TRANSLATE_NOOP("phrases", "Lean further"),
+    Code.NOT_UPRIGHT: QT_TRANSLATE_NOOP("phrases", "Hold it upright"),
+    Code.UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Not known yet"),
+    Code.UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Not certain enough"),
+    Code.HALVES_DIFFER: QT_TRANSLATE_NOOP("phrases", "Halves differ"),
+    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "Many images dropped"),
+    Code.LEDS_OFF: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+    Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED out of place"),
+    Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+    Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
+    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),
 }
-_DECIMALS: dict[Code, tuple[int, ...]] = {
-    Code.BAD_FIT: (3, 3),
-    Code.TIP_ELSEWHERE: (2,),
-    Code.UNCERTAIN: (4, 4),
-    Code.HALVES_DIFFER: (4, 4),
-    Code.LEDS_OFF: (3, 4),
-    Code.LED_DISPLACED: (0, 2),
-    Code.LEDS_MISFIT: (2, 2),
-    Code.GOOD: (4,),
+# What to do at the screen; the core's own sentence stands in the braces.
+_AT_THE_SCREEN: dict[Code, str] = {
+    Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to go on."),
+    Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} Review has their reasons."),
+    Code.GOOD: QT_TRANSLATE_NOOP("phrases", "{0} Accept it at the screen."),
 }
 _LACKS: dict[Lack, str] = {
     Lack.STATION: QT_TRANSLATE_NOOP("phrases", "Enter the name of the station."),
@@ -237,19 +99,6 @@ _LACKS: dict[Lack, str] = {
     Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
         "phrases", "Save or discard the changes of the LED table."
     ),
-}
-_REASONS: dict[Reason, str] = {
-    Reason.NONE: "",
-    Reason.UNREADABLE: QT_TRANSLATE_NOOP("phrases", "unreadable"),
-    Reason.WRONG_SIZE: QT_TRANSLATE_NOOP("phrases", "wrong size"),
-    Reason.EMPTY: QT_TRANSLATE_NOOP("phrases", "no LED seen"),
-    Reason.BLURRED: QT_TRANSLATE_NOOP("phrases", "blurred"),
-    Reason.TOO_FEW_LEDS: QT_TRANSLATE_NOOP("phrases", "too few LEDs"),
-    Reason.NOT_THE_PEN: QT_TRANSLATE_NOOP("phrases", "spots do not fit the pen"),
-    Reason.AMBIGUOUS: QT_TRANSLATE_NOOP("phrases", "ambiguous"),
-    Reason.MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
-    Reason.SLIPPED: QT_TRANSLATE_NOOP("phrases", "tip slipped"),
-    Reason.TAKEN_OUT: QT_TRANSLATE_NOOP("phrases", "taken out"),
 }
 # A word for a sign to stand beside, read from a distance.
 _PHASES: dict[Phase, str] = {
@@ -302,24 +151,25 @@ _SIDES = (
 )
 
 
-def phrase(message: Message, heading: float | None = None) -> Phrase:
+def phrase(message: Sentence, heading: float | None = None) -> Phrase:
     """Return the words of a message.
 
     Parameters
     ----------
-    message : Message
+    message : Sentence
+        One of `lightpen.messages`.
     heading : float, optional
-        The operator's right as the camera sees it, rad; without it directions are
-        told as from behind the camera.
+        The operator's right as the camera sees it, rad; without it sides are told as
+        the camera sees them.
     """
-    short, hint = map(_translated, _PHRASES[message.code])
-    arguments = list(message.arguments)
-    if message.code is Code.TOO_LITTLE_TILT:
-        n_images, *directions = arguments
-        sides = sides_text((int(each) for each in directions), heading)
-        arguments = [n_images, sides]
-    words = _formatted(message.code, arguments)
-    return Phrase(short.format(*words), hint.format(*words))
+    code = Code(message.code)
+    if code is Code.TOO_LITTLE_TILT and heading is not None:
+        message = _by_own_sides(message, heading)
+    short = _translated(_SHORTS[code]).format(**message.values)
+    hint = worded(message)
+    if code in _AT_THE_SCREEN:
+        hint = _translated(_AT_THE_SCREEN[code]).format(hint)
+    return Phrase(short, hint)
 
 
 def lean_phrase(target: Posture, present: Posture | None, heading: float) -> Phrase:
@@ -347,20 +197,6 @@ def lean_phrase(target: Posture, present: Posture | None, heading: float) -> Phr
     return Phrase(short, _translated(hint))
 
 
-def sides_text(directions: Iterable[int], heading: float | None = None) -> str:
-    """Return where directions of the dial (0 to 7, camera's view) lie for the operator.
-
-    See `phrase` for ``heading``.
-    """
-    turned = round((heading or 0.0) / (2 * math.pi / N_DIRECTIONS))
-    directions = set(directions)
-    if len(directions) > MANY_SIDES:
-        return _translated(QT_TRANSLATE_NOOP("phrases", "to most sides"))
-    sides = sorted((direction - turned) % N_DIRECTIONS for direction in directions)
-    comma = _translated(QT_TRANSLATE_NOOP("phrases", ", "))
-    return comma.join(_translated(_SIDES[side]) for side in sides)
-
-
 def n_images_text(n_images: int) -> str:
     """Return how many images, such as "12 images"."""
     if n_images == 1:
@@ -376,7 +212,7 @@ def lack_text(lack: Lack) -> str:
 
 def reason_text(reason: Reason) -> str:
     """Return why an image does not take part, a few words; empty for one that does."""
-    return _translated(_REASONS[reason])
+    return worded(reason.words) if reason else ""
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:
@@ -389,14 +225,17 @@ def grade_text(grade: Grade) -> str:
     return _translated(_GRADES[grade])
 
 
-def _formatted(code: Code, arguments: list[Argument]) -> list[str]:
-    decimals = _DECIMALS.get(code, ())
-    return [
-        f"{argument:.{decimals[i]}f}"
-        if i < len(decimals) and isinstance(argument, int | float)
-        else str(argument)
-        for i, argument in enumerate(arguments)
-    ]
+def _by_own_sides(message: Sentence, heading: float) -> Sentence:
+    """Tell sides as the operator has them who sees the camera's right at an angle."""
+    sides = message.values["sides"]
+    if sides == MOST_SIDES:
+        return message
+    assert isinstance(sides, tuple)
+    turned = round(heading / (2 * math.pi / N_DIRECTIONS))
+    own = sorted((SIDES.index(side) - turned) % N_DIRECTIONS for side in sides)
+    comma = worded(COMMA)
+    words = comma.join(_translated(_SIDES[side]) for side in own)
+    return replace(message, values={**message.values, "sides": words})
 
 
 def _translated(text: str) -> str:

@@ -8,6 +8,8 @@ from typing import TypeAlias
 from PySide6.QtCore import QObject, QThreadPool, Signal
 
 from lightpen.errors import Cancelled, LightpenError
+from lightpen.sentences import Sentence
+from lightpen_app.look.sentences import worded
 
 Report: TypeAlias = Callable[[float], None]
 
@@ -27,7 +29,7 @@ class Job(QObject):
     succeeded(object)
         What the function returned.
     failed(str)
-        Text for the user.
+        Text for the user, in the language that is chosen.
     crashed()
         It ended by a bug, without an outcome.
     ended()
@@ -40,7 +42,7 @@ class Job(QObject):
     crashed = Signal()
     ended = Signal()
     _returned = Signal(object)
-    _refused = Signal(str)
+    _refused = Signal(object)
     _broke = Signal()
     _finished = Signal()
 
@@ -75,7 +77,7 @@ class Job(QObject):
         except Cancelled:
             tell = _tell_nothing
         except LightpenError as error:
-            tell = partial(self._refused.emit, str(error))
+            tell = partial(self._refused.emit, error.sentence)
         finally:
             tell()
             self._finished.emit()
@@ -93,9 +95,9 @@ class Job(QObject):
         if not self._cancelled.is_set():
             self.succeeded.emit(result)
 
-    def _on_refused(self, text: str) -> None:
+    def _on_refused(self, why: Sentence) -> None:
         if not self._cancelled.is_set():
-            self.failed.emit(text)
+            self.failed.emit(worded(why))
 
     def _on_broke(self) -> None:
         if not self._cancelled.is_set():

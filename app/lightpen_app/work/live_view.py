@@ -30,6 +30,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
 from lightpen_app.look.pooling import pooled
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
 from lightpen_app.work.swing_run import SwingRun
 
@@ -191,7 +192,7 @@ class LiveView(QObject):
         try:
             live.stop()
         except DeviceLost as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
         else:
             teller.deleteLater()
 
@@ -207,9 +208,9 @@ class LiveView(QObject):
             case SettingsApplied(settings):
                 self.settings_applied.emit(settings)
             case Failed(error):
-                self.failed.emit(str(error))
+                self.failed.emit(worded(error.sentence))
             case Troubled(trouble):
-                self.troubled.emit(str(trouble))
+                self.troubled.emit(worded(trouble.sentence))
 
 
 class _Teller(QObject):

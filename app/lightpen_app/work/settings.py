@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.errors import FileError
 from lightpen.model.limits import SwingLimits
+from lightpen.sentences import sentence
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 
@@ -191,8 +192,12 @@ def data_folder() -> Path:
 
 def _cannot_be_saved(file: Path) -> FileError:
     return FileError(
-        f"The settings cannot be saved: {file} cannot be written. Make sure that its "
-        "folder is yours to write and that the disk is not full."
+        sentence(
+            "settings.unwritable",
+            "The settings cannot be saved: {file} cannot be written. Make sure that "
+            "its folder is yours to write and that the disk is not full.",
+            file=str(file),
+        )
     )
 
 

@@ -12,6 +12,7 @@ from lightpen.simulator.follower import Follower
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import SwingEvent
 from lightpen.swing.status import SwingStatus
+from lightpen_app.look.sentences import worded
 
 RECORDS, RESULTS = "records", "results"
 
@@ -133,7 +134,7 @@ class SwingRun(QObject):
         self.changed.emit()
 
     def _on_trouble_told(self, sentence: Sentence) -> None:
-        self.troubled.emit(str(sentence))
+        self.troubled.emit(worded(sentence))
 
     def _on_relief_told(self, sentence: Sentence) -> None:
-        self.relieved.emit(str(sentence))
+        self.relieved.emit(worded(sentence))

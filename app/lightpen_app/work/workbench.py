@@ -17,6 +17,7 @@ from lightpen.live.sources import Surroundings, camera_of, sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
@@ -203,7 +204,7 @@ class Workbench(QObject):
     def _on_files_read(self, opened: OpenedFiles) -> None:
         self._reading, self._unread = None, Station()
         for trouble in opened.troubles:
-            self.troubled.emit(str(trouble))
+            self.troubled.emit(worded(trouble))
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -260,7 +261,7 @@ class Workbench(QObject):
         try:
             self._settings.set_last_station(station)
         except LightpenError as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
 
     def _remember(self) -> None:
         now = self._preparation
@@ -298,7 +299,7 @@ class Workbench(QObject):
         try:
             self._settings.set_station(names.station, station)
         except LightpenError as error:
-            self.troubled.emit(str(error))
+            self.troubled.emit(worded(error.sentence))
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

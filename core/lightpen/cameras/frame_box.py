@@ -4,6 +4,7 @@ from collections import deque
 from threading import Condition, Lock
 
 from lightpen.cameras.protocol import EndOfImages, Frame, FrameTimeout
+from lightpen.sentences import sentence
 
 
 class FrameBox:
@@ -76,7 +77,11 @@ class FrameQueue:
             if self._is_ended:
                 raise EndOfImages
             raise FrameTimeout(
-                f"No image came for {timeout_s:.1f} s. Check the camera."
+                sentence(
+                    "camera.no-image-came",
+                    "No image came for {waited:.1f} s. Check the camera.",
+                    waited=timeout_s,
+                )
             )
 
     def clear(self) -> None:

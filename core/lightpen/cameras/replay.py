@@ -25,6 +25,7 @@ from lightpen.cameras.protocol import (
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
+from lightpen.sentences import Sentence, sentence
 
 FRAME_RATE = Range(0.1, inf)  # inf: as fast as asked
 USUAL_FRAME_RATE = 20.0
@@ -90,7 +91,7 @@ class ReplayCamera:
             source = self._find()
             first = _first_image(source, self._where)
         except FileError as error:
-            raise DeviceNotFound(str(error)) from error
+            raise DeviceNotFound(error.sentence) from error
         height, width = first.shape
         self._source = source
         self._caps = Caps(
@@ -114,8 +115,12 @@ class ReplayCamera:
             raise ValueError("`configure` needs a stopped camera.")
         if settings.pixel_format not in {None, pixel_format}:
             raise ConfigError(
-                f"The recorded images are {pixel_format}, not "
-                f"{settings.pixel_format}. Choose {pixel_format}."
+                sentence(
+                    "replay.pixel-format",
+                    "The recorded images are {found}, not {wanted}. Choose {found}.",
+                    found=pixel_format,
+                    wanted=settings.pixel_format,
+                )
             )
         if settings.frame_rate is not None:
             self._frame_rate = FRAME_RATE.nearest(settings.frame_rate)
@@ -123,11 +128,11 @@ class ReplayCamera:
 
     def set_exposure(self, exposure_us: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken("exposure")
+        raise _already_taken(sentence("camera.exposure", "exposure"))
 
     def set_gain(self, gain_db: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken("gain")
+        raise _already_taken(sentence("camera.gain", "gain"))
 
     def start(self) -> None:
         """Let images come from the first on; nothing if they do."""
@@ -179,8 +184,13 @@ class ReplayCamera:
             self._clock.wait(timeout_s)
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
             raise FrameTimeout(
-                f"The next image of {self._where} comes {wait_s - timeout_s:.1f} s "
-                "later. Wait, or replay the images faster."
+                sentence(
+                    "replay.later",
+                    "The next image of {place} comes {seconds:.1f} s later. Wait, "
+                    "or replay the images faster.",
+                    place=self._where,
+                    seconds=wait_s - timeout_s,
+                )
             )
         self._clock.wait(wait_s)
 
@@ -208,10 +218,14 @@ class ReplayCamera:
             self._n_unread += 1
             if self._is_gone():
                 raise DeviceLost(
-                    f"No image of {printable(self._where)} can be read any more. "
-                    "Connect its disk or put the images back, or choose others."
+                    sentence(
+                        "replay.lost",
+                        "No image of {place} can be read any more. Connect its disk "
+                        "or put the images back, or choose others.",
+                        place=printable(self._where),
+                    )
                 ) from error
-            raise FrameIncomplete(str(error)) from error
+            raise FrameIncomplete(error.sentence) from error
         self._n_unread = 0
         return Frame(
             image=sealed(image),
@@ -238,24 +252,48 @@ class ReplayCamera:
 def _first_image(source: ImageSource, where: str) -> Image:
     for loader in source.open():
         return loader()
-    raise FileError(f"{where} holds no images. Choose a recording that holds some.")
+    raise FileError(
+        sentence(
+            "replay.no-images",
+            "{place} holds no images. Choose a recording that holds some.",
+            place=where,
+        )
+    )
 
 
 def _check_like_first(image: Image, name: str, caps: Caps) -> None:
     height, width = image.shape
     if (width, height) != (caps.width, caps.height):
         raise FileError(
-            f"{name} is {width} x {height} px, the first image is {caps.width} x "
-            f"{caps.height} px. Replay only images of one camera together."
+            sentence(
+                "replay.other-size",
+                "{name} is {width} x {height} px, the first image is {first_width} "
+                "x {first_height} px. Replay only images of one camera together.",
+                name=name,
+                width=width,
+                height=height,
+                first_width=caps.width,
+                first_height=caps.height,
+            )
         )
     if f"Mono{8 * image.itemsize}" not in caps.pixel_formats:
         raise FileError(
-            f"{name} has {8 * image.itemsize} bits, the first image is "
-            f"{caps.pixel_formats[0]}. Replay only images of one camera together."
+            sentence(
+                "replay.other-depth",
+                "{name} has {bits} bits, the first image is {first}. Replay only "
+                "images of one camera together.",
+                name=name,
+                bits=8 * image.itemsize,
+                first=caps.pixel_formats[0],
+            )
         )
 
 
-def _already_taken(what: str) -> ConfigError:
+def _already_taken(what: Sentence) -> ConfigError:
     return ConfigError(
-        f"The {what} of recorded images cannot be changed. Choose a live camera."
+        sentence(
+            "replay.already-taken",
+            "The {what} of recorded images cannot be changed. Choose a live camera.",
+            what=what,
+        )
     )

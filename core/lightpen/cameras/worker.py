@@ -30,6 +30,7 @@ from lightpen.cameras.protocol import (
     Stats,
 )
 from lightpen.errors import LightpenError
+from lightpen.sentences import sentence
 
 N_QUEUED = 4  # frames of 5 MB; those that are lost when it is full, no swing misses
 QUIET_PERIODS = 3
@@ -180,8 +181,13 @@ class CameraWorker:
         self._thread.join(timeout_s)
         if self._thread.is_alive():
             raise DeviceLost(
-                f"The camera {self.serial} did not stop within {timeout_s:.0f} s. "
-                "Unplug it, and start the program again before you use it."
+                sentence(
+                    "camera.did-not-stop",
+                    "The camera {serial} did not stop within {waited:.0f} s. Unplug "
+                    "it, and start the program again before you use it.",
+                    serial=self.serial,
+                    waited=timeout_s,
+                )
             )
 
     def latest(self) -> Frame | None:
@@ -292,8 +298,13 @@ class CameraWorker:
             self._change(Connection.SILENT)
         if silence >= max(LONGEST_SILENCE, 2 * self._quiet_time()):
             raise DeviceLost(
-                f"The camera {self.serial} sent no image for {silence:.0f} s. Check "
-                "its cable and its power."
+                sentence(
+                    "camera.silent",
+                    "The camera {serial} sent no image for {silence:.0f} s. Check "
+                    "its cable and its power.",
+                    serial=self.serial,
+                    silence=silence,
+                )
             )
         self._camera.probe()
 
@@ -377,6 +388,11 @@ def is_too_slow(n_missed: int, n_offered: int) -> bool:
 
 def _too_slow(n_missed: int, n_offered: int) -> FramesSkipped:
     return FramesSkipped(
-        f"This computer is too slow: {n_missed} of {n_offered} images were not "
-        "measured. Close other programs, or the swing takes longer."
+        sentence(
+            "camera.too-slow",
+            "This computer is too slow: {n_missed} of {n_offered} images were not "
+            "measured. Close other programs, or the swing takes longer.",
+            n_missed=n_missed,
+            n_offered=n_offered,
+        )
     )

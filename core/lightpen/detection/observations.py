@@ -21,6 +21,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
+from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
@@ -59,10 +60,10 @@ class Observations:
         none is labelled, or only centres are given.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
-    details : tuple of str
-        A sentence on that, empty where the reason says all.
-    advice : str
-        What may be wrong with the set as a whole; empty when most images are labelled.
+    details : tuple of Sentence or None
+        More on that, where the reason does not say all.
+    advice : Sentence or None
+        What may be wrong with the set as a whole; None when most images are labelled.
     """
 
     names: tuple[str, ...]
@@ -72,8 +73,8 @@ class Observations:
     translations: FloatArray
     edge_widths: FloatArray
     reasons: tuple[Reason, ...]
-    details: tuple[str, ...]
-    advice: str = ""
+    details: tuple[Sentence | None, ...]
+    advice: Sentence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ class _Sighting:
 
     spots: Spots
     reason: Reason
-    detail: str
+    detail: Sentence | None = None
 
 
 def observe_images(
@@ -172,7 +173,7 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
         translations=translations,
         edge_widths=np.full(len(pixels), np.nan),
         reasons=tuple(reasons.tolist()),
-        details=("",) * len(pixels),
+        details=(None,) * len(pixels),
     )
 
 
@@ -212,16 +213,17 @@ def _detect(
     try:
         image = load()
     except FileError as error:
-        return _Sighting(NO_SPOTS, Reason.UNREADABLE, str(error))
+        return _Sighting(NO_SPOTS, Reason.UNREADABLE, error.sentence)
     height, width = image.shape
     if (width, height) != (camera.width, camera.height):
-        return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, f"{width} x {height} px")
+        size = sentence(
+            "image.size", "{width} x {height} px", width=width, height=height
+        )
+        return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, size)
     spots = detect_spots(image, mask)
     if len(spots) == 0:
-        return _Sighting(
-            spots, Reason.BLURRED if shows_smears(image) else Reason.EMPTY, ""
-        )
-    return _Sighting(spots, Reason.NONE, "")
+        return _Sighting(spots, Reason.BLURRED if shows_smears(image) else Reason.EMPTY)
+    return _Sighting(spots, Reason.NONE)
 
 
 def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]:
@@ -230,16 +232,31 @@ def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]
 
 def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
     if all(s.reason is Reason.UNREADABLE for s in sightings):
+        why = sightings[0].detail
+        assert why is not None
         raise FileError(
-            f"None of the {len(sightings)} images can be read. {sightings[0].detail}"
+            sentence(
+                "images.none-readable",
+                "None of the {n_images} images can be read. {why}",
+                n_images=len(sightings),
+                why=why,
+            )
         )
-    wrong = [s.detail for s in sightings if s.reason is Reason.WRONG_SIZE]
+    wrong = [s.detail for s in sightings if s.reason is Reason.WRONG_SIZE and s.detail]
     n_readable = sum(s.reason is not Reason.UNREADABLE for s in sightings)
     if 2 * len(wrong) > n_readable:
         raise FileError(
-            f"{len(wrong)} of {n_readable} images are {wrong[0]}, the camera file was "
-            f"made for {camera.width} x {camera.height} px. Choose the file for this "
-            "camera, or switch off binning and cropping."
+            sentence(
+                "images.other-size",
+                "{n_wrong} of {n_readable} images are {size}, the camera file was "
+                "made for {width} x {height} px. Choose the file for this camera, "
+                "or switch off binning and cropping.",
+                n_wrong=len(wrong),
+                n_readable=n_readable,
+                size=wrong[0],
+                width=camera.width,
+                height=camera.height,
+            )
         )
 
 
@@ -249,9 +266,16 @@ def _require_inside(pixels: FloatArray, camera: Camera) -> None:
     outside = np.any((points < -0.5) | (points > [camera.width, camera.height]), axis=1)
     if 2 * outside.sum() > len(points):
         raise FileError(
-            f"The LED centres reach to ({far[0]:.0f}, {far[1]:.0f}) px, the camera "
-            f"file was made for {camera.width} x {camera.height} px. Choose the file "
-            "for this camera."
+            sentence(
+                "centers.outside",
+                "The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file "
+                "was made for {width} x {height} px. Choose the file for this "
+                "camera.",
+                x=far[0],
+                y=far[1],
+                width=camera.width,
+                height=camera.height,
+            )
         )
 
 
@@ -289,26 +313,27 @@ def _assemble(
         edge_widths=edge_widths,
         reasons=reasons,
         details=tuple(s.detail for s in sightings),
-        advice="" if mostly_labelled else _advice(reasons, spots, camera, pen),
+        advice=None if mostly_labelled else _advice(reasons, spots, camera, pen),
     )
 
 
 def _advice(
     reasons: tuple[Reason, ...], spots: list[Spots], camera: Camera, pen: Pen
-) -> str:
+) -> Sentence | None:
     if 2 * reasons.count(Reason.AMBIGUOUS) > len(reasons):
-        return (
+        return sentence(
+            "images.ambiguous",
             "The LEDs of this pen look the same when it is turned or mirrored, so they "
-            "cannot be told apart. Move an LED, or give the LED centres with --centers."
+            "cannot be told apart. Move an LED, or give the LED centres.",
         )
     return diagnose(spots, camera, pen)
 
 
 def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:
     """Refuse a mirrored pen, of which only the asymmetric LEDs are not found."""
-    sentence = diagnose_mirror(spots, camera, pen)
-    if sentence:
-        raise CalibrationError(sentence)
+    mirrored = diagnose_mirror(spots, camera, pen)
+    if mirrored:
+        raise CalibrationError(mirrored)
 
 
 def _reason(sighting: _Sighting, label: Labels) -> Reason:

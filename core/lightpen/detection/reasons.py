@@ -2,6 +2,8 @@
 
 from enum import StrEnum
 
+from lightpen.sentences import Sentence, sentence
+
 
 class Reason(StrEnum):
     """Why an image does not take part in the calibration."""
@@ -17,3 +19,22 @@ class Reason(StrEnum):
     MISFIT = "LEDs do not fit"
     SLIPPED = "tip slipped"
     TAKEN_OUT = "taken out"  # by the user
+
+    @property
+    def words(self) -> Sentence:
+        """It in a few words; `NONE` has none."""
+        return _WORDS[self]
+
+
+_WORDS = {
+    Reason.UNREADABLE: sentence("reason.unreadable", "unreadable"),
+    Reason.WRONG_SIZE: sentence("reason.wrong-size", "wrong size"),
+    Reason.EMPTY: sentence("reason.empty", "no LED seen"),
+    Reason.BLURRED: sentence("reason.blurred", "blurred"),
+    Reason.TOO_FEW_LEDS: sentence("reason.too-few-leds", "too few LEDs"),
+    Reason.NOT_THE_PEN: sentence("reason.not-the-pen", "spots do not fit the pen"),
+    Reason.AMBIGUOUS: sentence("reason.ambiguous", "ambiguous"),
+    Reason.MISFIT: sentence("reason.misfit", "LEDs do not fit"),
+    Reason.SLIPPED: sentence("reason.slipped", "tip slipped"),
+    Reason.TAKEN_OUT: sentence("reason.taken-out", "taken out"),
+}

@@ -25,6 +25,7 @@ from lightpen.estimation.uncertainty import Budget, Halves, combine, compare_hal
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
 from lightpen.model.pen import Pen
+from lightpen.sentences import Sentence, sentence
 
 MIN_IMAGES = 6  # the paper starts from six
 MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
@@ -191,9 +192,14 @@ def _smeared(observations: Observations) -> BoolArray:
 def _require_fit(sigma: float) -> None:
     if sigma > MAX_SIGMA:
         raise CalibrationError(
-            f"The LED positions do not fit the images: {sigma:.1f} px, "
-            f"{USUAL_SIGMA} px or less is usual. Check that the pen file is of this "
-            "pen with its LEDs in order, and the camera file of this camera."
+            sentence(
+                "calibrate.leds-do-not-fit",
+                "The LED positions do not fit the images: {sigma:.1f} px, {usual} "
+                "px or less is usual. Check that the pen file is of this pen with "
+                "its LEDs in order, and the camera file of this camera.",
+                sigma=sigma,
+                usual=USUAL_SIGMA,
+            )
         )
 
 
@@ -205,17 +211,40 @@ def _fitting(poses: Poses) -> BoolArray:
 
 
 def _require_images(
-    chosen: IntArray, reasons: npt.NDArray[np.object_], advice: str
+    chosen: IntArray, reasons: npt.NDArray[np.object_], advice: Sentence | None
 ) -> None:
     if len(chosen) >= MIN_IMAGES:
         return
-    counts = [
-        f"{int(np.sum(reasons == reason))} {reason}"
+    left_out = tuple(
+        sentence(
+            "calibrate.images-of-a-reason",
+            "{n_images} {reason}",
+            n_images=int(np.sum(reasons == reason)),
+            reason=reason.words,
+        )
         for reason in Reason
         if reason and np.any(reasons == reason)
-    ]
-    found = f" (left out: {', '.join(counts)})" if counts else ""
+    )
+    usable = sentence(
+        "calibrate.images-usable",
+        "{n_usable} of {n_images} images are usable",
+        n_usable=len(chosen),
+        n_images=len(reasons),
+    )
+    if left_out:
+        usable = sentence(
+            "calibrate.images-left-out",
+            "{usable} (left out: {left_out})",
+            usable=usable,
+            left_out=left_out,
+        )
+    more = sentence("calibrate.capture-more", "Capture more images.")
     raise CalibrationError(
-        f"{len(chosen)} of {len(reasons)} images are usable{found}; the tip needs at "
-        f"least {MIN_IMAGES}. {advice or 'Capture more images.'}"
+        sentence(
+            "calibrate.too-few-images",
+            "{usable}; the tip needs at least {needed}. {advice}",
+            usable=usable,
+            needed=MIN_IMAGES,
+            advice=advice or more,
+        )
     )

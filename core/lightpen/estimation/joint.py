@@ -35,6 +35,7 @@ from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.sentences import sentence
 
 LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
 MIN_LEDS = 3  # in an image; fewer leave its rotation free
@@ -256,8 +257,12 @@ def _descend(
         if np.abs(step).max() < tolerance:
             return state
     raise CalibrationError(
-        f"The joint fit did not settle in {MAX_STEPS} steps. The images may not be of "
-        "this pen and camera: check both files."
+        sentence(
+            "joint.not-settled",
+            "The joint fit did not settle in {n_steps} steps. The images may not be "
+            "of this pen and camera: check both files.",
+            n_steps=MAX_STEPS,
+        )
     )
 
 

@@ -17,6 +17,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.model.coverage import require_spread
 from lightpen.model.rigid import skew
+from lightpen.sentences import sentence
 
 MIN_POSES = 6  # the paper starts from six images
 N_SAMPLES = 300  # of four poses: 40 % outliers leave 1e-18 of drawing no clean one
@@ -258,8 +259,13 @@ def _best_sample(equations: _Equations) -> FloatArray:
 def _require_number(n_poses: int) -> None:
     if n_poses < MIN_POSES:
         raise CalibrationError(
-            f"{n_poses} poses are usable; the tip needs at least {MIN_POSES}. "
-            "Capture more images."
+            sentence(
+                "pivot.too-few-poses",
+                "{n_poses} poses are usable; the tip needs at least {needed}. "
+                "Capture more images.",
+                n_poses=n_poses,
+                needed=MIN_POSES,
+            )
         )
 
 
@@ -268,7 +274,13 @@ def _require_steadiness(fit: PivotFit) -> None:
     excess = float(np.median(fit.distances[fit.used])) / MEDIAN_CHI
     if excess > MAX_EXCESS and scatter > MAX_SCATTER:
         raise CalibrationError(
-            f"The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), "
-            f"{excess:.0f} times what the images alone explain. Press the tip into the "
-            "cone and repeat; check that cone and camera are clamped."
+            sentence(
+                "pivot.tip-moved",
+                "The tip did not stay in one place: it moved by {scatter:.2f} mm "
+                "(rms), {excess:.0f} times what the images alone explain. Press the "
+                "tip into the cone and repeat; check that cone and camera are "
+                "clamped.",
+                scatter=scatter,
+                excess=excess,
+            )
         )

@@ -16,6 +16,7 @@ from lightpen.estimation.pivot import PivotFit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.coverage import DIRECTION_NAMES
+from lightpen.sentences import Sentence, sentence
 
 METHODS = ("joint", "two-stage")
 
@@ -162,28 +163,42 @@ def calibration_text(
     lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
     warnings = warnings_of(calibration)
     if warnings:
-        lines += ["", *warnings]
+        lines += ["", *map(str, warnings)]
     return "\n".join(lines)
 
 
-def warnings_of(calibration: Calibration) -> list[str]:
+def warnings_of(calibration: Calibration) -> list[Sentence]:
     """Return what the user should look into, one sentence or two each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
     warnings = [
-        f"LED {led} was found in no image. A finger may cover it, it may be off, or "
-        "its place in the pen file may be wrong."
-        for led in np.flatnonzero(leds.n_seen == 0) + 1
+        sentence(
+            "warning.led-unseen",
+            "LED {led} was found in no image. A finger may cover it, it may be off, or "
+            "its place in the pen file may be wrong.",
+            led=int(led) + 1,
+        )
+        for led in np.flatnonzero(leds.n_seen == 0)
     ]
     warnings += [
-        f"LED {led} sits {np.linalg.norm(leds.displacement[led - 1]):.3f} mm off its "
-        "place in the pen file. Check the file, or measure the pen again."
+        sentence(
+            "warning.led-displaced",
+            "LED {led} sits {distance:.3f} mm off its place in the pen file. Check the "
+            "file, or measure the pen again.",
+            led=led,
+            distance=float(np.linalg.norm(leds.displacement[led - 1])),
+        )
         for led in leds.displaced
     ]
     if sigma > USUAL_SIGMA:
         warnings.append(
-            f"The residuals are large: {sigma:.2f} px, {USUAL_SIGMA} px or less is "
-            "usual. Check that the camera file is of this camera, lens and focus, and "
-            "the pen file of this pen: the uncertainty does not cover a wrong file."
+            sentence(
+                "warning.large-residuals",
+                "The residuals are large: {sigma:.2f} px, {usual} px or less is usual. "
+                "Check that the camera file is of this camera, lens and focus, and the "
+                "pen file of this pen: the uncertainty does not cover a wrong file.",
+                sigma=sigma,
+                usual=USUAL_SIGMA,
+            )
         )
     return warnings
 
@@ -375,7 +390,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
             "file": observations.names[i],
             "used": used,
             "reason": str(calibration.reasons[i]),
-            "detail": observations.details[i],
+            "detail": str(observations.details[i] or ""),
             "rms_px": rms,
             "tip_cam_mm": tip,
             "leds": [
@@ -408,7 +423,9 @@ def _dumps(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return arrays as lists, and what is not a number as null."""
+    """Return arrays as lists, what is not a number as null, sentences with codes."""
+    if isinstance(value, Sentence):
+        value = {"code": value.code, "text": str(value), "values": value.values}
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):

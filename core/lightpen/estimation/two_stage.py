@@ -22,6 +22,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot import contact_matrix, tip_covariances
 from lightpen.model.coverage import require_spread
+from lightpen.sentences import sentence
 
 N_START = 6  # images of the linear start
 STEP_TOLERANCE = 1e-9  # mm, of |alpha dX|
@@ -85,8 +86,13 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
     n_poses = len(rotations)
     if n_poses < N_START:
         raise CalibrationError(
-            f"{n_poses} poses are usable; the two-stage method starts from {N_START}. "
-            "Capture more images."
+            sentence(
+                "two-stage.too-few-poses",
+                "{n_poses} poses are usable; the two-stage method starts from "
+                "{needed}. Capture more images.",
+                n_poses=n_poses,
+                needed=N_START,
+            )
         )
     require_spread(rotations)
     M = contact_matrix(rotations)

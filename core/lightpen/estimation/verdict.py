@@ -9,9 +9,21 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
 from lightpen.estimation.led_quality import DISPLACED
 from lightpen.estimation.uncertainty import Halves
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    Code,
+    halves_differ,
+    led_displaced,
+    leds_misfit,
+    leds_off,
+    many_dropped,
+    tip_is_good,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
+)
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
+from lightpen.sentences import Sentence, sentence
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
 MANY_DROPPED = 0.2  # of the images
@@ -36,6 +48,27 @@ class NextStep(StrEnum):
     REPEAT = "repeat"
     CHECK_FILES = "check files"
 
+    @property
+    def sentence(self) -> Sentence:
+        """It in words."""
+        return _TOLD[self]
+
+
+_TOLD = {
+    NextStep.ACCEPT: sentence("next-step.accept", "Next: accept the tip."),
+    NextStep.CAPTURE_MORE: sentence(
+        "next-step.capture-more",
+        "Next: capture more images; those of this swing are kept.",
+    ),
+    NextStep.REPEAT: sentence(
+        "next-step.repeat", "Next: repeat the swing with the tip pressed in."
+    ),
+    NextStep.CHECK_FILES: sentence(
+        "next-step.check-files",
+        "Next: check the intrinsics file and the LED file, then repeat.",
+    ),
+}
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -44,11 +77,11 @@ class Verdict:
     Attributes
     ----------
     grade : Grade
-    reason : Message
+    reason : Sentence
     """
 
     grade: Grade
-    reason: Message
+    reason: Sentence
 
     @property
     def can_be_accepted(self) -> bool:
@@ -58,7 +91,7 @@ class Verdict:
     @property
     def next_step(self) -> NextStep:
         """The one thing to do that answers the reason."""
-        return _NEXT_STEPS[self.reason.code]
+        return _NEXT_STEPS[Code(self.reason.code)]
 
 
 _NEXT_STEPS = {
@@ -131,13 +164,13 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     """Judge a calibration by what its tip is worth, not by its residuals alone."""
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
-    uncertain = Message(Code.UNCERTAIN, (uncertainty, limit))
+    reason = uncertain(uncertainty, limit)
     by_leds = calibration.budget.led_uncertainty
     led_sigma = calibration.geometry.led_sigma
     if by_leds > limit and led_sigma > DISPLACED:  # more images hardly change it
-        uncertain = Message(Code.LEDS_OFF, (led_sigma, by_leds))
+        reason = leds_off(led_sigma, by_leds)
     if uncertainty > FAR_OFF * limit:
-        return Verdict(Grade.REPEAT, uncertain)
+        return Verdict(Grade.REPEAT, reason)
     differences = np.abs(calibration.halves.difference)
     by_chance = HALVES_GATE * calibration.halves.expanded_uncertainty
     # A difference that is certain but smaller than what is allowed does not matter.
@@ -145,28 +178,24 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     if apart.any():
         worst = int(np.argmax(np.where(apart, differences, 0)))
         usual = calibration.halves.expanded_uncertainty[worst]
-        figures = (float(differences[worst]), float(usual))
-        return Verdict(Grade.CHECK, Message(Code.HALVES_DIFFER, figures))
+        differ = halves_differ(float(differences[worst]), float(usual))
+        return Verdict(Grade.CHECK, differ)
     if calibration.joint.sigma > USUAL_SIGMA:
-        figures = (calibration.joint.sigma, USUAL_SIGMA)
-        return Verdict(Grade.CHECK, Message(Code.LEDS_MISFIT, figures))
+        misfit = leds_misfit(calibration.joint.sigma, USUAL_SIGMA)
+        return Verdict(Grade.CHECK, misfit)
     if calibration.leds.displaced:
         lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
         led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
-        displaced = Message(Code.LED_DISPLACED, (led, float(lengths[led - 1])))
-        return Verdict(Grade.CHECK, displaced)
+        return Verdict(Grade.CHECK, led_displaced(led, float(lengths[led - 1])))
     n_images, n_used = len(calibration.used), int(calibration.used.sum())
     if n_images - n_used > MANY_DROPPED * n_images:
-        dropped = Message(Code.MANY_DROPPED, (n_images - n_used, n_images))
-        return Verdict(Grade.CHECK, dropped)
+        return Verdict(Grade.CHECK, many_dropped(n_images - n_used, n_images))
     if uncertainty > limit:
-        return Verdict(Grade.CHECK, uncertain)
+        return Verdict(Grade.CHECK, reason)
     if n_images < limits.min_images:
-        few = Message(Code.TOO_FEW_IMAGES, (n_images, limits.min_images))
-        return Verdict(Grade.CHECK, few)
+        return Verdict(Grade.CHECK, too_few_images(n_images, limits.min_images))
     bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
     if len(bare):
         n_images = limits.min_per_field * len(bare)
-        little = Message(Code.TOO_LITTLE_TILT, (n_images, *map(int, bare)))
-        return Verdict(Grade.CHECK, little)
-    return Verdict(Grade.PASS, Message(Code.GOOD, (uncertainty,)))
+        return Verdict(Grade.CHECK, too_little_tilt(n_images, map(int, bare)))
+    return Verdict(Grade.PASS, tip_is_good(uncertainty))

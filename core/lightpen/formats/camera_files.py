@@ -34,10 +34,12 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, UsageError
 from lightpen.formats.documents import parse_document
-from lightpen.formats.entries import Entries, counted_noun
+from lightpen.formats.entries import Entries, counted_numbers
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.model.camera import Camera
+from lightpen.sentences import Sentence, sentence
 
+CAMERA_FILE = sentence("file.camera", "camera file")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
@@ -89,7 +91,7 @@ def read_camera(path: Path) -> Camera:
     FileError
         The file cannot be read, or is not the complete file of a pinhole camera.
     """
-    text = read_text(path, "camera file", CAMERA_FILE_LIMIT)
+    text = read_text(path, CAMERA_FILE, CAMERA_FILE_LIMIT)
     name = printable(path.name)
     entries = Entries.of(parse_document(text, name), name)
     chain = [key for key in entries.values if re.fullmatch(_CAMERA_OF_CHAIN, key)]
@@ -128,8 +130,12 @@ def write_camera(
     """
     if path.suffix.lower() not in (".yaml", ".yml"):
         raise UsageError(
-            f"A camera file is written as YAML, but {printable(path.name)} does not "
-            "end in .yaml. Choose such a name."
+            sentence(
+                "camera-file.suffix",
+                "A camera file is written as YAML, but {name} does not end in "
+                ".yaml. Choose such a name.",
+                name=printable(path.name),
+            )
         )
     lines = _opencv_lines(camera) if layout == "opencv" else _ros_lines(camera)
     write_whole(path, "".join(f"{line}\n" for line in lines).encode())
@@ -138,8 +144,13 @@ def write_camera(
 def _only_camera(entries: Entries, chain: Sequence[str]) -> Entries:
     if len(chain) > 1:
         raise FileError(
-            f"{entries.name} describes {len(chain)} cameras. Keep the one that looks "
-            "at the pen, and remove the others."
+            sentence(
+                "camera-file.several-cameras",
+                "{name} describes {n_cameras} cameras. Keep the one that looks at "
+                "the pen, and remove the others.",
+                name=entries.name,
+                n_cameras=len(chain),
+            )
         )
     return entries.part(chain[0])
 
@@ -159,9 +170,13 @@ def _from_kalibr(entries: Entries) -> Camera:
     model = entries.word("camera_model").casefold()
     if model and model != "pinhole":
         raise FileError(
-            f"{entries.name} describes a camera of the model {quoted(model)}; "
-            "the model pinhole is needed. Calibrate the camera again with "
-            "pinhole-radtan."
+            sentence(
+                "camera-file.not-pinhole",
+                "{name} describes a camera of the model {model}; the model pinhole "
+                "is needed. Calibrate the camera again with pinhole-radtan.",
+                name=entries.name,
+                model=quoted(model),
+            )
         )
     _check_model(entries, "distortion_model")
     pinhole = entries.counted(4, "intrinsics")
@@ -185,9 +200,13 @@ def _from_matlab(entries: Entries) -> Camera:
     radial = entries.numbers("RadialDistortion")
     if len(radial) not in (2, 3):
         raise FileError(
-            f"RadialDistortion in {entries.name} has "
-            f"{counted_noun(len(radial), 'number')} where 2 or 3 are needed. Correct "
-            "it, or export the file again."
+            sentence(
+                "camera-file.radial-count",
+                "RadialDistortion in {name} has {counted} where 2 or 3 are needed. "
+                "Correct it, or export the file again.",
+                name=entries.name,
+                counted=counted_numbers(len(radial)),
+            )
         )
     tangential = entries.counted(2, "TangentialDistortion")
     coefficients = np.concatenate([radial[:2], tangential, radial[2:]])
@@ -200,17 +219,27 @@ def _check_model(entries: Entries, key: str) -> None:
         raise _fisheye(entries.name, model)
     if model and model not in _MODELS:
         raise FileError(
-            f"{entries.name} has the distortion model {quoted(model)}, which is not "
-            "known here. Calibrate the camera again with plumb_bob (radtan) or "
-            "rational_polynomial."
+            sentence(
+                "camera-file.distortion-model",
+                "{name} has the distortion model {model}, which is not known here. "
+                "Calibrate the camera again with plumb_bob (radtan) or "
+                "rational_polynomial.",
+                name=entries.name,
+                model=quoted(model),
+            )
         )
 
 
-def _fisheye(name: str, model: str) -> FileError:
+def _fisheye(name: str | Sentence, model: str) -> FileError:
     return FileError(
-        f"{name} describes a fisheye lens ({model}). A pinhole camera is needed: "
-        "calibrate the camera again with the distortion model plumb_bob (radtan) or "
-        "rational_polynomial."
+        sentence(
+            "camera-file.fisheye",
+            "{name} describes a fisheye lens ({model}). A pinhole camera is needed: "
+            "calibrate the camera again with the distortion model plumb_bob "
+            "(radtan) or rational_polynomial.",
+            name=name,
+            model=model,
+        )
     )
 
 
@@ -220,8 +249,12 @@ def _size(entries: Entries) -> tuple[float, float]:
         return width, height
     if not entries.has(*_WIDTH) or not entries.has(*_HEIGHT):
         raise FileError(
-            f"{entries.name} does not say how large the images are. Add the lines "
-            "image_width and image_height, in pixels."
+            sentence(
+                "camera-file.no-size",
+                "{name} does not say how large the images are. Add the lines "
+                "image_width and image_height, in pixels.",
+                name=entries.name,
+            )
         )
     return entries.counted(1, *_WIDTH)[0], entries.counted(1, *_HEIGHT)[0]
 
@@ -230,8 +263,12 @@ def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
     """Return fx fy cx cy of a camera matrix."""
     if not np.array_equal(matrix[2], [0, 0, 1]) or matrix[1, 0] != 0:
         raise FileError(
-            f"The camera matrix of {entries.name} is not of the form fx 0 cx, 0 fy cy, "
-            "0 0 1; it may be transposed or incomplete. Export the file again."
+            sentence(
+                "camera-file.matrix-form",
+                "The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 "
+                "0 1; it may be transposed or incomplete. Export the file again.",
+                name=entries.name,
+            )
         )
     _check_skew(matrix[0, 1], entries)
     return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
@@ -240,8 +277,13 @@ def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
 def _check_skew(skew: float, entries: Entries) -> None:
     if abs(skew) > SKEW_TOLERANCE:
         raise FileError(
-            f"{entries.name} has a skew of {skew:g} px; cameras without skew are "
-            "needed. Calibrate the camera again without estimating a skew."
+            sentence(
+                "camera-file.skew",
+                "{name} has a skew of {skew:g} px; cameras without skew are needed. "
+                "Calibrate the camera again without estimating a skew.",
+                name=entries.name,
+                skew=skew,
+            )
         )
 
 
@@ -268,40 +310,77 @@ def _camera(
     )
 
 
-def _checked_size(size: tuple[float, float], name: str) -> tuple[int, int]:
+def _checked_size(size: tuple[float, float], name: str | Sentence) -> tuple[int, int]:
     for side in size:
         if side != round(side) or not 0 < side <= LARGEST_IMAGE:
             raise FileError(
-                f"{name} gives an image size of {size[0]:g} x {size[1]:g} px. Two "
-                f"whole numbers from 1 to {LARGEST_IMAGE} are needed."
+                sentence(
+                    "camera-file.image-size",
+                    "{name} gives an image size of {width:g} x {height:g} px. Two "
+                    "whole numbers from 1 to {most} are needed.",
+                    name=name,
+                    width=size[0],
+                    height=size[1],
+                    most=LARGEST_IMAGE,
+                )
             )
     return int(size[0]), int(size[1])
 
 
-def _check_pinhole(pinhole: FloatArray, width: int, height: int, name: str) -> None:
+def _check_pinhole(
+    pinhole: FloatArray, width: int, height: int, name: str | Sentence
+) -> None:
     fx, fy, cx, cy = pinhole
     if fx <= 0 or fy <= 0:
         raise FileError(
-            f"{name} has the focal lengths {fx:g} and {fy:g} px; both must be "
-            "positive. Export the file again, or calibrate the camera again."
+            sentence(
+                "camera-file.focal-length-sign",
+                "{name} has the focal lengths {fx:g} and {fy:g} px; both must be "
+                "positive. Export the file again, or calibrate the camera again.",
+                name=name,
+                fx=fx,
+                fy=fy,
+            )
         )
     if min(fx, fy) < SMALLEST_FOCAL_LENGTH * max(width, height):
         raise FileError(
-            f"{name} has the focal lengths {fx:g} and {fy:g} px, too short for "
-            f"images of {width} x {height} px; they may be in millimetres. Give them "
-            "in pixels."
+            sentence(
+                "camera-file.focal-length-short",
+                "{name} has the focal lengths {fx:g} and {fy:g} px, too short for "
+                "images of {width} x {height} px; they may be in millimetres. Give "
+                "them in pixels.",
+                name=name,
+                fx=fx,
+                fy=fy,
+                width=width,
+                height=height,
+            )
         )
     if max(fx, fy) > LARGEST_ASPECT * min(fx, fy):
         raise FileError(
-            f"{name} has the focal lengths {fx:g} and {fy:g} px along u and v; with "
-            "the pixels of a camera these are nearly alike. Export the file again, or "
-            "calibrate the camera again."
+            sentence(
+                "camera-file.focal-lengths-differ",
+                "{name} has the focal lengths {fx:g} and {fy:g} px along u and v; "
+                "with the pixels of a camera these are nearly alike. Export the "
+                "file again, or calibrate the camera again.",
+                name=name,
+                fx=fx,
+                fy=fy,
+            )
         )
     if abs(cx - width / 2) > width or abs(cy - height / 2) > height:
         raise FileError(
-            f"{name} has its principal point at ({cx:g}, {cy:g}) px, far outside the "
-            f"image of {width} x {height} px. Check that both belong to the same "
-            "camera and image size."
+            sentence(
+                "camera-file.principal-point",
+                "{name} has its principal point at ({cx:g}, {cy:g}) px, far outside "
+                "the image of {width} x {height} px. Check that both belong to the "
+                "same camera and image size.",
+                name=name,
+                cx=cx,
+                cy=cy,
+                width=width,
+                height=height,
+            )
         )
 
 
@@ -311,15 +390,34 @@ def _checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArra
     if count == 0 and entries.word("distortion_model").casefold() == "none":
         return np.zeros(5)
     if count not in (4, 5, 8, 12, 14):
+        counted = (
+            sentence("count.one-distortion-coefficient", "1 distortion coefficient")
+            if count == 1
+            else sentence(
+                "count.distortion-coefficients",
+                "{count} distortion coefficients",
+                count=count,
+            )
+        )
         raise FileError(
-            f"{entries.name} has {counted_noun(count, 'distortion coefficient')}; "
-            "4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again."
+            sentence(
+                "camera-file.distortion-count",
+                "{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 "
+                "k6). Export the file again.",
+                name=entries.name,
+                counted=counted,
+            )
         )
     if np.any(coefficients[8:]):
         raise FileError(
-            f"{entries.name} has {count} distortion coefficients with a thin prism or "
-            "a tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again "
-            "without these terms."
+            sentence(
+                "camera-file.distortion-terms",
+                "{name} has {count} distortion coefficients with a thin prism or a "
+                "tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again "
+                "without these terms.",
+                name=entries.name,
+                count=count,
+            )
         )
     return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]
 
@@ -334,9 +432,16 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
         deviations = entries.numbers(*_DEVIATIONS)
         if len(deviations) < 4 + given or np.any(deviations < 0):
             raise FileError(
-                f"{entries.entry(*_DEVIATIONS)[0]} in {entries.name} must hold "
-                f"{4 + given} numbers, none of them negative: of fx fy cx cy and the "
-                f"{given} distortion coefficients. Correct or remove it."
+                sentence(
+                    "camera-file.deviations",
+                    "{entry} in {name} must hold {needed} numbers, none of them "
+                    "negative: of fx fy cx cy and the {n_coefficients} distortion "
+                    "coefficients. Correct or remove it.",
+                    entry=entries.entry(*_DEVIATIONS)[0],
+                    name=entries.name,
+                    needed=4 + given,
+                    n_coefficients=given,
+                )
             )
         stated = np.diag(deviations[: 4 + given] ** 2)
     else:
@@ -347,7 +452,7 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
     return covariance
 
 
-def _check_covariance(covariance: FloatArray, name: str) -> None:
+def _check_covariance(covariance: FloatArray, name: str | Sentence) -> None:
     variances = np.diagonal(covariance)
     limits = np.multiply.outer(variances, variances) * (1 + SYMMETRY_TOLERANCE)
     asymmetry = (covariance - covariance.T) ** 2
@@ -357,8 +462,12 @@ def _check_covariance(covariance: FloatArray, name: str) -> None:
         or np.any(asymmetry > SYMMETRY_TOLERANCE**2 * limits)
     ):
         raise FileError(
-            f"The intrinsics_covariance of {name} is not a covariance: it must be "
-            "symmetric, with correlations from -1 to 1. Correct or remove it."
+            sentence(
+                "camera-file.covariance",
+                "The intrinsics_covariance of {name} is not a covariance: it must "
+                "be symmetric, with correlations from -1 to 1. Correct or remove it.",
+                name=name,
+            )
         )
 
 

@@ -17,6 +17,7 @@ import yaml
 
 from lightpen.errors import FileError
 from lightpen.formats.files import quoted
+from lightpen.sentences import sentence
 
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str | bool | None"
 
@@ -57,8 +58,13 @@ def parse_document(text: str, name: str) -> dict[str, Tree]:
         tree = parse_yaml(text, name)
     if not isinstance(tree, dict):
         raise FileError(
-            f"{name} begins with {quoted(text.strip())}, which names no values. "
-            "Check that the right file is named."
+            sentence(
+                "document.no-values",
+                "{name} begins with {start}, which names no values. Check that the "
+                "right file is named.",
+                name=name,
+                start=quoted(text.strip()),
+            )
         )
     return tree
 
@@ -70,7 +76,14 @@ def parse_json(text: str, name: str) -> Tree:
         mapping: dict[str, Tree] = {}
         for key, value in pairs:
             if key in mapping:
-                _refuse_twice(key, "", name)
+                raise FileError(
+                    sentence(
+                        "document.given-twice",
+                        "{key} is given a second time in {name}. Keep the right one.",
+                        key=quoted(key),
+                        name=name,
+                    )
+                )
             mapping[key] = value
         return mapping
 
@@ -84,8 +97,15 @@ def parse_json(text: str, name: str) -> Tree:
         )
     except json.JSONDecodeError as error:
         raise FileError(
-            f"Line {error.lineno} of {name} is not valid JSON ({error.msg}, column "
-            f"{error.colno}). The file may be cut short: copy or export it again."
+            sentence(
+                "json.invalid",
+                "Line {line} of {name} is not valid JSON ({problem}, column "
+                "{column}). The file may be cut short: copy or export it again.",
+                line=error.lineno,
+                name=name,
+                problem=error.msg,
+                column=error.colno,
+            )
         ) from error
     except RecursionError as error:
         raise _too_deep(name) from error
@@ -104,16 +124,20 @@ def parse_yaml(text: str, name: str) -> Tree:
     try:
         return _yaml_document(iter(yaml.parse(text, Loader=loader)), name)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = name if mark is None else f"Line {mark.line + 1} of {name}"
+        if error.problem_mark is None:
+            raise _no_yaml(name) from error
         raise FileError(
-            f"{place} is not valid YAML ({error.problem or error.context}). The file "
-            "may be cut short: copy or export it again."
+            sentence(
+                "yaml.invalid-line",
+                "Line {line} of {name} is not valid YAML ({problem}). The file may be "
+                "cut short: copy or export it again.",
+                line=error.problem_mark.line + 1,
+                name=name,
+                problem=str(error.problem or error.context),
+            )
         ) from error
     except yaml.YAMLError as error:
-        raise FileError(
-            f"{name} is not valid YAML. Check that the right file is named."
-        ) from error
+        raise _no_yaml(name) from error
 
 
 def parse_xml(text: str, name: str) -> Tree:
@@ -137,9 +161,14 @@ def parse_xml(text: str, name: str) -> Tree:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         raise FileError(
-            f"Line {error.lineno} of {name} is not valid XML "
-            f"({expat.ErrorString(error.code)}). The file may be cut short: copy or "
-            "export it again."
+            sentence(
+                "xml.invalid",
+                "Line {line} of {name} is not valid XML ({problem}). The file may "
+                "be cut short: copy or export it again.",
+                line=error.lineno,
+                name=name,
+                problem=expat.ErrorString(error.code),
+            )
         ) from error
     return builder.root
 
@@ -150,7 +179,11 @@ def _yaml_document(events: Iterator[Any], name: str) -> Tree:
         if isinstance(event, yaml.DocumentStartEvent):
             if tree is not None:
                 raise FileError(
-                    f"{name} holds more than one YAML document. Keep one of them."
+                    sentence(
+                        "yaml.several-documents",
+                        "{name} holds more than one YAML document. Keep one of them.",
+                        name=name,
+                    )
                 )
             tree = _yaml_node(next(events), events, 0, name)
     return tree
@@ -173,11 +206,16 @@ def _yaml_node(event: Any, events: Iterator[Any], depth: int, name: str) -> Tree
         line = child.start_mark.line + 1
         if not isinstance(key, str):
             raise FileError(
-                f"Line {line} of {name} has a list in place of a name. Check that the "
-                "right file is named."
+                sentence(
+                    "yaml.list-as-name",
+                    "Line {line} of {name} has a list in place of a name. Check "
+                    "that the right file is named.",
+                    line=line,
+                    name=name,
+                )
             )
         if key in mapping:
-            _refuse_twice(key, f" on line {line}", name)
+            _refuse_twice(key, line, name)
         mapping[key] = _yaml_node(next(events), events, depth + 1, name)
     return mapping
 
@@ -186,16 +224,27 @@ def _check_yaml_event(event: Any, name: str) -> None:
     line = event.start_mark.line + 1
     if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
         raise FileError(
-            f"Line {line} of {name} has the YAML anchor or alias "
-            f"{quoted(event.anchor)}, which can make a small file fill the memory. "
-            "Write the values out."
+            sentence(
+                "yaml.anchor",
+                "Line {line} of {name} has the YAML anchor or alias {anchor}, which "
+                "can make a small file fill the memory. Write the values out.",
+                line=line,
+                name=name,
+                anchor=quoted(event.anchor),
+            )
         )
     if event.tag is not None and event.tag not in _YAML_TAGS and event.tag != "!":
         tag = event.tag.replace(_YAML_NAMESPACE, "!!")
         raise FileError(
-            f"Line {line} of {name} has the tag {quoted(tag)}. Such a tag can "
-            "ask for code to be run, so only plain values and matrices of OpenCV are "
-            "read. Remove the tag, or use a file from a source you trust."
+            sentence(
+                "yaml.tag",
+                "Line {line} of {name} has the tag {tag}. Such a tag can ask for "
+                "code to be run, so only plain values and matrices of OpenCV are "
+                "read. Remove the tag, or use a file from a source you trust.",
+                line=line,
+                name=name,
+                tag=quoted(tag),
+            )
         )
 
 
@@ -229,7 +278,7 @@ class _XmlBuilder:
         if self._open:
             parent = self._open[-1]
             if tag in parent.seen and (tag != "_" or len(parent.seen) > 1):
-                _refuse_twice(tag, f" on line {line}", self._name)
+                _refuse_twice(tag, line, self._name)
             parent.seen.add(tag)
         self._open.append(_Element(tag))
 
@@ -246,9 +295,14 @@ class _XmlBuilder:
 
     def refuse_definition(self, line: int) -> NoReturn:
         raise FileError(
-            f"Line {line} of {self._name} begins a document type definition, which can "
-            "make a small file fill the memory. Remove it; a camera file of OpenCV has "
-            "none."
+            sentence(
+                "xml.definition",
+                "Line {line} of {name} begins a document type definition, which can "
+                "make a small file fill the memory. Remove it; a camera file of "
+                "OpenCV has none.",
+                line=line,
+                name=self._name,
+            )
         )
 
 
@@ -273,14 +327,36 @@ def _check_depth(tree: Tree, name: str) -> None:
     raise _too_deep(name)
 
 
-def _too_deep(name: str) -> FileError:
+def _no_yaml(name: str) -> FileError:
     return FileError(
-        f"{name} is nested more than {MAX_DEPTH} levels deep. Check that the right "
-        "file is named."
+        sentence(
+            "yaml.invalid",
+            "{name} is not valid YAML. Check that the right file is named.",
+            name=name,
+        )
     )
 
 
-def _refuse_twice(key: str, place: str, name: str) -> NoReturn:
+def _too_deep(name: str) -> FileError:
+    return FileError(
+        sentence(
+            "document.too-deep",
+            "{name} is nested more than {n_levels} levels deep. Check that the "
+            "right file is named.",
+            name=name,
+            n_levels=MAX_DEPTH,
+        )
+    )
+
+
+def _refuse_twice(key: str, line: int, name: str) -> NoReturn:
     raise FileError(
-        f"{quoted(key)} is given a second time{place} in {name}. Keep the right one."
+        sentence(
+            "document.given-twice-on-line",
+            "{key} is given a second time on line {line} in {name}. Keep the right "
+            "one.",
+            key=quoted(key),
+            line=line,
+            name=name,
+        )
     )

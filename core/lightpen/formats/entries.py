@@ -8,7 +8,8 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.documents import Tree
 from lightpen.formats.files import printable, quoted
-from lightpen.formats.tables import number_flaw
+from lightpen.formats.tables import number_flaw, too_large_number
+from lightpen.sentences import Sentence, sentence
 
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
 
@@ -22,17 +23,17 @@ class Entries:
 
     Attributes
     ----------
-    name : str
-        Name of the file, for the sentences.
+    name : str or Sentence
+        Name of the file, or of a place in it, for the sentences.
     values : dict
         By the name without case and underscores: the name in the file, and the value.
     """
 
-    name: str
+    name: str | Sentence
     values: dict[str, tuple[str, Tree]]
 
     @staticmethod
-    def of(tree: dict[str, Tree], name: str) -> "Entries":
+    def of(tree: dict[str, Tree], name: str | Sentence) -> "Entries":
         """Return the entries of a mapping in the file called `name`."""
         values: dict[str, tuple[str, Tree]] = {}
         for key, value in tree.items():
@@ -57,8 +58,13 @@ class Entries:
         found = [self.values[_plain(n)] for n in names if _plain(n) in self.values]
         if not found:
             raise FileError(
-                f"{self.name} has no {names[0]}. Check that the right file is named "
-                "and that it is complete."
+                sentence(
+                    "entry.missing",
+                    "{name} has no {entry}. Check that the right file is named and "
+                    "that it is complete.",
+                    name=self.name,
+                    entry=names[0],
+                )
             )
         if len(found) > 1:
             raise _same_meaning(self.name, found[0][0], found[1][0])
@@ -73,8 +79,13 @@ class Entries:
         key, value = self.entry(*names)
         if not isinstance(value, dict):
             raise FileError(
-                f"{printable(key)} in {self.name} has no named values below it. The "
-                "file may be cut short: copy or export it again."
+                sentence(
+                    "entry.nothing-below",
+                    "{entry} in {name} has no named values below it. The file may "
+                    "be cut short: copy or export it again.",
+                    entry=printable(key),
+                    name=self.name,
+                )
             )
         return Entries.of(value, self.name)
 
@@ -95,8 +106,14 @@ class Entries:
             flaw = _flaw(cell)
             if flaw:
                 raise FileError(
-                    f"{printable(key)} in {self.name} cannot be read: {flaw} Correct "
-                    "it, or export the file again."
+                    sentence(
+                        "entry.unreadable",
+                        "{entry} in {name} cannot be read: {flaw} Correct it, or "
+                        "export the file again.",
+                        entry=printable(key),
+                        name=self.name,
+                        flaw=flaw,
+                    )
                 )
         numbers = np.array([float(str(cell)) for cell in cells])
         if isinstance(value, dict):
@@ -113,9 +130,15 @@ class Entries:
         numbers = self.numbers(*names)
         if len(numbers) != count:
             raise FileError(
-                f"{printable(self.entry(*names)[0])} in {self.name} has "
-                f"{counted_noun(len(numbers), 'number')} where {count} are needed. "
-                "Correct it, or export the file again."
+                sentence(
+                    "entry.wrong-count",
+                    "{entry} in {name} has {counted} where {needed} are needed. "
+                    "Correct it, or export the file again.",
+                    entry=printable(self.entry(*names)[0]),
+                    name=self.name,
+                    counted=counted_numbers(len(numbers)),
+                    needed=count,
+                )
             )
         return numbers
 
@@ -131,25 +154,41 @@ class Entries:
         rows, cols = (float(shape.counted(1, side)[0]) for side in ("rows", "cols"))
         if rows * cols != count:
             raise FileError(
-                f"{printable(key)} in {self.name} has {counted_noun(count, 'number')} "
-                f"where its {rows:g} rows of {cols:g} need {rows * cols:g}. The file "
-                "may be cut short: copy or export it again."
+                sentence(
+                    "entry.wrong-shape",
+                    "{entry} in {name} has {counted} where its {rows:g} rows of "
+                    "{cols:g} need {needed:g}. The file may be cut short: copy or "
+                    "export it again.",
+                    entry=printable(key),
+                    name=self.name,
+                    counted=counted_numbers(count),
+                    rows=rows,
+                    cols=cols,
+                    needed=rows * cols,
+                )
             )
 
 
-def counted_noun(count: int, noun: str) -> str:
-    """Return a number with its noun: "1 number", "2 numbers"."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+def counted_numbers(count: int) -> Sentence:
+    """Return how many numbers, such as "2 numbers"."""
+    if count == 1:
+        return sentence("count.one-number", "1 number")
+    return sentence("count.numbers", "{count} numbers", count=count)
 
 
 def _plain(name: str) -> str:
     return name.replace("_", "").casefold()
 
 
-def _same_meaning(name: str, first: str, second: str) -> FileError:
+def _same_meaning(name: str | Sentence, first: str, second: str) -> FileError:
     return FileError(
-        f"{name} has {quoted(first)} and {quoted(second)}, which mean the same. Keep "
-        "the right one."
+        sentence(
+            "entry.same-meaning",
+            "{name} has {first} and {second}, which mean the same. Keep the right one.",
+            name=name,
+            first=quoted(first),
+            second=quoted(second),
+        )
     )
 
 
@@ -163,10 +202,10 @@ def _cells(value: Tree) -> list[Tree]:
     return [value]
 
 
-def _flaw(cell: Tree) -> str:
+def _flaw(cell: Tree) -> Sentence | None:
     if not isinstance(cell, str):
-        return "it is not a list of numbers."
+        return sentence("number.no-list", "it is not a list of numbers.")
     flaw = number_flaw(cell)
     if not flaw and abs(float(cell)) > LARGEST_NUMBER:
-        return f"{quoted(cell)} is too large a number."
+        return too_large_number(cell)
     return flaw

@@ -9,31 +9,53 @@ from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 
 from lightpen.errors import FileError
+from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a sentence
 
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
+_DENIED = sentence(
+    "write.denied", "permission is denied. Choose another folder, or ask for access."
+)
 _REASONS = {
-    errno.ENOSPC: "the disk is full. Free some space, or write to another disk.",
-    errno.EDQUOT: "your disk quota is used up. Free some space, or write elsewhere.",
-    errno.EFBIG: "the file would be larger than allowed here. Write to another disk.",
-    errno.EACCES: "permission is denied. Choose another folder, or ask for access.",
-    errno.EPERM: "permission is denied. Choose another folder, or ask for access.",
-    errno.EROFS: "the disk is read-only. Choose another folder.",
-    errno.ENOENT: "its folder does not exist. Create the folder, or choose another.",
-    errno.ENOTDIR: "its folder is not a folder. Check the path.",
-    errno.ENAMETOOLONG: "the name is too long. Choose a shorter one.",
+    errno.ENOSPC: sentence(
+        "write.disk-full",
+        "the disk is full. Free some space, or write to another disk.",
+    ),
+    errno.EDQUOT: sentence(
+        "write.quota-used-up",
+        "your disk quota is used up. Free some space, or write elsewhere.",
+    ),
+    errno.EFBIG: sentence(
+        "write.larger-than-allowed",
+        "the file would be larger than allowed here. Write to another disk.",
+    ),
+    errno.EACCES: _DENIED,
+    errno.EPERM: _DENIED,
+    errno.EROFS: sentence(
+        "write.read-only", "the disk is read-only. Choose another folder."
+    ),
+    errno.ENOENT: sentence(
+        "write.no-folder",
+        "its folder does not exist. Create the folder, or choose another.",
+    ),
+    errno.ENOTDIR: sentence(
+        "write.not-a-folder", "its folder is not a folder. Check the path."
+    ),
+    errno.ENAMETOOLONG: sentence(
+        "write.name-too-long", "the name is too long. Choose a shorter one."
+    ),
 }
 
 
-def read_bytes(path: Path, what: str, limit: int) -> bytes:
+def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
     """Return the content of a file.
 
     Parameters
     ----------
     path : Path
-    what : str
+    what : Sentence
         What the file is, for the sentences: "camera file".
     limit : int
         Largest size, bytes. It is checked before anything is read.
@@ -43,24 +65,29 @@ def read_bytes(path: Path, what: str, limit: int) -> bytes:
     FileError
         The file is missing, a folder, empty, unreadable or larger than `limit`.
     """
-    shown = f"The {what} {printable(str(path))}"
+    shown = printable(str(path))
     try:
         status = path.stat()
-        _check_readable(status, shown, limit)
+        _check_readable(status, what, shown, limit)
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise FileError(
-            f"{shown} does not exist. Check the name and the folder."
+            sentence(
+                "read.missing",
+                "The {what} {path} does not exist. Check the name and the folder.",
+                what=what,
+                path=shown,
+            )
         ) from error
     except OSError as error:
         raise unreadable(path, what, error) from error
     if len(data) > limit:
-        raise _too_large(shown, len(data), limit)
+        raise _too_large(what, shown, len(data), limit)
     return data
 
 
-def read_text(path: Path, what: str, limit: int) -> str:
+def read_text(path: Path, what: Sentence, limit: int) -> str:
     r"""Return the content of a text file, with ``\n`` at the line ends.
 
     UTF-8 with or without byte order mark, UTF-16 with one, and Windows-1252, which
@@ -69,7 +96,7 @@ def read_text(path: Path, what: str, limit: int) -> str:
     Parameters
     ----------
     path : Path
-    what : str
+    what : Sentence
         What the file is, for the sentences.
     limit : int
         Largest size, bytes.
@@ -80,24 +107,44 @@ def read_text(path: Path, what: str, limit: int) -> str:
         As `read_bytes`, or the file is not text.
     """
     data = read_bytes(path, what, limit)
-    shown = f"The {what} {printable(str(path))}"
+    shown = printable(str(path))
     try:
         text = _decode(data)
     except UnicodeDecodeError as error:
         raise FileError(
-            f"{shown} is not text: byte {error.start + 1} fits no known encoding. "
-            "Check that the right file is named, or save it as UTF-8."
+            sentence(
+                "read.no-known-encoding",
+                "The {what} {path} is not text: byte {byte} fits no known encoding. "
+                "Check that the right file is named, or save it as UTF-8.",
+                what=what,
+                path=shown,
+                byte=error.start + 1,
+            )
         ) from error
     control = re.search(_CONTROL, text)
     if control:
         line = text.count("\n", 0, control.start()) + 1
         raise FileError(
-            f"{shown} is not text: line {line} holds the control character "
-            f"{ord(control[0])}. Check that the right file is named, or save it as "
-            "UTF-8."
+            sentence(
+                "read.control-character",
+                "The {what} {path} is not text: line {line} holds the control "
+                "character {character}. Check that the right file is named, or save "
+                "it as UTF-8.",
+                what=what,
+                path=shown,
+                line=line,
+                character=ord(control[0]),
+            )
         )
     if not text.strip():
-        raise FileError(f"{shown} holds nothing but blanks. Save it again.")
+        raise FileError(
+            sentence(
+                "read.blank",
+                "The {what} {path} holds nothing but blanks. Save it again.",
+                what=what,
+                path=shown,
+            )
+        )
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -124,23 +171,40 @@ def write_whole(path: Path, data: bytes) -> None:
             _replace(Path(os.path.realpath(path)), data)
     except IsADirectoryError as error:
         raise FileError(
-            f"{printable(str(path))} cannot be written: it is a folder. Name a file."
+            sentence(
+                "write.onto-folder",
+                "{path} cannot be written: it is a folder. Name a file.",
+                path=printable(str(path)),
+            )
         ) from error
     except OSError as error:
-        reason = _REASONS.get(
-            error.errno or 0, f"{_strerror(error)}. Choose another folder or name."
+        other = sentence(
+            "write.other-reason",
+            "{reason}. Choose another folder or name.",
+            reason=strerror(error),
         )
         raise FileError(
-            f"{printable(str(path))} cannot be written: {reason} What was there "
-            "before is unchanged."
+            sentence(
+                "write.failed",
+                "{path} cannot be written: {reason} What was there before is "
+                "unchanged.",
+                path=printable(str(path)),
+                reason=_REASONS.get(error.errno or 0, other),
+            )
         ) from error
 
 
-def unreadable(path: Path, what: str, error: OSError) -> FileError:
+def unreadable(path: Path, what: Sentence, error: OSError) -> FileError:
     """Return the error of a file or folder, ``what`` it is, that cannot be read."""
     return FileError(
-        f"The {what} {printable(str(path))} cannot be read: {_strerror(error)}. Check "
-        "that it is yours to read and that its disk is connected."
+        sentence(
+            "read.failed",
+            "The {what} {path} cannot be read: {reason}. Check that it is yours to "
+            "read and that its disk is connected.",
+            what=what,
+            path=printable(str(path)),
+            reason=strerror(error),
+        )
     )
 
 
@@ -159,8 +223,13 @@ def sha256(path: Path) -> str:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise FileError(
-            f"The file {printable(str(path))} cannot be read: {_strerror(error)}. "
-            "Check the name and that it is yours to read."
+            sentence(
+                "hash.failed",
+                "The file {path} cannot be read: {reason}. Check the name and that it "
+                "is yours to read.",
+                path=printable(str(path)),
+                reason=strerror(error),
+            )
         ) from error
 
 
@@ -180,21 +249,56 @@ def quoted(text: str) -> str:
     return f'"{printable(start)}{"..." if len(text) > len(start) else ""}"'
 
 
-def _check_readable(status: os.stat_result, shown: str, limit: int) -> None:
+def strerror(error: OSError) -> str:
+    """Return what the system says of an error."""
+    return error.strerror or type(error).__name__
+
+
+def _check_readable(
+    status: os.stat_result, what: Sentence, path: str, limit: int
+) -> None:
     if stat.S_ISDIR(status.st_mode):
-        raise FileError(f"{shown} is a folder. Name the file itself.")
+        raise FileError(
+            sentence(
+                "read.folder",
+                "The {what} {path} is a folder. Name the file itself.",
+                what=what,
+                path=path,
+            )
+        )
     if not stat.S_ISREG(status.st_mode):
-        raise FileError(f"{shown} is a pipe or a device. Name a file on a disk.")
+        raise FileError(
+            sentence(
+                "read.device",
+                "The {what} {path} is a pipe or a device. Name a file on a disk.",
+                what=what,
+                path=path,
+            )
+        )
     if status.st_size == 0:
-        raise FileError(f"{shown} is empty. Check how it was saved or copied.")
+        raise FileError(
+            sentence(
+                "read.empty",
+                "The {what} {path} is empty. Check how it was saved or copied.",
+                what=what,
+                path=path,
+            )
+        )
     if status.st_size > limit:
-        raise _too_large(shown, status.st_size, limit)
+        raise _too_large(what, path, status.st_size, limit)
 
 
-def _too_large(shown: str, size: int, limit: int) -> FileError:
+def _too_large(what: Sentence, path: str, size: int, limit: int) -> FileError:
     return FileError(
-        f"{shown} has {size / MEGABYTE:.1f} MB, more than the {limit / MEGABYTE:g} MB "
-        "such a file may have. Check that the right file is named."
+        sentence(
+            "read.too-large",
+            "The {what} {path} has {size:.1f} MB, more than the {limit:g} MB such a "
+            "file may have. Check that the right file is named.",
+            what=what,
+            path=path,
+            size=size / MEGABYTE,
+            limit=limit / MEGABYTE,
+        )
     )
 
 
@@ -227,7 +331,3 @@ def _replace(target: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
-
-
-def _strerror(error: OSError) -> str:
-    return error.strerror or type(error).__name__

@@ -19,9 +19,11 @@ import numpy.typing as npt
 from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.files import read_bytes, unreadable
+from lightpen.sentences import Sentence, sentence
 
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
+IMAGE_FILE = sentence("file.image", "image")
 MAX_FILE_SIZE = 512_000_000  # bytes
 MAX_PIXELS = 200_000_000
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
@@ -73,7 +75,9 @@ def find_images(*places: str) -> ImageSource:
     try:
         return _images_at(path, places[0])
     except OSError as error:
-        raise unreadable(path, "source of images", error) from error
+        raise unreadable(
+            path, sentence("file.image-source", "source of images"), error
+        ) from error
 
 
 def image_files(files: list[Path]) -> ImageSource:
@@ -111,7 +115,7 @@ def read_image(path: Path) -> Image:
     FileError
         The file is missing, empty, too large, damaged or no image.
     """
-    return decode_image(read_bytes(path, "image", MAX_FILE_SIZE), path.name)
+    return decode_image(read_bytes(path, IMAGE_FILE, MAX_FILE_SIZE), path.name)
 
 
 def decode_image(data: bytes, name: str) -> Image:
@@ -127,9 +131,22 @@ def decode_image(data: bytes, name: str) -> Image:
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:
-        raise FileError(f"{name} cannot be decoded: {error.err}.") from error
+        raise FileError(
+            sentence(
+                "image.undecodable",
+                "{name} cannot be decoded: {problem}.",
+                name=name,
+                problem=error.err,
+            )
+        ) from error
     if image is None:
-        raise FileError(f"{name} is damaged or no image. Capture or copy it again.")
+        raise FileError(
+            sentence(
+                "image.damaged",
+                "{name} is damaged or no image. Capture or copy it again.",
+                name=name,
+            )
+        )
     return _grey(np.asarray(image), name)
 
 
@@ -141,8 +158,13 @@ def _images_at(path: Path, where: str) -> ImageSource:
             files = _image_files_in(inner)
         if not files:
             raise FileError(
-                f"The folder {where} holds no images ({', '.join(SUFFIXES)}). "
-                "Name the folder that the images are in."
+                sentence(
+                    "images.empty-folder",
+                    "The folder {folder} holds no images ({suffixes}). Name the "
+                    "folder that the images are in.",
+                    folder=where,
+                    suffixes=", ".join(SUFFIXES),
+                )
             )
     elif path.is_file():
         if path.suffix.lower() in VIDEO_SUFFIXES:
@@ -152,7 +174,11 @@ def _images_at(path: Path, where: str) -> ImageSource:
         files = [Path(name) for name in glob.glob(where)]  # noqa: PTH207 - any root
         if not files:
             raise FileError(
-                f"There is no folder, video or image at {where}. Check the name."
+                sentence(
+                    "images.nothing-there",
+                    "There is no folder, video or image at {place}. Check the name.",
+                    place=where,
+                )
             )
     return image_files(sorted(files, key=_natural_order))
 
@@ -161,11 +187,16 @@ def _image_files_in(folder: Path) -> list[Path]:
     return [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
 
 
-def _grey(image: npt.NDArray[Any], name: str) -> Image:
+def _grey(image: npt.NDArray[Any], name: str | Sentence) -> Image:
     if image.dtype not in (np.uint8, np.uint16):
         raise FileError(
-            f"{name} holds values of type {image.dtype}; grey values of 8 or 16 bit "
-            "are needed. Save the images without conversion."
+            sentence(
+                "image.value-type",
+                "{name} holds values of type {value_type}; grey values of 8 or 16 "
+                "bit are needed. Save the images without conversion.",
+                name=name,
+                value_type=str(image.dtype),
+            )
         )
     if image.ndim == 2:
         return image
@@ -183,8 +214,12 @@ def _video(path: Path) -> ImageSource:
     capture.release()
     if not readable:
         raise FileError(
-            f"The video {path} cannot be opened, or holds no frames. Check that it "
-            "plays, or save its frames as images."
+            sentence(
+                "image.video",
+                "The video {path} cannot be opened, or holds no frames. Check that "
+                "it plays, or save its frames as images.",
+                path=str(path),
+            )
         )
 
     def loaders() -> Iterator[Callable[[], Image]]:
@@ -201,9 +236,12 @@ def _video(path: Path) -> ImageSource:
 
 
 def _frame(frame: npt.NDArray[Any] | None, i: int) -> Image:
+    name = sentence("image.frame", "Frame {number} of the video", number=i + 1)
     if frame is None:
-        raise FileError(f"Frame {i + 1} of the video cannot be decoded.")
-    return _grey(frame, f"Frame {i + 1} of the video")
+        raise FileError(
+            sentence("image.frame-undecodable", "{name} cannot be decoded.", name=name)
+        )
+    return _grey(frame, name)
 
 
 def _check_png(data: bytes, name: str) -> None:
@@ -213,24 +251,45 @@ def _check_png(data: bytes, name: str) -> None:
     while kind != b"IEND":
         head = data[position : position + 8]
         if len(head) < 8:
-            raise FileError(f"{name} is cut off. Capture or copy it again.")
+            raise _cut_off(name)
         length, kind = struct.unpack(">I4s", head)
         body = data[position + 4 : position + 8 + length]
         checksum = data[position + 8 + length : position + 12 + length]
         if len(checksum) < 4:
-            raise FileError(f"{name} is cut off. Capture or copy it again.")
+            raise _cut_off(name)
         if zlib.crc32(body) != int.from_bytes(checksum, "big"):
             raise FileError(
-                f"{name} is damaged (wrong checksum). Capture or copy it again."
+                sentence(
+                    "image.wrong-checksum",
+                    "{name} is damaged (wrong checksum). Capture or copy it again.",
+                    name=name,
+                )
             )
         if kind == b"IHDR":
             width, height = struct.unpack(">II", body[4:12])
             if width * height > MAX_PIXELS:
                 raise FileError(
-                    f"{name} is {width} x {height} px; at most {MAX_PIXELS:,} px are "
-                    "read. Choose images of the calibrated camera."
+                    sentence(
+                        "image.too-many-pixels",
+                        "{name} is {width} x {height} px; at most {most:,} px are "
+                        "read. Choose images of the calibrated camera.",
+                        name=name,
+                        width=width,
+                        height=height,
+                        most=MAX_PIXELS,
+                    )
                 )
         position += 12 + length
+
+
+def _cut_off(name: str) -> FileError:
+    return FileError(
+        sentence(
+            "image.cut-off",
+            "{name} is cut off. Capture or copy it again.",
+            name=name,
+        )
+    )
 
 
 def _natural_order(path: Path) -> list[tuple[int, str]]:

@@ -18,6 +18,7 @@ from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE
 from lightpen.formats.tables import Table, read_table
 from lightpen.model.rigid import nearest_rotation
+from lightpen.sentences import sentence
 
 OBSERVATION_FILE_LIMIT = 16 * MEGABYTE
 MAX_FRAMES = 30_000
@@ -93,8 +94,10 @@ def read_centers(path: Path, n_leds: int) -> Centers:
         The file cannot be read, or has LEDs that the pen does not have, an LED twice
         in a frame, or cells that are not numbers. The text names the line.
     """
-    table = read_table(path, "file of LED centres", OBSERVATION_FILE_LIMIT)
-    columns = table.columns(_CENTERS, "LED centres")
+    table = read_table(
+        path, sentence("file.centers", "file of LED centres"), OBSERVATION_FILE_LIMIT
+    )
+    columns = table.columns(_CENTERS, sentence("table.of-centers", "LED centres"))
     frame_of_row = table.whole_numbers(columns[0])
     led_of_row = table.whole_numbers(columns[1])
     pixels = table.numbers(columns[2:])
@@ -102,8 +105,14 @@ def read_centers(path: Path, n_leds: int) -> Centers:
     frames, place = np.unique(frame_of_row, return_inverse=True)
     if len(frames) > MAX_FRAMES:
         raise FileError(
-            f"{table.name} has {len(frames)} frames; at most {MAX_FRAMES} are read. "
-            "Check that the right file is named, or divide it."
+            sentence(
+                "centers.too-many-frames",
+                "{name} has {n_frames} frames; at most {most} are read. Check that "
+                "the right file is named, or divide it.",
+                name=table.name,
+                n_frames=len(frames),
+                most=MAX_FRAMES,
+            )
         )
     _check_no_pair_twice(table, frame_of_row, led_of_row, place * n_leds + led_of_row)
     grid = np.full((len(frames), n_leds, 2), np.nan)
@@ -123,7 +132,9 @@ def read_poses(path: Path) -> PoseTable:
         The file cannot be read, or has matrices that are no rotations or covariances,
         poses given twice, or cells that are not numbers. The text names the line.
     """
-    table = read_table(path, "pose file", OBSERVATION_FILE_LIMIT)
+    table = read_table(
+        path, sentence("file.poses", "pose file"), OBSERVATION_FILE_LIMIT
+    )
     columns, covariance_columns = _pose_columns(table)
     numbers = table.numbers(columns)
     if "pose" in table.header:
@@ -135,8 +146,12 @@ def read_poses(path: Path) -> PoseTable:
     if np.any(far):
         raise table.error(
             int(np.argmax(far)),
-            f"the translation is more than {LARGEST_TRANSLATION / 1000:g} m. Check its "
-            "units: millimetres are needed.",
+            sentence(
+                "poses.far",
+                "the translation is more than {most:g} m. Check its units: "
+                "millimetres are needed.",
+                most=LARGEST_TRANSLATION / 1000,
+            ),
         )
     covariances = None
     if covariance_columns:
@@ -154,16 +169,26 @@ def _check_centers(
         row = int(np.argmax(unknown))
         raise table.error(
             row,
-            f"there is no LED {leds[row]}; the pen has LEDs 1 to {n_leds}. Check that "
-            "the pen file is of this pen, and that LEDs are numbered from 1.",
+            sentence(
+                "centers.unknown-led",
+                "there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that "
+                "the pen file is of this pen, and that LEDs are numbered from 1.",
+                led=leds[row],
+                n_leds=n_leds,
+            ),
         )
     far = np.abs(pixels).max(axis=1) > LARGEST_PIXEL
     if np.any(far):
         row = int(np.argmax(far))
         raise table.error(
             row,
-            f"({pixels[row, 0]:g}, {pixels[row, 1]:g}) px lies outside every image. "
-            "Correct or remove the line.",
+            sentence(
+                "centers.far",
+                "({x:g}, {y:g}) px lies outside every image. Correct or remove the "
+                "line.",
+                x=pixels[row, 0],
+                y=pixels[row, 1],
+            ),
         )
 
 
@@ -177,14 +202,20 @@ def _check_no_pair_twice(
         first, second = order[twice][pair], order[twice + 1][pair]
         raise table.error(
             int(second),
-            f"LED {leds[second]} of frame {frames[second]} stands already on line "
-            f"{table.lines[first]}. Keep the right one.",
+            sentence(
+                "centers.twice",
+                "LED {led} of frame {frame} stands already on line {line}. Keep the "
+                "right one.",
+                led=leds[second],
+                frame=frames[second],
+                line=table.lines[first],
+            ),
         )
 
 
 def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
     """Return the columns of the pose and those, if any, of its covariance."""
-    what = "poses"
+    what = sentence("table.of-poses", "poses")
     if table.header:
         with_covariance = any(name in table.header for (name,) in _COVARIANCE)
         return (
@@ -194,10 +225,16 @@ def _pose_columns(table: Table) -> tuple[list[int], list[int]]:
     skipped = table.n_columns % 12  # the number of the pose
     if skipped > 1 or table.n_columns - skipped not in (12, 48):
         raise FileError(
-            f"{table.name} has no header and {table.n_columns} columns; poses need the "
-            "12 columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, with "
-            "the number of the pose before them and the covariance c11 to c66 behind "
-            "them if known. Put a header line with these names on top."
+            sentence(
+                "poses.no-header",
+                "{name} has no header and {n_columns} columns; poses need the 12 "
+                "columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, "
+                "with the number of the pose before them and the covariance c11 to "
+                "c66 behind them if known. Put a header line with these names on "
+                "top.",
+                name=table.name,
+                n_columns=table.n_columns,
+            )
         )
     places = list(range(skipped, table.n_columns))
     return places[:12], places[12:]
@@ -211,8 +248,13 @@ def _check_repeated(table: Table, poses: FloatArray) -> None:
         row = int(np.argmax(repeated))
         raise table.error(
             row,
-            f"pose {poses[row]:g} is given on line {table.lines[first[which[row]]]} "
-            "already. Remove what was copied twice.",
+            sentence(
+                "poses.twice",
+                "pose {pose:g} is given on line {line} already. Remove what was "
+                "copied twice.",
+                pose=poses[row],
+                line=table.lines[first[which[row]]],
+            ),
         )
 
 
@@ -225,15 +267,22 @@ def _checked_rotations(table: Table, matrices: FloatArray) -> FloatArray:
     if np.any(wrong):
         raise table.error(
             int(np.argmax(wrong)),
-            "r11 to r33 are not a rotation: their rows must have the length 1 and be "
-            "at right angles to each other. Check the order of the columns.",
+            sentence(
+                "poses.no-rotation",
+                "r11 to r33 are not a rotation: their rows must have the length 1 "
+                "and be at right angles to each other. Check the order of the "
+                "columns.",
+            ),
         )
     mirrored = np.linalg.det(matrices) < 0
     if np.any(mirrored):
         raise table.error(
             int(np.argmax(mirrored)),
-            "r11 to r33 are a mirrored rotation (determinant -1). Give the poses in "
-            "right-handed frames.",
+            sentence(
+                "poses.mirrored",
+                "r11 to r33 are a mirrored rotation (determinant -1). Give the "
+                "poses in right-handed frames.",
+            ),
         )
     coarse = deviations > ROUNDING_TOLERANCE
     rotations = matrices.copy()
@@ -257,14 +306,21 @@ def _check_covariances(table: Table, covariances: FloatArray) -> None:
     if np.any(wrong):
         raise table.error(
             int(np.argmax(wrong)),
-            "c11 to c66 are not a covariance: they must be symmetric, with "
-            "correlations from -1 to 1. Correct or remove these columns.",
+            sentence(
+                "poses.no-covariance",
+                "c11 to c66 are not a covariance: they must be symmetric, with "
+                "correlations from -1 to 1. Correct or remove these columns.",
+            ),
         )
     values = np.linalg.eigvalsh(covariances)
     singular = values[:, 0] <= SINGULAR * values[:, -1]
     if np.any(singular):
         raise table.error(
             int(np.argmax(singular)),
-            "the covariance c11 to c66 leaves a direction without any uncertainty, "
-            "which no measurement does. Correct or remove these columns.",
+            sentence(
+                "poses.certain-direction",
+                "the covariance c11 to c66 leaves a direction without any "
+                "uncertainty, which no measurement does. Correct or remove these "
+                "columns.",
+            ),
         )

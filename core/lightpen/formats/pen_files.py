@@ -39,7 +39,9 @@ from lightpen.model.pen import (
     check_leds,
     in_pen_frame,
 )
+from lightpen.sentences import Sentence, sentence
 
+PEN_FILE = sentence("file.pen", "pen file")
 PEN_FILE_LIMIT = MEGABYTE
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
 LARGEST_DIAMETER = 100.0  # mm
@@ -92,7 +94,7 @@ def read_pen(
         check_leds(pen.leds, pen.diameter)
         check_frame(pen)
     except FileError as error:
-        raise FileError(f"{printable(path.name)}: {error}") from error
+        raise _flawed(path, error) from error
     return pen
 
 
@@ -133,7 +135,7 @@ def read_raw_pen(
             pen = replace(pen, normals=_facing_normals(pen.n_leds))
         check_frame(pen)
     except FileError as error:
-        raise FileError(f"{printable(path.name)}: {error}") from error
+        raise _flawed(path, error) from error
     return pen if nominal_tip is None else replace(pen, nominal_tip=nominal_tip)
 
 
@@ -178,14 +180,22 @@ def write_pen(pen: Pen, path: Path) -> None:
     elif suffix == ".csv":
         if pen.name or pen.nominal_tip is not None:
             raise UsageError(
-                f"{printable(path.name)} is a table, which has no place for the name "
-                "and the nominal tip of the pen. Choose a name that ends in .json."
+                sentence(
+                    "pen-file.table-has-no-place",
+                    "{name} is a table, which has no place for the name and the "
+                    "nominal tip of the pen. Choose a name that ends in .json.",
+                    name=printable(path.name),
+                )
             )
         text = _csv_text(pen)
     else:
         raise UsageError(
-            f"A pen is written as .csv or .json, but {printable(path.name)} ends in "
-            "neither. Choose such a name."
+            sentence(
+                "pen-file.suffix",
+                "A pen is written as .csv or .json, but {name} ends in neither. "
+                "Choose such a name.",
+                name=printable(path.name),
+            )
         )
     write_whole(path, text.encode())
 
@@ -206,8 +216,13 @@ def _pen(
 ) -> Pen:
     if diameter is not None and not 0 < diameter <= LARGEST_DIAMETER:
         raise UsageError(
-            f"The LED discs cannot be {diameter:g} mm wide. Give a diameter of up to "
-            f"{LARGEST_DIAMETER:g} mm."
+            sentence(
+                "pen-file.given-diameter",
+                "The LED discs cannot be {diameter:g} mm wide. Give a diameter of "
+                "up to {most:g} mm.",
+                diameter=diameter,
+                most=LARGEST_DIAMETER,
+            )
         )
     if nominal_tip is None:
         nominal_tip = content.nominal_tip
@@ -219,6 +234,17 @@ def _pen(
     return Pen(content.leds, normals, diameter, nominal_tip, content.name)
 
 
+def _flawed(path: Path, flaw: FileError) -> FileError:
+    return FileError(
+        sentence(
+            "pen-file.flawed",
+            "{name}: {flaw}",
+            name=printable(path.name),
+            flaw=flaw.sentence,
+        )
+    )
+
+
 def _facing_normals(n_leds: int) -> FloatArray:
     return np.tile([0.0, 0.0, 1.0], (n_leds, 1))
 
@@ -226,10 +252,14 @@ def _facing_normals(n_leds: int) -> FloatArray:
 def _read(path: Path, units: str | None) -> _Content:
     if units is not None and units not in UNITS:
         raise UsageError(
-            f"{quoted(units)} is not a unit of length known here. Choose one of "
-            f"{', '.join(UNITS)}."
+            sentence(
+                "pen-file.unknown-unit",
+                "{unit} is not a unit of length known here. Choose one of {known}.",
+                unit=quoted(units),
+                known=", ".join(UNITS),
+            )
         )
-    text = read_text(path, "pen file", PEN_FILE_LIMIT)
+    text = read_text(path, PEN_FILE, PEN_FILE_LIMIT)
     name = printable(path.name)
     if text.lstrip().startswith(("{", "[")):
         return _from_json(parse_json(text, name), units, name)
@@ -240,15 +270,22 @@ def _from_table(table: Table, units: str | None) -> _Content:
     named = [_name_and_unit(column) for column in table.header]
     stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}
     if len(stated) > 1:
+        one, other = sorted(stated)[:2]
         raise FileError(
-            f"{table.name} has coordinates in {' and in '.join(sorted(stated))}. Give "
-            "all of them in one unit."
+            sentence(
+                "pen-file.mixed-units",
+                "{name} has coordinates in {one} and in {other}. Give all of them "
+                "in one unit.",
+                name=table.name,
+                one=one,
+                other=other,
+            )
         )
     unit = _agreed_unit(stated.pop() if stated else "", units, table.name)
     bare = replace(table, header=tuple(name for name, _ in named))
     with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
     wanted = [_LED_NAMES, *_COORDINATES, *(_NORMALS if with_normals else ())]
-    columns = bare.columns(wanted, "the LEDs of a pen")
+    columns = bare.columns(wanted, sentence("table.of-leds", "the LEDs of a pen"))
     _check_numbering(table, columns[0])
     numbers = table.numbers(columns[1:])
     diameter = None
@@ -260,7 +297,10 @@ def _from_table(table: Table, units: str | None) -> _Content:
     if with_normals:
         normals = np.empty((len(numbers), 3))
         for i, line in enumerate(table.lines):
-            normals[i] = _unit(numbers[i, 3:], f"Line {line} of {table.name}")
+            where = sentence(
+                "pen-file.line", "Line {line} of {name}", line=line, name=table.name
+            )
+            normals[i] = _unit(numbers[i, 3:], where)
     return _Content(numbers[:, :3] * UNITS[unit], normals, diameter)
 
 
@@ -276,14 +316,24 @@ def _name_and_unit(column: str) -> tuple[str, str]:
 def _agreed_unit(stated: str, given: str | None, name: str) -> str:
     if stated and given and stated != given:
         raise UsageError(
-            f"{name} states its lengths in {stated}, but --units {given} is given. "
-            "Leave the option away, or correct the file."
+            sentence(
+                "pen-file.contradicting-units",
+                "{name} states its lengths in {stated}, but the unit {given} is "
+                "given. Leave the unit away, or correct the file.",
+                name=name,
+                stated=stated,
+                given=given,
+            )
         )
     unit = stated or given
     if not unit:
         raise UsageError(
-            f"{name} does not say which units its coordinates have. Name them, such as "
-            "--units mm, or in the header: led,x_mm,y_mm,z_mm."
+            sentence(
+                "pen-file.no-units",
+                "{name} does not say which units its coordinates have. Name them, "
+                "or write them into the header: led,x_mm,y_mm,z_mm.",
+                name=name,
+            )
         )
     return unit
 
@@ -298,18 +348,30 @@ def _check_numbering(table: Table, column: int) -> None:
     found, needed = int(numbers[row]), row + 1
     earlier = np.flatnonzero(numbers[:row] == found)
     if len(earlier):
-        text = f"LED {found} is listed already on line {table.lines[earlier[0]]}."
+        flaw = sentence(
+            "pen-file.listed-twice",
+            "LED {led} is listed already on line {line}.",
+            led=found,
+            line=table.lines[earlier[0]],
+        )
     elif needed in numbers:
-        text = (
-            f"LED {found} stands where LED {needed} is needed. List the LEDs from 1 to "
-            f"{len(numbers)} in ascending order."
+        flaw = sentence(
+            "pen-file.out-of-order",
+            "LED {led} stands where LED {needed} is needed. List the LEDs from 1 to "
+            "{n_leds} in ascending order.",
+            led=found,
+            needed=needed,
+            n_leds=len(numbers),
         )
     else:
-        text = (
-            f"LED {found} stands where LED {needed} is needed, and no line has LED "
-            f"{needed}. Number the LEDs from 1 without gaps."
+        flaw = sentence(
+            "pen-file.gap",
+            "LED {led} stands where LED {needed} is needed, and no line has LED "
+            "{needed}. Number the LEDs from 1 without gaps.",
+            led=found,
+            needed=needed,
         )
-    raise table.error(row, text)
+    raise table.error(row, flaw)
 
 
 def _common_diameter(table: Table, column: int) -> float:
@@ -318,8 +380,13 @@ def _common_diameter(table: Table, column: int) -> float:
     if np.any(other):
         raise table.error(
             int(np.argmax(other)),
-            f"the diameter is {diameters[other][0]:g} where the first LED has "
-            f"{diameters[0]:g}. All LEDs of a pen must be equally wide.",
+            sentence(
+                "pen-file.diameters-differ",
+                "the diameter is {diameter:g} where the first LED has {first:g}. "
+                "All LEDs of a pen must be equally wide.",
+                diameter=diameters[other][0],
+                first=diameters[0],
+            ),
         )
     return float(diameters[0])
 
@@ -327,18 +394,29 @@ def _common_diameter(table: Table, column: int) -> float:
 def _check_diameter(diameter: float, name: str) -> None:
     if not 0 < diameter <= LARGEST_DIAMETER:
         raise FileError(
-            f"{name} has LED discs {diameter:g} mm wide. A diameter of up to "
-            f"{LARGEST_DIAMETER:g} mm is needed; check its units."
+            sentence(
+                "pen-file.diameter",
+                "{name} has LED discs {diameter:g} mm wide. A diameter of up to "
+                "{most:g} mm is needed; check its units.",
+                name=name,
+                diameter=diameter,
+                most=LARGEST_DIAMETER,
+            )
         )
 
 
-def _unit(normal: FloatArray, place: str) -> FloatArray:
+def _unit(normal: FloatArray, place: str | Sentence) -> FloatArray:
     """Return a normal of unit length, unchanged if it has it but for rounding."""
     squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
     if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
         raise FileError(
-            f"{place}: the normal {' '.join(f'{c:g}' for c in normal)} does not have "
-            "the length 1. Correct it, or leave the normals away if all discs face +z."
+            sentence(
+                "pen-file.normal-length",
+                "{place}: the normal {normal} does not have the length 1. Correct "
+                "it, or leave the normals away if all discs face +z.",
+                place=place,
+                normal=" ".join(f"{c:g}" for c in normal),
+            )
         )
     return normal if abs(squared - 1) < 1e-9 else normal / np.sqrt(squared)
 
@@ -346,16 +424,26 @@ def _unit(normal: FloatArray, place: str) -> FloatArray:
 def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
     if not isinstance(tree, dict):
         raise FileError(
-            f"{name} is a list; a pen file is a mapping with leds and units. Write it "
-            "so."
+            sentence(
+                "pen-file.list",
+                "{name} is a list; a pen file is a mapping with leds and units. "
+                "Write it so.",
+                name=name,
+            )
         )
     entries = Entries.of(tree, name)
     _refuse_other_keys(entries, _FILE_KEYS, name)
     stated = entries.word("units").casefold()
     if stated and stated not in _UNIT_NAMES:
         raise FileError(
-            f"{name} has the units {quoted(stated)}, which are not known here. Use one "
-            f"of {', '.join(UNITS)}."
+            sentence(
+                "pen-file.unknown-units-in-file",
+                "{name} has the units {unit}, which are not known here. Use one of "
+                "{known}.",
+                name=name,
+                unit=quoted(stated),
+                known=", ".join(UNITS),
+            )
         )
     unit = UNITS[_agreed_unit(_UNIT_NAMES.get(stated, ""), units, name)]
     leds = _listed_leds(entries, name)
@@ -380,24 +468,37 @@ def _listed_leds(entries: Entries, name: str) -> list[Entries]:
     listed = entries.value("leds")
     if not isinstance(listed, list) or not listed:
         raise FileError(
-            f"leds in {name} is no list of LEDs. Write it as [{{"
-            '"led": 1, "x": 0, "y": 0, "z": -30}, ...].'
+            sentence(
+                "pen-file.no-led-list",
+                "leds in {name} is no list of LEDs. Write it as "
+                '[{{"led": 1, "x": 0, "y": 0, "z": -30}}, ...].',
+                name=name,
+            )
         )
     leds = []
     for number, tree in enumerate(listed, 1):
-        place = f"LED {number} of {name}"
+        place = sentence("pen-file.led", "LED {led} of {name}", led=number, name=name)
         if not isinstance(tree, dict):
             raise FileError(
-                f"{place} is no mapping. Write it as "
-                '{"led": 1, "x": 0, "y": 0, "z": -30}.'
+                sentence(
+                    "pen-file.led-no-mapping",
+                    "{place} is no mapping. Write it as "
+                    '{{"led": 1, "x": 0, "y": 0, "z": -30}}.',
+                    place=place,
+                )
             )
         led = Entries.of(tree, place)
         _refuse_other_keys(led, _LED_KEYS, place)
         if led.counted(1, "led")[0] != number:
             raise FileError(
-                f"Entry {number} of leds in {name} is LED "
-                f"{led.counted(1, 'led')[0]:g}. List the LEDs from 1 in ascending "
-                "order, each once."
+                sentence(
+                    "pen-file.entry-out-of-order",
+                    "Entry {number} of leds in {name} is LED {led:g}. List the LEDs "
+                    "from 1 in ascending order, each once.",
+                    number=number,
+                    name=name,
+                    led=led.counted(1, "led")[0],
+                )
             )
         leds.append(led)
     return leds
@@ -409,18 +510,29 @@ def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
         return None
     if not all(given):
         raise FileError(
-            f"LED {given.index(False) + 1} of {name} has no normal, but others have. "
-            "Give the normals of all LEDs or of none."
+            sentence(
+                "pen-file.some-normals",
+                "LED {led} of {name} has no normal, but others have. Give the "
+                "normals of all LEDs or of none.",
+                led=given.index(False) + 1,
+                name=name,
+            )
         )
     return np.array([_unit(led.counted(3, "normal"), led.name) for led in leds])
 
 
-def _refuse_other_keys(entries: Entries, known: set[str], name: str) -> None:
+def _refuse_other_keys(entries: Entries, known: set[str], name: str | Sentence) -> None:
     for plain, (key, _) in entries.values.items():
         if plain not in known:
             raise FileError(
-                f"{name} has {quoted(key)}, which means nothing here. Remove it, or "
-                f"correct it to one of {', '.join(sorted(known))}."
+                sentence(
+                    "pen-file.unknown-key",
+                    "{name} has {key}, which means nothing here. Remove it, or "
+                    "correct it to one of {known}.",
+                    name=name,
+                    key=quoted(key),
+                    known=", ".join(sorted(known)),
+                )
             )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, quoted, read_text
+from lightpen.sentences import Sentence, sentence
 
 MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters
@@ -20,18 +21,17 @@ LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
 _NUMBER = r"(?a:[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
+_BLANK = sentence("look-alike.blank", "blank inside")
 _LOOK_ALIKES = {
-    "O": "letter O",
-    "o": "letter o",
-    "l": "letter l",
-    "I": "letter I",
-    "S": "letter S",
-    "B": "letter B",
-    "\N{MINUS SIGN}": "a typographic minus sign",
-    "\N{EN DASH}": "a dash in place of a minus sign",
-    "_": "underscore",
-    " ": "blank inside",
-    "\N{NO-BREAK SPACE}": "blank inside",
+    **{
+        letter: sentence("look-alike.letter", "letter {letter}", letter=letter)
+        for letter in "OolISB"
+    },
+    "\N{MINUS SIGN}": sentence("look-alike.minus", "a typographic minus sign"),
+    "\N{EN DASH}": sentence("look-alike.dash", "a dash in place of a minus sign"),
+    "_": sentence("look-alike.underscore", "underscore"),
+    " ": _BLANK,
+    "\N{NO-BREAK SPACE}": _BLANK,
 }
 _CUT_SHORT_ROWS = 20  # fewer rows are typed by hand and may end in a shorter number
 
@@ -62,7 +62,7 @@ class Table:
         """Number of columns."""
         return len(self.rows[0])
 
-    def columns(self, names: Sequence[Sequence[str]], what: str) -> list[int]:
+    def columns(self, names: Sequence[Sequence[str]], what: Sentence) -> list[int]:
         """Return where columns are.
 
         A table without header has its columns in the order of `names`.
@@ -71,7 +71,7 @@ class Table:
         ----------
         names : sequence of sequences of str
             For each column the names it may have, the preferred one first.
-        what : str
+        what : Sentence
             What the table holds, for the sentences.
 
         Raises
@@ -83,25 +83,51 @@ class Table:
         if not self.header:
             if self.n_columns == len(names):
                 return list(range(len(names)))
+            n_columns = (
+                sentence("table.one-column", "1 column")
+                if self.n_columns == 1
+                else sentence("table.columns", "{count} columns", count=self.n_columns)
+            )
             raise FileError(
-                f"{self.name} has no header and {self.n_columns} "
-                f"{'column' if self.n_columns == 1 else 'columns'}; {what} need the "
-                f"{len(names)} columns {wanted}. Put a header line with these names on "
-                "top, and separate the columns by commas, semicolons or tabs."
+                sentence(
+                    "table.no-header",
+                    "{name} has no header and {n_columns}; {what} need the {n_needed} "
+                    "columns {wanted}. Put a header line with these names on top, and "
+                    "separate the columns by commas, semicolons or tabs.",
+                    name=self.name,
+                    n_columns=n_columns,
+                    what=what,
+                    n_needed=len(names),
+                    wanted=wanted,
+                )
             )
         places = []
         for alternatives in names:
             found = [i for i, name in enumerate(self.header) if name in alternatives]
             if not found:
                 raise FileError(
-                    f"{self.name} has no column {alternatives[0]}; {what} need the "
-                    f"columns {wanted}. Its header is "
-                    f"{quoted(','.join(self.header))}. Name the columns so."
+                    sentence(
+                        "table.no-column",
+                        "{name} has no column {column}; {what} need the columns "
+                        "{wanted}. Its header is {header}. Name the columns so.",
+                        name=self.name,
+                        column=alternatives[0],
+                        what=what,
+                        wanted=wanted,
+                        header=quoted(",".join(self.header)),
+                    )
                 )
             if len(found) > 1:
                 raise FileError(
-                    f"Columns {found[0] + 1} and {found[1] + 1} of {self.name} both "
-                    f"hold {alternatives[0]}. Remove one of them."
+                    sentence(
+                        "table.two-columns",
+                        "Columns {first} and {second} of {name} both hold {column}. "
+                        "Remove one of them.",
+                        first=found[0] + 1,
+                        second=found[1] + 1,
+                        name=self.name,
+                        column=alternatives[0],
+                    )
                 )
             places.append(found[0])
         return places
@@ -151,32 +177,50 @@ class Table:
         if np.any(wrong):
             row = int(np.argmax(wrong))
             raise self.error(
-                row, f"{quoted(self.rows[row][column])} is not a whole number."
+                row,
+                sentence(
+                    "table.not-whole",
+                    "{cell} is not a whole number.",
+                    cell=quoted(self.rows[row][column]),
+                ),
             )
         return values.astype(np.int64)
 
-    def error(self, row: int, text: str) -> FileError:
+    def error(self, row: int, flaw: Sentence) -> FileError:
         """Return the error that names the line of a row."""
-        return FileError(f"Line {self.lines[row]} of {self.name}: {text}")
+        return FileError(
+            sentence(
+                "table.line",
+                "Line {line} of {name}: {flaw}",
+                line=self.lines[row],
+                name=self.name,
+                flaw=flaw,
+            )
+        )
 
     def _refuse_numbers(self, columns: Sequence[int]) -> NoReturn:
         """Raise the error of the cell that keeps `numbers` from its result."""
         first: dict[str, int] = {}
         for i, row in enumerate(self.rows):
             for cell in (row[column] for column in columns):
-                if number_flaw(cell.replace(",", ".")):
-                    raise self.error(i, number_flaw(cell))
+                flaw = number_flaw(cell)
+                if flaw and number_flaw(cell.replace(",", ".")):
+                    raise self.error(i, flaw)
                 for mark in ".,":
                     if mark in cell:
                         first.setdefault(mark, i)
         raise self.error(
             max(first.values()),
-            "the file has decimal points and decimal commas, the other ones on line "
-            f"{self.lines[min(first.values())]}. Use one of them throughout.",
+            sentence(
+                "table.points-and-commas",
+                "the file has decimal points and decimal commas, the other ones on "
+                "line {line}. Use one of them throughout.",
+                line=self.lines[min(first.values())],
+            ),
         )
 
 
-def read_table(path: Path, what: str, limit: int) -> Table:
+def read_table(path: Path, what: Sentence, limit: int) -> Table:
     """Read a table from delimited text.
 
     The separator is found from the lines: semicolon, tab, comma or blanks. Numbers may
@@ -186,7 +230,7 @@ def read_table(path: Path, what: str, limit: int) -> Table:
     Parameters
     ----------
     path : Path
-    what : str
+    what : Sentence
         What the file is, for the sentences.
     limit : int
         Largest size, bytes.
@@ -208,7 +252,13 @@ def parse_table(text: str, name: str) -> Table:
         separator = hint[1]
         del lines[0]
     if not lines:
-        raise FileError(f"{name} has no rows. Check that it is complete.")
+        raise FileError(
+            sentence(
+                "table.no-rows",
+                "{name} has no rows. Check that it is complete.",
+                name=name,
+            )
+        )
     numbers = [number for number, _ in lines]
     rows = [_cells(line, separator, number, name) for number, line in lines]
     if all(row[-1] == "" and len(row) > 1 for row in rows):
@@ -219,27 +269,45 @@ def parse_table(text: str, name: str) -> Table:
         header = tuple(cell.casefold() for cell in rows.pop(0))
         _check_header(header, numbers.pop(0), name)
     if not rows:
-        raise FileError(f"{name} has a header but no rows below it.")
+        raise FileError(
+            sentence(
+                "table.only-header",
+                "{name} has a header but no rows below it.",
+                name=name,
+            )
+        )
     table = Table(name, header, rows, numbers)
     if not text.endswith("\n"):
         _check_last_number(table)
     return table
 
 
-def number_flaw(text: str) -> str:
-    """Return what keeps a text from being a finite number, or an empty string."""
+def number_flaw(text: str) -> Sentence | None:
+    """Return what keeps a text from being a finite number."""
     if re.fullmatch(_NUMBER, text):
-        if math.isfinite(float(text)):
-            return ""
-        return f"{quoted(text)} is too large a number."
+        return None if math.isfinite(float(text)) else too_large_number(text)
     if not text:
-        return "a cell is empty where a number is needed."
+        return sentence("number.missing", "a cell is empty where a number is needed.")
     if re.fullmatch(_NOT_FINITE, text):
-        return f"{quoted(text)} is not a finite number."
+        return sentence(
+            "number.not-finite", "{cell} is not a finite number.", cell=quoted(text)
+        )
     for character, meaning in _LOOK_ALIKES.items():
         if character in text and any(map(str.isdigit, text)):
-            return f"{quoted(text)} is not a number ({meaning})."
-    return f"{quoted(text)} is not a number."
+            return sentence(
+                "number.look-alike",
+                "{cell} is not a number ({meaning}).",
+                cell=quoted(text),
+                meaning=meaning,
+            )
+    return sentence("number.none", "{cell} is not a number.", cell=quoted(text))
+
+
+def too_large_number(text: str) -> Sentence:
+    """Return the flaw of a number beyond all that is measured."""
+    return sentence(
+        "number.too-large", "{cell} is too large a number.", cell=quoted(text)
+    )
 
 
 def _clean_numbers(cells: list[str]) -> FloatArray | None:
@@ -262,8 +330,13 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
     """Return the lines that are neither blank nor comments, with their numbers."""
     if text.count("\n") > MAX_LINES:
         raise FileError(
-            f"{name} has more than {MAX_LINES} lines. Check that the right file is "
-            "named, or divide it."
+            sentence(
+                "table.too-many-lines",
+                "{name} has more than {most} lines. Check that the right file is "
+                "named, or divide it.",
+                name=name,
+                most=MAX_LINES,
+            )
         )
     lines = [
         (number, line)
@@ -271,12 +344,24 @@ def _filled_lines(text: str, name: str) -> list[tuple[int, str]]:
         if line and not line.isspace() and line.lstrip()[0] != "#"
     ]
     if not lines:
-        raise FileError(f"{name} has no lines but comments. Check that it is complete.")
+        raise FileError(
+            sentence(
+                "table.only-comments",
+                "{name} has no lines but comments. Check that it is complete.",
+                name=name,
+            )
+        )
     for number, line in lines:
         if len(line) > MAX_LINE_LENGTH:
             raise FileError(
-                f"Line {number} of {name} has {len(line)} characters, which no row of "
-                "a table has. Check that the right file is named."
+                sentence(
+                    "table.long-line",
+                    "Line {line} of {name} has {n_characters} characters, which no "
+                    "row of a table has. Check that the right file is named.",
+                    line=number,
+                    name=name,
+                    n_characters=len(line),
+                )
             )
     return lines
 
@@ -304,8 +389,13 @@ def _cells(line: str, separator: str | None, number: int, name: str) -> list[str
         return [cell.strip() for cell in next(reader)]
     except csv.Error as error:
         raise FileError(
-            f"Line {number} of {name}: the quotation marks do not pair up. Remove or "
-            "complete them."
+            sentence(
+                "table.quotation-marks",
+                "Line {line} of {name}: the quotation marks do not pair up. Remove "
+                "or complete them.",
+                line=number,
+                name=name,
+            )
         ) from error
 
 
@@ -321,13 +411,29 @@ def _check_lengths(
     for number, row in zip(numbers, rows, strict=True):
         if len(row) != expected:
             hint = (
-                "If numbers have decimal commas, separate the columns by semicolons."
+                sentence(
+                    "table.decimal-commas",
+                    "If numbers have decimal commas, separate the columns by "
+                    "semicolons.",
+                )
                 if separator == "," and len(row) > expected
-                else "Complete the line; if it is the last one, the file is cut short."
+                else sentence(
+                    "table.short-line",
+                    "Complete the line; if it is the last one, the file is cut short.",
+                )
             )
             raise FileError(
-                f"Line {number} of {name} has {len(row)} cells where line {numbers[0]} "
-                f"has {expected}. {hint}"
+                sentence(
+                    "table.line-lengths",
+                    "Line {line} of {name} has {n_cells} cells where line "
+                    "{first_line} has {expected}. {hint}",
+                    line=number,
+                    name=name,
+                    n_cells=len(row),
+                    first_line=numbers[0],
+                    expected=expected,
+                    hint=hint,
+                )
             )
 
 
@@ -336,8 +442,14 @@ def _check_header(header: tuple[str, ...], number: int, name: str) -> None:
     for column in header:
         if column in seen:
             raise FileError(
-                f"Line {number} of {name}: the header names {quoted(column)} twice. "
-                "Give each column a name of its own."
+                sentence(
+                    "table.column-twice",
+                    "Line {line} of {name}: the header names {column} twice. Give "
+                    "each column a name of its own.",
+                    line=number,
+                    name=name,
+                    column=quoted(column),
+                )
             )
         seen.add(column)
 
@@ -350,7 +462,13 @@ def _check_last_number(table: Table) -> None:
     if len(set(decimals[:-1])) == 1 and decimals[-1] < decimals[0]:
         raise table.error(
             len(table.rows) - 1,
-            f"the file ends within the number {quoted(table.rows[-1][-1])}, which has "
-            f"{decimals[-1]} decimals where all others have {decimals[0]}. Copy the "
-            "file again, or remove the line.",
+            sentence(
+                "table.cut-short",
+                "the file ends within the number {number}, which has {n_decimals} "
+                "decimals where all others have {n_others}. Copy the file again, or "
+                "remove the line.",
+                number=quoted(table.rows[-1][-1]),
+                n_decimals=decimals[-1],
+                n_others=decimals[0],
+            ),
         )

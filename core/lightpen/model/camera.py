@@ -26,6 +26,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.sentences import sentence
 
 UNDISTORT_STEPS = 20
 UNDISTORT_TOLERANCE = 1e-12  # normalised units: 1e-8 px at any sensible focal length
@@ -255,9 +256,12 @@ class Camera:
                         break
                     return PointMap(normalised, inverse)
         raise CalibrationError(
-            "The lens distortion of the camera file cannot be undone for some image "
-            "points: its coefficients fold the image. Check the distortion "
-            "coefficients, or calibrate the camera again."
+            sentence(
+                "camera.distortion-folds",
+                "The lens distortion of the camera file cannot be undone for some "
+                "image points: its coefficients fold the image. Check the "
+                "distortion coefficients, or calibrate the camera again.",
+            )
         )
 
 

@@ -5,6 +5,7 @@ in the camera: the scatter matrix of the rotations, ``mean (R_i - R)^T (R_i - R)
 by how much. A swing about one axis leaves that axis without scatter.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.model.rigid import nearest_rotation
+from lightpen.sentences import Sentence, sentence
 
 MIN_SPREAD = np.radians(3.0)  # rms turn of the worst direction; a cone of 3 degrees
 TILT_RINGS = (np.radians(8.0), np.radians(20.0))  # upright, leaning, leaning far
@@ -126,37 +128,64 @@ def require_spread(rotations: FloatArray) -> None:
     spread, axes = posture_spread(rotations)
     if spread[0] >= MIN_SPREAD:
         return
-    found = f"{np.degrees(spread[0]):.1f} degrees"
-    needed = f"{np.degrees(MIN_SPREAD):.0f} degrees are needed"
+    found, needed = float(np.degrees(spread[0])), math.degrees(MIN_SPREAD)
     if spread[1] < MIN_SPREAD:
         raise CalibrationError(
-            f"The pen hardly moved: its postures differ by {found} (rms), {needed}. "
-            "Tilt the pen to all sides, by 20 degrees or more, and turn it about its "
-            "own axis."
+            sentence(
+                "coverage.hardly-moved",
+                "The pen hardly moved: its postures differ by {found:.1f} degrees "
+                "(rms), {needed:.0f} degrees are needed. Tilt the pen to all sides, "
+                "by 20 degrees or more, and turn it about its own axis.",
+                found=found,
+                needed=needed,
+            )
         )
     raise CalibrationError(
-        f"The pen was swung about one axis only, {_axis_name(axes[0])}: that axis "
-        f"itself turned by {found} (rms), {needed}, so the tip's place along it is "
-        f"not fixed. {_advice(axes[0])}"
+        sentence(
+            "coverage.one-axis",
+            "The pen was swung about one axis only, {axis}: that axis itself turned "
+            "by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the "
+            "tip's place along it is not fixed. {advice}",
+            axis=_axis_name(axes[0]),
+            found=found,
+            needed=needed,
+            advice=_advice(axes[0]),
+        )
     )
 
 
-def _axis_name(axis: FloatArray) -> str:
+def _axis_name(axis: FloatArray) -> Sentence:
     largest = int(np.argmax(np.abs(axis)))
     if abs(axis[largest]) > 0.9:
-        return f"the pen's {'xyz'[largest]} axis"
-    return "the direction ({:.2f}, {:.2f}, {:.2f}) of the pen".format(*axis)
+        return sentence("pen.axis", "the pen's {axis} axis", axis="xyz"[largest])
+    x, y, z = axis.tolist()
+    return sentence(
+        "pen.direction",
+        "the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen",
+        x=x,
+        y=y,
+        z=z,
+    )
 
 
-def _advice(axis: FloatArray) -> str:
+def _advice(axis: FloatArray) -> Sentence:
     largest = int(np.argmax(np.abs(axis)))
     return (
-        "Lean the pen to the left and right as well as towards and away from the "
-        "camera, and turn it about its own axis.",
-        "Tilt the pen to all sides, by 20 degrees or more, not only about its own "
-        "axis.",
-        "Lean the pen towards and away from the camera as well as to the left and "
-        "right, and turn it about its own axis.",
+        sentence(
+            "coverage.lean-sideways",
+            "Lean the pen to the left and right as well as towards and away from the "
+            "camera, and turn it about its own axis.",
+        ),
+        sentence(
+            "coverage.tilt",
+            "Tilt the pen to all sides, by 20 degrees or more, not only about its own "
+            "axis.",
+        ),
+        sentence(
+            "coverage.lean-forth",
+            "Lean the pen towards and away from the camera as well as to the left and "
+            "right, and turn it about its own axis.",
+        ),
     )[largest]
 
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import FileError
+from lightpen.sentences import Sentence, sentence
 
 DISC_DIAMETER = 10.0  # mm, of each LED of the paper's pen
 FRAME_TOLERANCE = 1.0  # mm; LEDs deviate by up to 0.4 mm from line and plane
@@ -39,13 +40,17 @@ MIN_OFF_LINE = 0.02  # of the pen's extent, of the LED farthest from the best li
 
 _BACK, _LEFT, _RIGHT = slice(0, 4), slice(4, 7), slice(7, 10)
 _HANDEDNESS = (
-    (
-        "x",
+    sentence(
+        "pen.sign-of-x",
         "LEDs 5 to 7 must have negative x and 8 to 10 positive x. Change the sign of "
         "all x, or exchange the columns if they are numbered the wrong way.",
     ),
-    ("y", "y must grow from LED 1 to LED 4. Change the sign of all y."),
-    ("z", "LEDs 1 to 4 must have negative z. Change the sign of all z."),
+    sentence(
+        "pen.sign-of-y", "y must grow from LED 1 to LED 4. Change the sign of all y."
+    ),
+    sentence(
+        "pen.sign-of-z", "LEDs 1 to 4 must have negative z. Change the sign of all z."
+    ),
 )
 
 
@@ -98,27 +103,48 @@ def check_leds(leds: FloatArray, diameter: float) -> None:
     """
     if not MIN_LEDS <= len(leds) <= MAX_LEDS:
         raise FileError(
-            f"A pen needs {MIN_LEDS} to {MAX_LEDS} LEDs; the file has {len(leds)}. "
-            "Check that it is the complete file of a pen."
+            sentence(
+                "pen.number-of-leds",
+                "A pen needs {least} to {most} LEDs; the file has {n_leds}. Check "
+                "that it is the complete file of a pen.",
+                least=MIN_LEDS,
+                most=MAX_LEDS,
+                n_leds=len(leds),
+            )
         )
     farthest = np.abs(leds).max(axis=1)
     if farthest.max() > MAX_COORDINATE:
         raise FileError(
-            f"LED {np.argmax(farthest) + 1} is {farthest.max() / 1000:.6g} m from the "
-            "origin, which no pen is. Check the numbers and their units."
+            sentence(
+                "pen.far-led",
+                "LED {led} is {distance:.6g} m from the origin, which no pen is. "
+                "Check the numbers and their units.",
+                led=int(np.argmax(farthest)) + 1,
+                distance=float(farthest.max()) / 1000,
+            )
         )
     extent = float(np.ptp(leds, axis=0).max())
     if extent > MAX_EXTENT:
         raise FileError(
-            f"The LEDs span {extent / 1000:.6g} m; a pen spans at most "
-            f"{MAX_EXTENT / 1000:g} m. Check that the coordinates are in millimetres, "
-            "in the header too, or name their units, such as --units um."
+            sentence(
+                "pen.too-large",
+                "The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. "
+                "Check that the coordinates are in millimetres, in the header too, "
+                "or name their units.",
+                extent=extent / 1000,
+                most=MAX_EXTENT / 1000,
+            )
         )
     if extent < diameter:
         raise FileError(
-            f"The LEDs span only {extent:.4g} mm, less than one disc of "
-            f"{diameter:g} mm. Are the coordinates in metres? Then name the units: "
-            "x_m, y_m, z_m in the header, or --units m on the command line."
+            sentence(
+                "pen.too-small",
+                "The LEDs span only {extent:.4g} mm, less than one disc of "
+                "{diameter:g} mm. Are the coordinates in metres? Then name the "
+                "units, such as in the header: x_m, y_m, z_m.",
+                extent=extent,
+                diameter=diameter,
+            )
         )
     _check_separation(leds, diameter)
     _check_not_in_line(leds, extent)
@@ -149,18 +175,26 @@ def check_frame(pen: Pen) -> None:
     worst = int(np.argmax(deviations))
     if deviations[worst] > FRAME_TOLERANCE:
         raise FileError(
-            f"The LEDs are not in the pen frame: LED {worst + 1} is "
-            f"{deviations[worst]:.2f} mm from where the frame puts it (origin in front "
-            "of LED 1, y along LEDs 1 to 4, LEDs 5 to 10 at z = 0). If these are a "
-            "measuring machine's coordinates, put them into the pen frame, on "
-            "the command line with: lightpen pen RAW.csv OUT.csv."
+            sentence(
+                "pen.not-in-frame",
+                "The LEDs are not in the pen frame: LED {led} is {distance:.2f} mm "
+                "from where the frame puts it (origin in front of LED 1, y along "
+                "LEDs 1 to 4, LEDs 5 to 10 at z = 0). If these are a measuring "
+                "machine's coordinates, put them into the pen frame.",
+                led=worst + 1,
+                distance=float(deviations[worst]),
+            )
         )
     backwards = np.flatnonzero(pen.normals[:, 2] <= 0)
     if len(backwards):
         raise FileError(
-            f"The normal of LED {backwards[0] + 1} points away from the viewer (nz = "
-            f"{pen.normals[backwards[0], 2]:.3f}); nz must be positive in the pen "
-            "frame. Change its sign."
+            sentence(
+                "pen.normal-backwards",
+                "The normal of LED {led} points away from the viewer (nz = "
+                "{nz:.3f}); nz must be positive in the pen frame. Change its sign.",
+                led=int(backwards[0]) + 1,
+                nz=float(pen.normals[backwards[0], 2]),
+            )
         )
 
 
@@ -191,18 +225,26 @@ def pen_frame_from_raw(raw_leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     slots = _layout(raw_leds)
     if slots is None:
         raise FileError(
-            "The LEDs do not stand as the pen frame needs it: ten LEDs, 1 to 4 in a "
-            "line behind the plane of 5 to 10, and these in two columns of three "
-            f"parallel to the line, all within {FRAME_TOLERANCE:g} mm. "
-            f"{_misfit(raw_leds)} Measure the LEDs again, or give a pen of another "
-            "layout in a frame of its own."
+            sentence(
+                "pen.no-frame",
+                "The LEDs do not stand as the pen frame needs it: ten LEDs, 1 to 4 "
+                "in a line behind the plane of 5 to 10, and these in two columns of "
+                "three parallel to the line, all within {tolerance:g} mm. {misfit} "
+                "Measure the LEDs again, or give a pen of another layout in a frame "
+                "of its own.",
+                tolerance=FRAME_TOLERANCE,
+                misfit=_misfit(raw_leds),
+            )
         )
     if not _check_order(raw_leds, slots):
         raise FileError(
-            "The LEDs are a mirror image of the pen: seen from the front with LED 4 "
-            "above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on the right. "
-            "If the machine's axes are left-handed, change the sign of one coordinate; "
-            "if the columns are exchanged, number them anew."
+            sentence(
+                "pen.mirror-image",
+                "The LEDs are a mirror image of the pen: seen from the front with "
+                "LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on "
+                "the right. If the machine's axes are left-handed, change the sign "
+                "of one coordinate; if the columns are exchanged, number them anew.",
+            )
         )
     return _frame(raw_leds)
 
@@ -231,8 +273,16 @@ def _check_separation(leds: FloatArray, diameter: float) -> None:
     nearest = distances[first, second]
     if nearest < MIN_SEPARATION * diameter:
         raise FileError(
-            f"LEDs {first + 1} and {second + 1} are {nearest:.2f} mm apart, too close "
-            f"for discs of {diameter:g} mm. Check their coordinates and the diameter."
+            sentence(
+                "pen.leds-too-close",
+                "LEDs {first} and {second} are {distance:.2f} mm apart, too close "
+                "for discs of {diameter:g} mm. Check their coordinates and the "
+                "diameter.",
+                first=int(first) + 1,
+                second=int(second) + 1,
+                distance=float(nearest),
+                diameter=diameter,
+            )
         )
 
 
@@ -240,9 +290,15 @@ def _check_not_in_line(leds: FloatArray, extent: float) -> None:
     off_line = _off_line(leds).max()
     if off_line < MIN_OFF_LINE * extent:
         raise FileError(
-            f"The LEDs stand in a line within {off_line:.2f} mm over {extent:.0f} mm, "
-            "so a turn about it could not be seen. At least one LED must stand "
-            f"{MIN_OFF_LINE * extent:.1f} mm off the line."
+            sentence(
+                "pen.leds-in-line",
+                "The LEDs stand in a line within {off_line:.2f} mm over "
+                "{extent:.0f} mm, so a turn about it could not be seen. At least "
+                "one LED must stand {needed:.1f} mm off the line.",
+                off_line=off_line,
+                extent=extent,
+                needed=MIN_OFF_LINE * extent,
+            )
         )
 
 
@@ -325,16 +381,35 @@ def _out_of_order(order: IntArray) -> FileError:
     wrong = np.flatnonzero(order != np.arange(10))
     if len(wrong) == 2:
         return FileError(
-            f"LEDs {wrong[0] + 1} and {wrong[1] + 1} are exchanged: each stands where "
-            "the other belongs. LEDs 1 to 4 must follow each other along the back "
-            "line, and 5 to 7 and 8 to 10 along the columns in the same direction. "
-            "Exchange their coordinates."
+            sentence(
+                "pen.leds-exchanged",
+                "LEDs {first} and {second} are exchanged: each stands where the "
+                "other belongs. LEDs 1 to 4 must follow each other along the back "
+                "line, and 5 to 7 and 8 to 10 along the columns in the same "
+                "direction. Exchange their coordinates.",
+                first=int(wrong[0]) + 1,
+                second=int(wrong[1]) + 1,
+            )
         )
-    places = _listing([f"{order[j] + 1} where {j + 1} belongs" for j in wrong])
+    places = _listing(
+        [
+            sentence(
+                "pen.led-in-place-of",
+                "{led} where {other} belongs",
+                led=int(order[j]) + 1,
+                other=int(j) + 1,
+            )
+            for j in wrong
+        ]
+    )
     return FileError(
-        f"The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each other "
-        "along the back line, and 5 to 7 and 8 to 10 along the columns in the same "
-        "direction. Number them so."
+        sentence(
+            "pen.out-of-order",
+            "The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each "
+            "other along the back line, and 5 to 7 and 8 to 10 along the columns in "
+            "the same direction. Number them so.",
+            places=places,
+        )
     )
 
 
@@ -347,37 +422,55 @@ def _mirrored(leds: FloatArray) -> FileError:
             break
     else:
         return FileError(
-            "The LEDs are neither in the pen frame nor right-handed: they are a mirror "
-            "image of the pen. Change the sign of one coordinate, then put them into "
-            "the pen frame, on the command line with: lightpen pen RAW.csv OUT.csv."
+            sentence(
+                "pen.neither-framed-nor-handed",
+                "The LEDs are neither in the pen frame nor right-handed: they are a "
+                "mirror image of the pen. Change the sign of one coordinate, then "
+                "put them into the pen frame.",
+            )
         )
-    name, rule = _HANDEDNESS[axis]
     worst = int(np.argmax(np.abs(leds[:, axis])))
     return FileError(
-        f"The LEDs are mirrored in {name}, a left-handed frame: LED {worst + 1} has "
-        f"{name} = {leds[worst, axis]:.2f} mm in place of {-leds[worst, axis]:.2f} mm. "
-        f"{rule}"
+        sentence(
+            "pen.mirrored-axis",
+            "The LEDs are mirrored in {axis}, a left-handed frame: LED {led} has "
+            "{axis} = {found:.2f} mm in place of {needed:.2f} mm. {rule}",
+            axis="xyz"[axis],
+            led=worst + 1,
+            found=float(leds[worst, axis]),
+            needed=-float(leds[worst, axis]),
+            rule=_HANDEDNESS[axis],
+        )
     )
 
 
-def _misfit(leds: FloatArray) -> str:
+def _misfit(leds: FloatArray) -> Sentence:
     """Return a sentence about what keeps LEDs from being the paper's layout."""
     if len(leds) != 10:
-        return f"The file has {len(leds)} LEDs."
+        return sentence(
+            "pen.led-count", "The file has {n_leds} LEDs.", n_leds=len(leds)
+        )
     off_line = _off_line(leds[_BACK])
     front = leds[4:] - leds[4:].mean(axis=0)
     off_plane = np.abs(front @ np.linalg.svd(front)[2][2])
     if off_line.max() > FRAME_TOLERANCE:
-        return (
-            f"LED {np.argmax(off_line) + 1} is {off_line.max():.2f} mm off the line of "
-            "LEDs 1 to 4."
+        return sentence(
+            "pen.off-line",
+            "LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.",
+            led=int(np.argmax(off_line)) + 1,
+            distance=float(off_line.max()),
         )
     if off_plane.max() > FRAME_TOLERANCE:
-        return (
-            f"LED {np.argmax(off_plane) + 5} is {off_plane.max():.2f} mm off the plane "
-            "of LEDs 5 to 10."
+        return sentence(
+            "pen.off-plane",
+            "LED {led} is {distance:.2f} mm off the plane of LEDs 5 to 10.",
+            led=int(np.argmax(off_plane)) + 5,
+            distance=float(off_plane.max()),
         )
-    return "The line, the plane and the columns are not parallel, or too close."
+    return sentence(
+        "pen.not-parallel",
+        "The line, the plane and the columns are not parallel, or too close.",
+    )
 
 
 def _in_frame(leds: FloatArray) -> FloatArray:
@@ -398,5 +491,6 @@ def _frame(leds: FloatArray) -> tuple[FloatArray, FloatArray]:
     return R, -R @ origin
 
 
-def _listing(items: Sequence[str]) -> str:
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+def _listing(items: Sequence[Sentence]) -> Sentence:
+    *others, last = items
+    return sentence("list.and", "{others} and {last}", others=tuple(others), last=last)

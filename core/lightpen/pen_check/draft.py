@@ -11,6 +11,7 @@ from lightpen.formats.pen_files import LARGEST_DIAMETER, NORMAL_TOLERANCE
 from lightpen.formats.tables import number_flaw
 from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import FrameCheck, examine_frame, moved_into_frame
+from lightpen.sentences import Sentence, sentence
 
 COLUMNS = ("x", "y", "z", "nx", "ny", "nz")
 DECIMALS = 6  # of coordinates in mm, as they are shown
@@ -25,18 +26,24 @@ class CellFlaw:
     ----------
     row, column : int
         From 0; the columns are those of `COLUMNS`.
-    text : str
-        What is wrong with it, after LED and column.
+    flaw : Sentence
+        What is wrong with it.
     """
 
     row: int
     column: int
-    text: str
+    flaw: Sentence
 
     @property
-    def sentence(self) -> str:
+    def sentence(self) -> Sentence:
         """What is wrong, and where."""
-        return f"LED {self.row + 1}, {COLUMNS[self.column]}: {self.text}"
+        return sentence(
+            "draft.cell",
+            "LED {led}, {column}: {flaw}",
+            led=self.row + 1,
+            column=COLUMNS[self.column],
+            flaw=self.flaw,
+        )
 
 
 @dataclass(frozen=True)
@@ -103,7 +110,7 @@ class PenDraft:
             CellFlaw(row, column, flaw)
             for row, cells in enumerate(self.rows)
             for column, cell in enumerate(cells)
-            if (flaw := number_flaw(_pointed(cell)) and number_flaw(cell))
+            if number_flaw(_pointed(cell)) and (flaw := number_flaw(cell))
         )
 
     def pen(self) -> Pen:
@@ -124,12 +131,23 @@ class PenDraft:
     def _diameter(self) -> float:
         flaw = number_flaw(_pointed(self.diameter))
         if flaw:
-            raise FileError(f"Diameter of the discs: {flaw}")
+            raise FileError(
+                sentence(
+                    "draft.diameter",
+                    "Diameter of the discs: {flaw}",
+                    flaw=flaw,
+                )
+            )
         diameter = float(_pointed(self.diameter))
         if not 0 < diameter <= LARGEST_DIAMETER:
             raise FileError(
-                f"The LED discs cannot be {diameter:g} mm wide. Give a diameter of up "
-                f"to {LARGEST_DIAMETER:g} mm."
+                sentence(
+                    "draft.disc-diameter",
+                    "The LED discs cannot be {diameter:g} mm wide. Give a diameter "
+                    "of up to {most:g} mm.",
+                    diameter=diameter,
+                    most=LARGEST_DIAMETER,
+                )
             )
         return diameter
 
@@ -139,7 +157,14 @@ class PenDraft:
         for axis, cell in zip("xyz", self.tip, strict=True):
             flaw = number_flaw(_pointed(cell))
             if flaw:
-                raise FileError(f"Nominal tip, {axis}: {flaw}")
+                raise FileError(
+                    sentence(
+                        "draft.nominal-tip",
+                        "Nominal tip, {axis}: {flaw}",
+                        axis=axis,
+                        flaw=flaw,
+                    )
+                )
         return np.array([float(_pointed(cell)) for cell in self.tip])
 
 
@@ -149,8 +174,8 @@ class DraftCheck:
 
     Attributes
     ----------
-    flaw : str
-        Why it is no pen: the cell and what is wrong with it; empty if it is one.
+    flaw : Sentence or None
+        Why it is no pen: the cell and what is wrong with it.
     pen : Pen or None
         The pen as it is typed.
     frame : FrameCheck or None
@@ -159,7 +184,7 @@ class DraftCheck:
         The pen to look for in images: in the pen frame if it can be put there.
     """
 
-    flaw: str = ""
+    flaw: Sentence | None = None
     pen: Pen | None = None
     frame: FrameCheck | None = None
     sought: Pen | None = None
@@ -184,7 +209,7 @@ def check_draft(draft: PenDraft, pen: Pen | None = None) -> DraftCheck:
     try:
         pen = pen or draft.pen()
     except FileError as error:
-        return DraftCheck(str(error))
+        return DraftCheck(error.sentence)
     frame = examine_frame(pen)
     sought = pen if frame.is_a_pen else None
     if frame.can_be_moved:
@@ -206,8 +231,12 @@ def _unit_normals(normals: FloatArray) -> FloatArray:
     wrong = np.flatnonzero(np.abs(lengths - 1) > NORMAL_TOLERANCE)
     if len(wrong):
         raise FileError(
-            f"LED {wrong[0] + 1}: the normal "
-            f"{' '.join(f'{c:g}' for c in normals[wrong[0]])} does not have the length "
-            "1. Correct it; a disc that faces +z has the normal 0 0 1."
+            sentence(
+                "draft.normal-length",
+                "LED {led}: the normal {normal} does not have the length 1. Correct "
+                "it; a disc that faces +z has the normal 0 0 1.",
+                led=int(wrong[0]) + 1,
+                normal=" ".join(f"{c:g}" for c in normals[wrong[0]]),
+            )
         )
     return np.asarray(normals / lengths[:, None])

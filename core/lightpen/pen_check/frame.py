@@ -15,6 +15,7 @@ from lightpen.model.pen import (
     in_pen_frame,
     pen_frame_from_raw,
 )
+from lightpen.sentences import Sentence
 
 
 class Rule(StrEnum):
@@ -63,17 +64,17 @@ class FrameCheck:
     ----------
     checks : tuple of RuleCheck
         In the order of `Rule`.
-    error : str
-        Why the pen cannot be used, with LED and amount; empty if it can.
-    remark : str
-        Why it is no pen of the paper's layout; empty if it is, or is in error.
+    error : Sentence or None
+        Why the pen cannot be used, with LED and amount.
+    remark : Sentence or None
+        Why it is no pen of the paper's layout, though it is not in error.
     can_be_moved : bool
         Whether its coordinates can be put into the pen frame.
     """
 
     checks: tuple[RuleCheck, ...]
-    error: str = ""
-    remark: str = ""
+    error: Sentence | None = None
+    remark: Sentence | None = None
     can_be_moved: bool = False
 
     @property
@@ -90,7 +91,7 @@ def examine_frame(pen: Pen) -> FrameCheck:
     try:
         check_leds(pen.leds, pen.diameter)
     except FileError as error:
-        return FrameCheck(_all_open(Rule.LEDS), str(error))
+        return FrameCheck(_all_open(Rule.LEDS), error.sentence)
     off_layout, off_frame = _layout_error(pen.leds), _frame_error(pen)
     if off_layout and not off_frame:
         return FrameCheck(_all_open(), remark=off_layout)
@@ -119,20 +120,20 @@ def moved_into_frame(pen: Pen) -> Pen:
     return moved
 
 
-def _layout_error(leds: FloatArray) -> str:
+def _layout_error(leds: FloatArray) -> Sentence | None:
     try:
         pen_frame_from_raw(leds)
     except FileError as error:
-        return str(error)
-    return ""
+        return error.sentence
+    return None
 
 
-def _frame_error(pen: Pen) -> str:
+def _frame_error(pen: Pen) -> Sentence | None:
     try:
         check_frame(pen)
     except FileError as error:
-        return str(error)
-    return ""
+        return error.sentence
+    return None
 
 
 def _all_open(broken: Rule | None = None) -> tuple[RuleCheck, ...]:

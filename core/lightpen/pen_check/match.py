@@ -36,6 +36,7 @@ from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
 from lightpen.pen_check.shifts import Shift, find_shifts, triple
 from lightpen.pen_check.unknown_leds import find_unknown_leds
+from lightpen.sentences import Sentence
 
 MAX_VIEWS = 30
 MOVED = 0.006  # of the extent of the spots, by which views differ
@@ -50,8 +51,8 @@ SURE_SHARE = 0.1  # of its length, likewise
 class What(StrEnum):
     """What is wrong; what `Finding` holds is given beside."""
 
-    ADVICE = "advice"  # text
-    EXCHANGED = "exchanged"  # two LEDs; text: coordinates, "y", or "x/y" for either
+    ADVICE = "advice"
+    EXCHANGED = "exchanged"  # two LEDs, axes
     SHIFTED = "shifted"  # LED, by
     SHIFTED_EITHER = "shifted either"  # two LEDs, of which one is; by
     UNSEEN = "unseen"  # LED
@@ -72,14 +73,18 @@ class Finding:
         Pen frame, mm.
     is_sure : bool
         Whether the views differ enough to tell `by`.
-    text : str
+    axes : str
+        Coordinates that two LEDs have of each other: "y", or "x/y" for either.
+    advice : Sentence or None
+        What is likely wrong with the files as a whole, and what to do.
     """
 
     what: What
     leds: tuple[int, ...] = ()
     by: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_sure: bool = True
-    text: str = ""
+    axes: str = ""
+    advice: Sentence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,14 +150,14 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
         if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_LEDS
     ]
     if not found or 2 * len(found) < len(views):
-        sentence = diagnose(views, camera, pen) if views else ""
-        return _without_pen(pen, len(views), sentence)
+        advice = diagnose(views, camera, pen) if views else None
+        return _without_pen(pen, len(views), advice)
     spots = [views[i] for i in found]
     seen = _Seen.of(camera, pen, spots, [labels[i] for i in found])
     if len(seen.missing) > 1:
-        sentence = diagnose_mirror(spots, camera, pen)
-        if sentence:
-            return _without_pen(pen, len(views), sentence)
+        advice = diagnose_mirror(spots, camera, pen)
+        if advice:
+            return _without_pen(pen, len(views), advice)
     located = _located(camera, pen, seen)
     residuals = _residuals(camera, pen, located, seen.poses)
     sigma = robust_sigma(residuals, 6)
@@ -253,14 +258,14 @@ def _located(camera: Camera, pen: Pen, seen: _Seen) -> _Located:
     )
 
 
-def _without_pen(pen: Pen, n_views: int, sentence: str) -> PenMatch:
+def _without_pen(pen: Pen, n_views: int, advice: Sentence | None) -> PenMatch:
     return PenMatch(
         n_views=n_views,
         n_labelled=0,
         n_seen=np.zeros(pen.n_leds, dtype=np.int64),
         rms=np.full(pen.n_leds, np.nan),
         sigma=float("nan"),
-        findings=(Finding(What.ADVICE, text=sentence),) if sentence else (),
+        findings=(Finding(What.ADVICE, advice=advice),) if advice else (),
     )
 
 
@@ -371,7 +376,7 @@ def _findings(pen: Pen, located: _Located) -> tuple[Finding, ...]:
     for one, other in combinations(sorted(shifts), 2):
         axes = _exchanged(pen.leds, shifts[one], shifts[other])
         if axes and one in left and other in left:
-            findings.append(Finding(What.EXCHANGED, (one, other), text=axes))
+            findings.append(Finding(What.EXCHANGED, (one, other), axes=axes))
             del left[one], left[other]
     for shift in left.values():
         is_sure = shift.sigma < max(SURE, SURE_SHARE * shift.length)

@@ -15,6 +15,7 @@ from typing import IO
 
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
+from lightpen.sentences import sentence
 
 PATIENCE = 0.5  # s for one who only looks, or is about to close, to let go
 PAUSE = 0.01  # s between two attempts
@@ -42,8 +43,12 @@ def lock_journal(journal: IO[bytes], folder: Path) -> None:
     """
     if not _is_taken_over(journal.fileno(), shared=False):
         raise FileError(
-            f"Another program is writing to the swing in {printable(str(folder))}. Go "
-            "on with it there, or close that program and try again."
+            sentence(
+                "record.locked",
+                "Another program is writing to the swing in {folder}. Go on with it "
+                "there, or close that program and try again.",
+                folder=printable(str(folder)),
+            )
         )
 
 

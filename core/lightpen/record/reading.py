@@ -33,14 +33,20 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.errors import FileError
-from lightpen.formats.camera_files import read_camera
+from lightpen.formats.camera_files import CAMERA_FILE, read_camera
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
-from lightpen.formats.images import MAX_FILE_SIZE, ImageSource, decode_image
-from lightpen.formats.pen_files import read_pen
+from lightpen.formats.images import (
+    IMAGE_FILE,
+    MAX_FILE_SIZE,
+    ImageSource,
+    decode_image,
+)
+from lightpen.formats.pen_files import PEN_FILE, read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.record.names import Names
+from lightpen.sentences import Sentence, sentence
 
 HEADER, JOURNAL, IMAGES = "header.json", "journal.jsonl", "images"
 FORMAT = 1
@@ -59,7 +65,7 @@ class FileCopy:
     data: bytes
 
     @classmethod
-    def of(cls, path: Path, what: str) -> Self:
+    def of(cls, path: Path, what: Sentence) -> Self:
         """Read a file; ``what`` it is, for the sentences."""
         return cls(path.name, read_bytes(path, what, 4 * MEGABYTE))
 
@@ -239,9 +245,13 @@ def open_record(folder: Path) -> Record:
                     more = int(entries["min_images"]), int(entries["max_images"])
         except (ValueError, KeyError, TypeError) as error:
             raise FileError(
-                f"Line {number} of {printable(str(folder / JOURNAL))} is damaged. "
-                "Restore the file from a copy, or remove the line to go on without "
-                "that image."
+                sentence(
+                    "record.damaged-line",
+                    "Line {line} of {file} is damaged. Restore the file from a "
+                    "copy, or remove the line to go on without that image.",
+                    line=number,
+                    file=printable(str(folder / JOURNAL)),
+                )
             ) from error
     return Record(
         folder, header, tuple(images), taken_out, verdict, more, _length_of(lines)
@@ -270,7 +280,7 @@ def is_record(folder: Path) -> bool:
     try:
         return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
     except OSError as error:
-        raise unreadable(folder, "folder", error) from error
+        raise unreadable(folder, sentence("file.folder", "folder"), error) from error
 
 
 def missing_parts(folder: Path) -> tuple[str, ...]:
@@ -348,11 +358,15 @@ def source(record: Record) -> RecordSource:
 
 
 def _load(image: RecordedImage) -> Image:
-    data = read_bytes(image.file, "image", MAX_FILE_SIZE)
+    data = read_bytes(image.file, IMAGE_FILE, MAX_FILE_SIZE)
     if sha256(data).hexdigest() != image.sha256:
         raise FileError(
-            f"{image.file.name} is not as it was recorded (wrong checksum). Restore "
-            "it from a copy."
+            sentence(
+                "record.image-changed",
+                "{name} is not as it was recorded (wrong checksum). Restore it from "
+                "a copy.",
+                name=image.file.name,
+            )
         )
     return decode_image(data, image.file.name)
 
@@ -387,7 +401,9 @@ def _sound_lines(folder: Path) -> list[bytes]:
     path = folder / JOURNAL
     if path.is_file() and path.stat().st_size == 0:
         return []
-    lines = read_bytes(path, "journal", JOURNAL_LIMIT).split(b"\n")[:-1]
+    lines = read_bytes(path, sentence("file.journal", "journal"), JOURNAL_LIMIT).split(
+        b"\n"
+    )[:-1]
     if lines and not _is_whole(lines[-1]):  # blocks of zeros, after a power cut
         lines.pop()
     return lines
@@ -412,7 +428,8 @@ def _is_whole(line: bytes) -> bool:
 
 def _read_header(folder: Path) -> Header:
     path = folder / HEADER
-    data = read_bytes(path, "record's header", HEADER_LIMIT)
+    header = sentence("file.header", "record's header")
+    data = read_bytes(path, header, HEADER_LIMIT)
     try:
         entries = json.loads(data)
         if entries["format"] > FORMAT:
@@ -421,8 +438,8 @@ def _read_header(folder: Path) -> Header:
             raise ValueError(entries["format"])
         tip = entries["nominal_tip_mm"]
         return Header(
-            camera=_read_copy(folder, "camera", entries["camera_file"]),
-            pen=_read_copy(folder, "pen", entries["pen_file"]),
+            camera=_read_copy(folder, "camera", CAMERA_FILE, entries["camera_file"]),
+            pen=_read_copy(folder, "pen", PEN_FILE, entries["pen_file"]),
             created=datetime.fromisoformat(entries["created"]),
             program=entries["program"],
             station=entries["station"],
@@ -437,25 +454,41 @@ def _read_header(folder: Path) -> Header:
         )
     except (ValueError, KeyError, TypeError) as error:
         raise FileError(
-            f"{printable(str(path))} is damaged. Restore it from a copy."
+            sentence(
+                "record.damaged",
+                "{path} is damaged. Restore it from a copy.",
+                path=printable(str(path)),
+            )
         ) from error
 
 
 def _of_later_version(path: Path, number: Any) -> FileError:
     return FileError(
-        f"{printable(str(path))} was written by a later version of the program (format "
-        f"{number}; this version reads {FORMAT}). Open the record with that version."
+        sentence(
+            "record.later-version",
+            "{path} was written by a later version of the program (format {number}; "
+            "this version reads {known}). Open the record with that version.",
+            path=printable(str(path)),
+            number=number,
+            known=FORMAT,
+        )
     )
 
 
-def _read_copy(folder: Path, stem: str, entries: Mapping[str, str]) -> FileCopy:
+def _read_copy(
+    folder: Path, stem: str, what: Sentence, entries: Mapping[str, str]
+) -> FileCopy:
     name = entries["name"]
     path = folder / (stem + Path(name).suffix.lower())
-    data = read_bytes(path, f"{stem} file", 4 * MEGABYTE)
+    data = read_bytes(path, what, 4 * MEGABYTE)
     if sha256(data).hexdigest() != entries["sha256"]:
         raise FileError(
-            f"{printable(str(path))} is not as it was recorded (wrong checksum). "
-            "Restore it from a copy."
+            sentence(
+                "record.file-changed",
+                "{path} is not as it was recorded (wrong checksum). Restore it from "
+                "a copy.",
+                path=printable(str(path)),
+            )
         )
     return FileCopy(name, data)
 

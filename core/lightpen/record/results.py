@@ -14,8 +14,15 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.files import MEGABYTE, printable, read_bytes, write_whole
+from lightpen.formats.files import (
+    MEGABYTE,
+    printable,
+    read_bytes,
+    strerror,
+    write_whole,
+)
 from lightpen.record.names import Names
+from lightpen.sentences import sentence
 
 FORMAT = 1
 LIMIT = MEGABYTE
@@ -65,8 +72,13 @@ def store_result(root: Path, result: Result) -> Path:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise FileError(
-            f"The folder {printable(str(root))} cannot be made: {error.strerror}. "
-            "Make sure that it is yours to write."
+            sentence(
+                "results.no-folder",
+                "The folder {folder} cannot be made: {reason}. Make sure that it is "
+                "yours to write.",
+                folder=printable(str(root)),
+                reason=strerror(error),
+            )
         ) from error
     newest = _files(root)[:1]
     number = 1 + (_number(newest[0]) if newest else 0)
@@ -119,7 +131,7 @@ def _number(file: Path) -> int:
 
 
 def _read(file: Path) -> Result:
-    data = read_bytes(file, "result", LIMIT)
+    data = read_bytes(file, sentence("file.result", "result"), LIMIT)
     try:
         entries = json.loads(data)
         ball = entries["ball_diameter_mm"]
@@ -150,6 +162,10 @@ def _read(file: Path) -> Result:
 
 def _damaged(file: Path) -> FileError:
     return FileError(
-        f"The result {printable(str(file))} is damaged. Restore it from a copy, or "
-        "move it away to go on without it."
+        sentence(
+            "results.damaged",
+            "The result {file} is damaged. Restore it from a copy, or move it away "
+            "to go on without it.",
+            file=printable(str(file)),
+        )
     )

@@ -26,6 +26,7 @@ from lightpen.estimation.joint import ContactModel, reduce
 from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.reading import Record, RecordSource, source
+from lightpen.sentences import sentence
 
 TURNS = 8  # steps by which an image that is left out is turned into the fit
 
@@ -93,8 +94,12 @@ def solve_record(
     """
     if not record.images:
         raise CalibrationError(
-            f"The record {record.folder.name} holds no images. Resume the swing, or "
-            "begin a new one."
+            sentence(
+                "record.no-images",
+                "The record {name} holds no images. Resume the swing, or begin a "
+                "new one.",
+                name=record.folder.name,
+            )
         )
     found = source(record)
     observations = observe_images(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lightpen.errors import FileError
-from lightpen.formats.files import printable
+from lightpen.formats.files import printable, strerror
 from lightpen.record.lock import is_locked
 from lightpen.record.reading import (
     DISCARDED,
@@ -16,6 +16,7 @@ from lightpen.record.reading import (
     open_record,
 )
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import Sentence, sentence
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,12 @@ class DamagedSwing:
     Attributes
     ----------
     folder : Path
-    sentence : str
+    sentence : Sentence
         What is damaged, and what to do.
     """
 
     folder: Path
-    sentence: str
+    sentence: Sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,9 +68,13 @@ def find_unfinished(root: Path) -> Unfinished:
         folders = list(root.iterdir()) if root.is_dir() else []
     except OSError as error:
         raise FileError(
-            f"The folder {printable(str(root))} cannot be read: {error.strerror}. "
-            "Interrupted swings in it are not offered; make sure that it is yours to "
-            "read."
+            sentence(
+                "unfinished.folder-unreadable",
+                "The folder {folder} cannot be read: {reason}. Interrupted swings "
+                "in it are not offered; make sure that it is yours to read.",
+                folder=printable(str(root)),
+                reason=strerror(error),
+            )
         ) from error
     interrupted, under_way, damaged = [], [], []
     for folder in sorted(folders, reverse=True):
@@ -82,14 +87,16 @@ def find_unfinished(root: Path) -> Unfinished:
             else:
                 interrupted.append(record)
         except OSError as error:
-            sentence = (
-                f"The swing in {printable(str(folder))} cannot be read: "
-                f"{error.strerror}. Make sure that it is yours to read, or move the "
-                "folder away."
+            unreadable = sentence(
+                "unfinished.swing-unreadable",
+                "The swing in {folder} cannot be read: {reason}. Make sure that it is "
+                "yours to read, or move the folder away.",
+                folder=printable(str(folder)),
+                reason=strerror(error),
             )
-            damaged.append(DamagedSwing(folder, sentence))
+            damaged.append(DamagedSwing(folder, unreadable))
         except FileError as error:
-            damaged.append(DamagedSwing(folder, str(error)))
+            damaged.append(DamagedSwing(folder, error.sentence))
     return Unfinished(
         _newest_first(interrupted), _newest_first(under_way), tuple(damaged)
     )
@@ -137,15 +144,25 @@ def _read_unfinished(folder: Path) -> Record | None:
     for name in (HEADER, JOURNAL):
         if not (folder / name).exists():
             raise FileError(
-                f"{printable(str(folder))} holds images of a swing, but no {name}. "
-                "Restore this file from a copy, or move the folder away."
+                sentence(
+                    "unfinished.file-missing",
+                    "{folder} holds images of a swing, but no {name}. Restore this "
+                    "file from a copy, or move the folder away.",
+                    folder=printable(str(folder)),
+                    name=name,
+                )
             )
     record = open_record(folder)
     # A crash leaves no more than one image without a line.
     if not record.images and n_images > 1:
         raise FileError(
-            f"{printable(str(journal))} knows none of the {n_images} images in its "
-            "folder. Restore this file from a copy."
+            sentence(
+                "unfinished.unknown-images",
+                "{journal} knows none of the {n_images} images in its folder. "
+                "Restore this file from a copy.",
+                journal=printable(str(journal)),
+                n_images=n_images,
+            )
         )
     return record if record.images and record.verdict is None else None
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
-from lightpen.formats.files import printable, write_whole
+from lightpen.formats.files import printable, strerror, write_whole
 from lightpen.record.lock import lock_journal, unlock_journal
 from lightpen.record.reading import (
     FORMAT,
@@ -30,6 +30,7 @@ from lightpen.record.reading import (
     open_record,
     sound_length,
 )
+from lightpen.sentences import sentence
 
 
 class RecordWriter:
@@ -56,8 +57,12 @@ class RecordWriter:
         """
         if folder.is_dir() and any(folder.iterdir()):
             raise FileError(
-                f"The folder {printable(str(folder))} is not empty. Choose another "
-                "for this swing; nothing is overwritten."
+                sentence(
+                    "record.not-empty",
+                    "The folder {folder} is not empty. Choose another for this "
+                    "swing; nothing is overwritten.",
+                    folder=printable(str(folder)),
+                )
             )
         try:
             (folder / IMAGES).mkdir(parents=True)
@@ -258,9 +263,13 @@ def _own_journal(folder: Path, length: int) -> FileIO:
             lock_journal(journal, folder)
             if sound_length(folder) != length:
                 raise FileError(
-                    f"The swing in {printable(str(folder))} has changed since it was "
-                    "read: another program wrote to it. Read it again to go on with "
-                    "all of its images."
+                    sentence(
+                        "record.changed-meanwhile",
+                        "The swing in {folder} has changed since it was read: "
+                        "another program wrote to it. Read it again to go on with "
+                        "all of its images.",
+                        folder=printable(str(folder)),
+                    )
                 )
             journal.truncate(length)
         except OSError as error:
@@ -300,8 +309,13 @@ def _point(point: FloatArray) -> list[float] | None:
 
 def _unwritable(path: Path, error: OSError) -> FileError:
     return FileError(
-        f"{printable(str(path))} cannot be written: {error.strerror or error}. Free "
-        "some space or choose another folder; the images recorded so far are safe."
+        sentence(
+            "record.unwritable",
+            "{path} cannot be written: {reason}. Free some space or choose another "
+            "folder; the images recorded so far are safe.",
+            path=printable(str(path)),
+            reason=strerror(error),
+        )
     )
 
 

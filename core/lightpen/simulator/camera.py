@@ -27,6 +27,7 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
+from lightpen.sentences import sentence
 from lightpen.simulator.faults import Faults
 from lightpen.simulator.hand import Held, Operator
 from lightpen.simulator.image_plans import ImagePlan, led_gains, render_plan
@@ -126,12 +127,20 @@ class SimulatedCamera:
         broken = self.faults.now()
         if broken.is_unplugged:
             raise DeviceNotFound(
-                f"The simulated camera {self._serial} is not plugged in. Plug it in."
+                sentence(
+                    "simulated-camera.unplugged",
+                    "The simulated camera {serial} is not plugged in. Plug it in.",
+                    serial=self._serial,
+                )
             )
         if self._now < broken.busy_until:
             raise DeviceBusy(
-                f"Another program uses the simulated camera {self._serial}. Close that "
-                "program, or wait a few seconds."
+                sentence(
+                    "simulated-camera.busy",
+                    "Another program uses the simulated camera {serial}. Close that "
+                    "program, or wait a few seconds.",
+                    serial=self._serial,
+                )
             )
         if self._n_unplugged != broken.n_unplugged:
             self._n_unplugged = broken.n_unplugged
@@ -152,8 +161,13 @@ class SimulatedCamera:
         pixel_format = settings.pixel_format or now.pixel_format
         if pixel_format not in BITS:
             raise ConfigError(
-                f"The simulated camera has no pixel format {pixel_format}; it has "
-                f"{', '.join(BITS)}. Choose one of these."
+                sentence(
+                    "simulated-camera.pixel-format",
+                    "The simulated camera has no pixel format {wanted}; it has "
+                    "{offered}. Choose one of these.",
+                    wanted=str(pixel_format),
+                    offered=", ".join(BITS),
+                )
             )
         self._settings = CameraSettings(
             exposure_us=_applied(EXPOSURE_US, settings.exposure_us, now.exposure_us),
@@ -201,8 +215,12 @@ class SimulatedCamera:
         self._check_open()
         if self._is_cut_off:
             raise DeviceLost(
-                f"The simulated camera {self._serial} no longer answers. Check its "
-                "cable and its power."
+                sentence(
+                    "simulated-camera.lost",
+                    "The simulated camera {serial} no longer answers. Check its "
+                    "cable and its power.",
+                    serial=self._serial,
+                )
             )
 
     def stats(self) -> Stats:
@@ -252,8 +270,13 @@ class SimulatedCamera:
             self._clock.wait(limit - self._now)
             self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
             raise FrameTimeout(
-                f"The simulated camera {self._serial} sent no image for "
-                f"{timeout_s:.1f} s. Check its cable."
+                sentence(
+                    "simulated-camera.silent",
+                    "The simulated camera {serial} sent no image for {waited:.1f} s. "
+                    "Check its cable.",
+                    serial=self._serial,
+                    waited=timeout_s,
+                )
             )
         self._clock.wait(end - self._now)
 
@@ -283,8 +306,13 @@ class SimulatedCamera:
         if self.faults.take_spoilt():
             self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
             raise FrameIncomplete(
-                f"Image {seq} of the simulated camera {self._serial} arrived "
-                "incomplete. Check the cable and the network."
+                sentence(
+                    "simulated-camera.incomplete",
+                    "Image {seq} of the simulated camera {serial} arrived "
+                    "incomplete. Check the cable and the network.",
+                    seq=seq,
+                    serial=self._serial,
+                )
             )
         return self._expose(seq, end)
 

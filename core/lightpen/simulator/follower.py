@@ -2,7 +2,7 @@
 
 from math import pi
 
-from lightpen.messages import Code
+from lightpen.messages import SWING_TO_SEAT
 from lightpen.model.posture import Posture
 from lightpen.simulator.hand import Operator
 from lightpen.swing.state import Phase, SwingState
@@ -30,7 +30,7 @@ class Follower:
 
     def follow(self, state: SwingState) -> None:
         """Do what a state of the swing asks for."""
-        swings = state.phase is Phase.SEEN and state.message.code is Code.SWING_TO_SEAT
+        swings = state.phase is Phase.SEEN and state.message == SWING_TO_SEAT
         if swings:
             step = int((state.time - state.since) / LEAN_TIME)
             self._lean_towards(GENTLE_LEANS[step % len(GENTLE_LEANS)])

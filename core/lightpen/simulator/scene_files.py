@@ -13,11 +13,12 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
-from lightpen.formats.files import write_whole
+from lightpen.formats.files import strerror, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
 from lightpen.model.rigid import fit_rigid, vector_from_rotation
+from lightpen.sentences import sentence
 from lightpen.simulator.image_plans import ImagePlan, ScenePlan, plan_scene, render_plan
 from lightpen.simulator.render import hidden_fraction, led_levels
 from lightpen.simulator.rims import disc_rims, measure_insides
@@ -165,16 +166,27 @@ def _make_folder(images: Path, names: list[str]) -> None:
         raise _no_folder(images, error) from error
     if strangers:
         raise FileError(
-            f"The folder {images} holds {len(strangers)} other files, such as "
-            f"{min(strangers)}, which would get mixed up with the new images. Choose "
-            "an empty folder."
+            sentence(
+                "scene.other-files",
+                "The folder {folder} holds {n_files} other files, such as "
+                "{example}, which would get mixed up with the new images. Choose an "
+                "empty folder.",
+                folder=str(images),
+                n_files=len(strangers),
+                example=min(strangers),
+            )
         )
 
 
 def _no_folder(folder: Path, error: OSError) -> FileError:
     return FileError(
-        f"The folder {folder} cannot be made or read: {error.strerror}. Choose "
-        "another folder."
+        sentence(
+            "scene.no-folder",
+            "The folder {folder} cannot be made or read: {reason}. Choose another "
+            "folder.",
+            folder=str(folder),
+            reason=strerror(error),
+        )
     )
 
 

@@ -15,7 +15,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import LightpenError
 from lightpen.estimation.verdict import Grade, judge
-from lightpen.messages import Code, Message
+from lightpen.messages import no_tip
 from lightpen.model.limits import SwingLimits
 from lightpen.record.acceptance import accept
 from lightpen.record.archive import Archive
@@ -471,9 +471,7 @@ class SwingCourse:
         self._task = None
         solution = self._status.solution
         if solution is None:
-            self._conclude(
-                self._status, Message(Code.NO_TIP, (str(why),)), passed=False
-            )
+            self._conclude(self._status, no_tip(why), passed=False)
             return
         if set(self._tried) > set(solution.taken_out):
             why = sentence(
@@ -492,7 +490,7 @@ class SwingCourse:
         self._tell_trouble(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
-    def _conclude(self, status: SwingStatus, reason: Message, passed: bool) -> None:
+    def _conclude(self, status: SwingStatus, reason: Sentence, passed: bool) -> None:
         assert status.state is not None
         is_first = status.state.phase is not Phase.VERDICT
         transition = conclude(status.state, reason, passed)

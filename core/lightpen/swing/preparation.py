@@ -9,7 +9,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.aim import Aim
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.formats.pen_files import PEN_FILE
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -170,8 +172,8 @@ class Preparation:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
         limits = self.limits
         return Header(
-            camera=FileCopy.of(self.camera_file.path, "camera file"),
-            pen=FileCopy.of(self.pen_file.path, "pen file"),
+            camera=FileCopy.of(self.camera_file.path, CAMERA_FILE),
+            pen=FileCopy.of(self.pen_file.path, PEN_FILE),
             created=datetime.now(UTC).astimezone(),
             program=f"lightpen {version('lightpen')}",
             station=self.names.station,

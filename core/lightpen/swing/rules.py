@@ -18,8 +18,26 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    FOLLOW_ARROW,
+    HOLD_STILL,
+    LEAN_TO_YOUR_RIGHT,
+    PAUSED,
+    PEN_LIFTED,
+    PEN_LOST,
+    SEAT_TIP,
+    SHOW_PEN,
+    SOLVING,
+    SWING_TO_SEAT,
+    TOO_FAST,
+    bad_fit,
+    few_leds,
+    starts_in,
+    tip_elsewhere,
+    tip_slipped,
+)
 from lightpen.model.posture import angles_between, posture_of
+from lightpen.sentences import Sentence
 from lightpen.swing.guidance import MIN_LEDS
 from lightpen.swing.kept_images import KeptImages, keep, none_kept, without_slipped
 from lightpen.swing.rest import (
@@ -108,7 +126,7 @@ def pause(state: SwingState) -> SwingState:
     """Return the swing paused by the user."""
     if state.phase in (Phase.SOLVING, Phase.VERDICT):
         return state
-    paused = _enter(state, Phase.PAUSED, Message(Code.PAUSED))
+    paused = _enter(state, Phase.PAUSED, PAUSED)
     return replace(paused, pause=Pause.BY_USER)
 
 
@@ -121,11 +139,11 @@ def resume(state: SwingState) -> SwingState:
 
 def finish(state: SwingState) -> Transition:
     """End the capture, whatever is missing."""
-    solving = _enter(state, Phase.SOLVING, Message(Code.SOLVING))
+    solving = _enter(state, Phase.SOLVING, SOLVING)
     return Transition(replace(solving, target=None), (SwingEvent(Happening.CAPTURED),))
 
 
-def conclude(state: SwingState, verdict: Message, passed: bool) -> Transition:
+def conclude(state: SwingState, verdict: Sentence, passed: bool) -> Transition:
     """Show the verdict on the solved swing."""
     happening = Happening.DONE if passed else Happening.FAILED
     return Transition(_enter(state, Phase.VERDICT, verdict), (SwingEvent(happening),))
@@ -198,7 +216,7 @@ def _wait(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transitio
 
 def _seen(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
     if _is_lost(state):
-        return Transition(_enter(state, Phase.WAIT, Message(Code.SHOW_PEN)))
+        return Transition(_enter(state, Phase.WAIT, SHOW_PEN))
     seat = steady_seat(setup.pen, state)
     if seat is None:
         return Transition(state)
@@ -213,7 +231,7 @@ def _settle(setup: SwingSetup, state: SwingState, seat: Seat) -> Transition:
             return Transition(replace(state, message=_elsewhere(state)))
         transition = _dropped_all(setup, state)
         state, events = transition.state, [*events, *transition.events]
-    settled = _enter(state, Phase.SETTLED, Message(Code.HOLD_STILL))
+    settled = _enter(state, Phase.SETTLED, HOLD_STILL)
     return Transition(replace(settled, seat=state.kept.seat or seat), tuple(events))
 
 
@@ -225,9 +243,7 @@ def _settled(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transi
         return Transition(state)
     if state.n_kept:
         return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
-    return Transition(
-        _enter(state, Phase.COUNTDOWN, Message(Code.STARTS_IN, (ceil(COUNTDOWN),)))
-    )
+    return Transition(_enter(state, Phase.COUNTDOWN, starts_in(ceil(COUNTDOWN))))
 
 
 def _countdown(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
@@ -236,9 +252,7 @@ def _countdown(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Tran
         return unsettled
     left = COUNTDOWN - (state.time - state.since)
     if left > 0:
-        return Transition(
-            replace(state, message=Message(Code.STARTS_IN, (ceil(left),)))
-        )
+        return Transition(replace(state, message=starts_in(ceil(left))))
     return Transition(_enter(state, Phase.CAPTURING, _asking(state)))
 
 
@@ -258,7 +272,7 @@ def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
 
 def _capturing(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
     if _is_lost(state):
-        return _pause_for(state, Pause.LOST, Message(Code.PEN_LOST))
+        return _pause_for(state, Pause.LOST, PEN_LOST)
     if not sighting.has_pose:
         return Transition(state)
     if not in_place(state, state.recent[-1:]).all():
@@ -327,7 +341,7 @@ def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
     if offset(state) > LIFTED:
         if strayed_for < LEAVING:
             return transition
-        paused = _pause_for(state, Pause.LIFTED, Message(Code.PEN_LIFTED))
+        paused = _pause_for(state, Pause.LIFTED, PEN_LIFTED)
         return Transition(paused.state, (*events, *paused.events))
     if strayed_for > ASTRAY:
         if max(len(strays), FEW) < state.n_kept:
@@ -339,18 +353,14 @@ def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
     if begins and not events:
         events = (SwingEvent(Happening.SLIPPED),)
     n_dropped = len(strays) + len(dropped)
-    return Transition(
-        replace(state, message=Message(Code.TIP_SLIPPED, (n_dropped,))), events
-    )
+    return Transition(replace(state, message=tip_slipped(n_dropped)), events)
 
 
 def _paused(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
     if state.pause is Pause.BY_USER:
         return Transition(state)
     if _is_lost(state):
-        return Transition(
-            replace(state, pause=Pause.LOST, message=Message(Code.PEN_LOST))
-        )
+        return Transition(replace(state, pause=Pause.LOST, message=PEN_LOST))
     if state.time - state.since > RESEATED and rests_in_place(state, RESEATED):
         capturing = _enter(state, Phase.CAPTURING, _asking(state))
         return Transition(capturing, (SwingEvent(Happening.SEATED),))
@@ -370,7 +380,7 @@ _RULES: dict[Phase, Callable[[SwingSetup, SwingState, Sighting], Transition]] = 
 }
 
 
-def _enter(state: SwingState, phase: Phase, message: Message) -> SwingState:
+def _enter(state: SwingState, phase: Phase, message: Sentence) -> SwingState:
     return replace(
         state,
         phase=phase,
@@ -384,10 +394,10 @@ def _enter(state: SwingState, phase: Phase, message: Message) -> SwingState:
 
 def _await_seat(state: SwingState) -> SwingState:
     """Return to where the pen must be seen and seated again."""
-    return replace(_enter(state, Phase.WAIT, Message(Code.SHOW_PEN)), recent=())
+    return replace(_enter(state, Phase.WAIT, SHOW_PEN), recent=())
 
 
-def _pause_for(state: SwingState, why: Pause, message: Message) -> Transition:
+def _pause_for(state: SwingState, why: Pause, message: Sentence) -> Transition:
     paused = replace(_enter(state, Phase.PAUSED, message), pause=why)
     return Transition(paused, (SwingEvent(Happening.LOST),))
 
@@ -396,19 +406,19 @@ def _is_lost(state: SwingState) -> bool:
     return state.time - state.last_seen > LOST_AFTER
 
 
-def _seating(setup: SwingSetup) -> Message:
+def _seating(setup: SwingSetup) -> Sentence:
     known = setup.pen.nominal_tip is not None
-    return Message(Code.SEAT_TIP if known else Code.SWING_TO_SEAT)
+    return SEAT_TIP if known else SWING_TO_SEAT
 
 
-def _elsewhere(state: SwingState) -> Message:
-    return Message(Code.TIP_ELSEWHERE, (offset(state, BATCH),))
+def _elsewhere(state: SwingState) -> Sentence:
+    return tip_elsewhere(offset(state, BATCH))
 
 
-def _asking(state: SwingState) -> Message:
+def _asking(state: SwingState) -> Sentence:
     if state.heading is None:
-        return Message(Code.LEAN_TO_YOUR_RIGHT)
-    return Message(Code.FOLLOW_ARROW)
+        return LEAN_TO_YOUR_RIGHT
+    return FOLLOW_ARROW
 
 
 def _is_new(rotations: FloatArray, sighting: Sighting, spacing: float) -> bool:
@@ -433,9 +443,9 @@ def _flawed(
     flawed = _with_new(setup, state.flawed_rotations, sighting)
     needed = min(MIN_LEDS, setup.pen.n_leds)
     messages = {
-        Reason.TOO_FEW_LEDS: Message(Code.FEW_LEDS, (sighting.n_leds, needed)),
-        Reason.BLURRED: Message(Code.TOO_FAST),
-        Reason.MISFIT: Message(Code.BAD_FIT, (sighting.sigma, state.kept.sigma)),
+        Reason.TOO_FEW_LEDS: few_leds(sighting.n_leds, needed),
+        Reason.BLURRED: TOO_FAST,
+        Reason.MISFIT: bad_fit(sighting.sigma, state.kept.sigma),
     }
     return replace(
         state,

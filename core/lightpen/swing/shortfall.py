@@ -7,11 +7,18 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.sighting import Sighting
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    UNKNOWN,
+    not_upright,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
+)
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture, angles_between, posture_of, rotations_of
+from lightpen.sentences import Sentence
 from lightpen.swing.guidance import Outlook, next_posture, visible_fields
 from lightpen.swing.seat import Seat
 from lightpen.swing.state import (
@@ -115,26 +122,23 @@ def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
     return float(turns.min()), float(turns.max())
 
 
-def missing(setup: SwingSetup, state: SwingState) -> tuple[Message, ...]:
+def missing(setup: SwingSetup, state: SwingState) -> tuple[Sentence, ...]:
     """Return what a swing lacks, for an operator who wants to finish early."""
     short = measure_shortfall(setup, state)
     found = []
     if short.fields[1:].any():
         directions = np.flatnonzero(short.fields[1:].sum(axis=0))
         n_images = int(short.fields[1:].sum())
-        found.append(Message(Code.TOO_LITTLE_TILT, (n_images, *map(int, directions))))
+        found.append(too_little_tilt(n_images, map(int, directions)))
     if short.fields[0, 0]:
-        found.append(Message(Code.NOT_UPRIGHT, (int(short.fields[0, 0]),)))
+        found.append(not_upright(int(short.fields[0, 0])))
     if short.n_for_uncertainty:
         uncertainty = state.kept.uncertainty
         limit = setup.limits.max_uncertainty
-        n_images = short.n_for_uncertainty
         known = np.isfinite(uncertainty)
-        uncertain = Message(Code.UNCERTAIN, (uncertainty, limit, n_images))
-        found.append(uncertain if known else Message(Code.UNKNOWN))
+        found.append(uncertain(uncertainty, limit) if known else UNKNOWN)
     if state.n_kept < setup.limits.min_images:
-        counts = (state.n_kept, setup.limits.min_images)
-        found.append(Message(Code.TOO_FEW_IMAGES, counts))
+        found.append(too_few_images(state.n_kept, setup.limits.min_images))
     return tuple(found)
 
 

@@ -18,12 +18,13 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.messages import Code, Message
+from lightpen.messages import SHOW_PEN
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
+from lightpen.sentences import Sentence
 from lightpen.swing.kept_images import KeptImages, none_kept
 from lightpen.swing.seat import Seat
 
@@ -138,7 +139,7 @@ class SwingState:
         When the phase began, s.
     time : float
         Of the last image, s.
-    message : Message
+    message : Sentence
         What the operator should do or know now.
     kept : KeptImages
         The images and the running fit.
@@ -175,7 +176,7 @@ class SwingState:
     phase: Phase
     since: float
     time: float
-    message: Message
+    message: Sentence
     kept: KeptImages
     next_number: int
     n_dropped: Mapping[Reason, int]
@@ -215,7 +216,7 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         phase=Phase.WAIT,
         since=time,
         time=time,
-        message=Message(Code.SHOW_PEN),
+        message=SHOW_PEN,
         kept=none_kept(setup.pen.n_leds),
         next_number=1,
         n_dropped=Counter(),

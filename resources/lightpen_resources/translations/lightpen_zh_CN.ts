@@ -1475,20 +1475,8 @@
         <translation>接受之前，结果不会生效。</translation>
     </message>
     <message>
-        <source>Next: accept the tip. The old one stays in force until then.</source>
-        <translation>下一步：接受测头。在此之前旧数据一直有效。</translation>
-    </message>
-    <message>
-        <source>Next: capture more images; those of this swing are kept.</source>
-        <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
-    </message>
-    <message>
-        <source>Next: repeat the swing with the tip pressed in.</source>
-        <translation>下一步：压紧测头，重做摆动。</translation>
-    </message>
-    <message>
-        <source>Next: check the intrinsics file and the LED file, then repeat.</source>
-        <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+        <source>{0} The old one stays in force until then.</source>
+        <translation>{0}在此之前旧数据一直有效。</translation>
     </message>
     <message>
         <source>Swing the pen first.</source>
@@ -2216,42 +2204,1233 @@
     </message>
 </context>
 <context>
-    <name>phrases</name>
+    <name>core</name>
     <message>
-        <source>Show the pen</source>
-        <translation>请出示光笔</translation>
+        <source>({x:g}, {y:g}) px lies outside every image. Correct or remove the line.</source>
+        <translation>({x:g}, {y:g}) px 在任何图像之外。请改正或删除该行。</translation>
+    </message>
+    <message>
+        <source>, </source>
+        <translation>、</translation>
+    </message>
+    <message>
+        <source>1 column</source>
+        <translation>1 列</translation>
+    </message>
+    <message>
+        <source>1 distortion coefficient</source>
+        <translation>1 个畸变系数</translation>
+    </message>
+    <message>
+        <source>1 number</source>
+        <translation>1 个数</translation>
+    </message>
+    <message>
+        <source>A camera file is written as YAML, but {name} does not end in .yaml. Choose such a name.</source>
+        <translation>内参文件以 YAML 保存，但 {name} 不以 .yaml 结尾。请选择这样的名称。</translation>
+    </message>
+    <message>
+        <source>A pen is written as .csv or .json, but {name} ends in neither. Choose such a name.</source>
+        <translation>光笔以 .csv 或 .json 保存，但 {name} 的结尾两者都不是。请选择这样的名称。</translation>
+    </message>
+    <message>
+        <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
+        <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
+    </message>
+    <message>
+        <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
+        <translation>另一个程序正在写入 {folder} 中的摆动。请在那里继续，或关闭该程序后重试。</translation>
+    </message>
+    <message>
+        <source>Another program uses the simulated camera {serial}. Close that program, or wait a few seconds.</source>
+        <translation>另一个程序正在使用模拟相机 {serial}。请关闭该程序，或稍等几秒。</translation>
+    </message>
+    <message>
+        <source>Capture more images.</source>
+        <translation>请采集更多图像。</translation>
+    </message>
+    <message>
+        <source>Columns {first} and {second} of {name} both hold {column}. Remove one of them.</source>
+        <translation>{name} 的第 {first} 列和第 {second} 列都是 {column}。请删除其中一列。</translation>
+    </message>
+    <message>
+        <source>Complete the line; if it is the last one, the file is cut short.</source>
+        <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
+    </message>
+    <message>
+        <source>Diameter of the discs: {flaw}</source>
+        <translation>发光面直径：{flaw}</translation>
+    </message>
+    <message>
+        <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
+        <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
+    </message>
+    <message>
+        <source>Frame {number} of the video</source>
+        <translation>视频第 {number} 帧</translation>
     </message>
     <message>
         <source>Hold it so that the camera sees its LEDs.</source>
         <translation>握住光笔，使相机能看到 LED。</translation>
     </message>
     <message>
-        <source>Seat the tip</source>
-        <translation>测头就位</translation>
+        <source>If numbers have decimal commas, separate the columns by semicolons.</source>
+        <translation>如果数字使用小数逗号，请用分号分隔各列。</translation>
+    </message>
+    <message>
+        <source>Image {seq} of the simulated camera {serial} arrived incomplete. Check the cable and the network.</source>
+        <translation>模拟相机 {serial} 的图像 {seq} 不完整。请检查线缆和网络。</translation>
+    </message>
+    <message>
+        <source>Images dropped: {n_dropped}. Press the tip into the cone again.</source>
+        <translation>已丢弃 {n_dropped} 幅图像。请把测头重新压入锥孔。</translation>
+    </message>
+    <message>
+        <source>Images kept: {n_kept} of at least {needed}.</source>
+        <translation>已保留 {n_kept} 幅图像，至少需要 {needed} 幅。</translation>
+    </message>
+    <message>
+        <source>Images of the upright pen still needed: {n_images}.</source>
+        <translation>还需 {n_images} 幅光笔竖直的图像。</translation>
+    </message>
+    <message>
+        <source>It rests {distance:.2f} mm from where it was. Put it back into the cone; check that the cone is clamped.</source>
+        <translation>测头偏离原位 {distance:.2f} mm。请放回锥孔，并检查锥孔是否夹紧。</translation>
+    </message>
+    <message>
+        <source>Keep the tip pressed into the cone.</source>
+        <translation>保持测头压紧在锥孔中。</translation>
+    </message>
+    <message>
+        <source>LED centres</source>
+        <translation>LED 中心</translation>
+    </message>
+    <message>
+        <source>LED {led} is listed already on line {line}.</source>
+        <translation>LED {led} 已在第 {line} 行列出。</translation>
+    </message>
+    <message>
+        <source>LED {led} is {distance:.2f} mm off the line of LEDs 1 to 4.</source>
+        <translation>LED {led} 偏离 LED 1 至 4 的直线 {distance:.2f} mm。</translation>
+    </message>
+    <message>
+        <source>LED {led} is {distance:.2f} mm off the plane of LEDs 5 to 10.</source>
+        <translation>LED {led} 偏离 LED 5 至 10 的平面 {distance:.2f} mm。</translation>
+    </message>
+    <message>
+        <source>LED {led} is {distance:.6g} m from the origin, which no pen is. Check the numbers and their units.</source>
+        <translation>LED {led} 距原点 {distance:.6g} m，光笔不会这么大。请检查数值及其单位。</translation>
+    </message>
+    <message>
+        <source>LED {led} of frame {frame} stands already on line {line}. Keep the right one.</source>
+        <translation>第 {frame} 帧的 LED {led} 已在第 {line} 行给出。请保留正确的一个。</translation>
+    </message>
+    <message>
+        <source>LED {led} of {name}</source>
+        <translation>{name} 的 LED {led}</translation>
+    </message>
+    <message>
+        <source>LED {led} of {name} has no normal, but others have. Give the normals of all LEDs or of none.</source>
+        <translation>{name} 的 LED {led} 没有法向量，而其他 LED 有。请给出全部法向量，或都不给。</translation>
+    </message>
+    <message>
+        <source>LED {led} sits {distance:.2f} mm off its place in the LED file. Is this the LED file of this pen?</source>
+        <translation>LED {led} 偏离 LED 文件中的位置 {distance:.2f} mm。这是该光笔的 LED 文件吗？</translation>
+    </message>
+    <message>
+        <source>LED {led} sits {distance:.3f} mm off its place in the pen file. Check the file, or measure the pen again.</source>
+        <translation>LED {led} 偏离 LED 文件中的位置 {distance:.3f} mm。请检查文件，或重新测量光笔。</translation>
+    </message>
+    <message>
+        <source>LED {led} stands where LED {needed} is needed, and no line has LED {needed}. Number the LEDs from 1 without gaps.</source>
+        <translation>应为 LED {needed} 的地方是 LED {led}，而且没有一行是 LED {needed}。请从 1 开始连续编号。</translation>
+    </message>
+    <message>
+        <source>LED {led} stands where LED {needed} is needed. List the LEDs from 1 to {n_leds} in ascending order.</source>
+        <translation>应为 LED {needed} 的地方是 LED {led}。请按升序列出 LED 1 至 {n_leds}。</translation>
+    </message>
+    <message>
+        <source>LED {led} was found in no image. A finger may cover it, it may be off, or its place in the pen file may be wrong.</source>
+        <translation>任何图像中都没有找到 LED {led}。可能被手指遮住、没有点亮，或在 LED 文件中的位置有误。</translation>
+    </message>
+    <message>
+        <source>LED {led}, {column}: {flaw}</source>
+        <translation>LED {led}，{column}：{flaw}</translation>
+    </message>
+    <message>
+        <source>LED {led}: the normal {normal} does not have the length 1. Correct it; a disc that faces +z has the normal 0 0 1.</source>
+        <translation>LED {led}：法向量 {normal} 的长度不为 1。请改正；朝 +z 的发光面法向量为 0 0 1。</translation>
+    </message>
+    <message>
+        <source>LEDs 1 to 4 must have negative z. Change the sign of all z.</source>
+        <translation>LED 1 至 4 的 z 必须为负。请改变所有 z 的符号。</translation>
+    </message>
+    <message>
+        <source>LEDs 5 to 7 must have negative x and 8 to 10 positive x. Change the sign of all x, or exchange the columns if they are numbered the wrong way.</source>
+        <translation>LED 5 至 7 的 x 必须为负，8 至 10 的 x 必须为正。请改变所有 x 的符号；若两列编号颠倒，请交换。</translation>
+    </message>
+    <message>
+        <source>LEDs do not fit</source>
+        <translation>LED 不匹配</translation>
+    </message>
+    <message>
+        <source>LEDs seen: {seen}, needed: {needed}. A finger may cover them; or lean back a little.</source>
+        <translation>看到 {seen} 个 LED，需要 {needed} 个。可能被手指遮住；或稍微往回倾斜。</translation>
+    </message>
+    <message>
+        <source>LEDs {first} and {second} are exchanged: each stands where the other belongs. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Exchange their coordinates.</source>
+        <translation>LED {first} 和 {second} 颠倒：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
+    </message>
+    <message>
+        <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check their coordinates and the diameter.</source>
+        <translation>LED {first} 和 {second} 相距 {distance:.2f} mm，对 {diameter:g} mm 的发光面来说太近。请检查坐标和直径。</translation>
+    </message>
+    <message>
+        <source>Lean the pen to the left and right as well as towards and away from the camera, and turn it about its own axis.</source>
+        <translation>除了朝向和远离相机，请也向左右倾斜光笔，并绕自身轴线转动。</translation>
+    </message>
+    <message>
+        <source>Lean the pen towards and away from the camera as well as to the left and right, and turn it about its own axis.</source>
+        <translation>除了左右，请也朝向和远离相机倾斜光笔，并绕自身轴线转动。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {file} is damaged. Restore the file from a copy, or remove the line to go on without that image.</source>
+        <translation>{file} 第 {line} 行已损坏。请用备份恢复文件，或删除该行，不用那幅图像继续。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name}</source>
+        <translation>{name} 第 {line} 行</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} begins a document type definition, which can make a small file fill the memory. Remove it; a camera file of OpenCV has none.</source>
+        <translation>{name} 第 {line} 行开始一个文档类型定义，它能使小文件占满内存。请删除；OpenCV 的内参文件中没有这种定义。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} has a list in place of a name. Check that the right file is named.</source>
+        <translation>{name} 第 {line} 行应为名称的地方是列表。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} has the YAML anchor or alias {anchor}, which can make a small file fill the memory. Write the values out.</source>
+        <translation>{name} 第 {line} 行有 YAML 锚点或别名 {anchor}，它能使小文件占满内存。请直接写出数值。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} has the tag {tag}. Such a tag can ask for code to be run, so only plain values and matrices of OpenCV are read. Remove the tag, or use a file from a source you trust.</source>
+        <translation>{name} 第 {line} 行有标签 {tag}。这类标签可能要求运行代码，因此只读取普通数值和 OpenCV 矩阵。请删除该标签，或使用来源可信的文件。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} has {n_cells} cells where line {first_line} has {expected}. {hint}</source>
+        <translation>{name} 第 {line} 行有 {n_cells} 个单元格，而第 {first_line} 行有 {expected} 个。{hint}</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} has {n_characters} characters, which no row of a table has. Check that the right file is named.</source>
+        <translation>{name} 第 {line} 行有 {n_characters} 个字符，表格的行不会这么长。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid JSON ({problem}, column {column}). The file may be cut short: copy or export it again.</source>
+        <translation>{name} 第 {line} 行不是有效的 JSON（{problem}，第 {column} 列）。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid XML ({problem}). The file may be cut short: copy or export it again.</source>
+        <translation>{name} 第 {line} 行不是有效的 XML（{problem}）。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name} is not valid YAML ({problem}). The file may be cut short: copy or export it again.</source>
+        <translation>{name} 第 {line} 行不是有效的 YAML（{problem}）。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name}: the header names {column} twice. Give each column a name of its own.</source>
+        <translation>{name} 第 {line} 行：表头中 {column} 出现两次。请给每一列不同的名称。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name}: the quotation marks do not pair up. Remove or complete them.</source>
+        <translation>{name} 第 {line} 行：引号不成对。请删除或补全。</translation>
+    </message>
+    <message>
+        <source>Line {line} of {name}: {flaw}</source>
+        <translation>{name} 第 {line} 行：{flaw}</translation>
+    </message>
+    <message>
+        <source>Most images show fewer than {n_needed} spots (median {median:.0f}); of the {n_leds} LEDs of the pen {n_needed} must be seen. Check that the LEDs are lit and in the image, and the exposure.</source>
+        <translation>多数图像中的光点少于 {n_needed} 个（中位数 {median:.0f}）；光笔的 {n_leds} 个 LED 中须看到 {n_needed} 个。请检查 LED 是否点亮并在图像内，以及曝光是否合适。</translation>
+    </message>
+    <message>
+        <source>Most images show {n_needed} or more spots, but these do not fit the pen file with its {n_leds} LEDs. Check that it is the file of this pen and that the camera file belongs to these images.</source>
+        <translation>多数图像中有 {n_needed} 个或更多光点，但与含 {n_leds} 个 LED 的 LED 文件不符。请检查该文件是否属于这支光笔，内参文件是否属于这些图像。</translation>
+    </message>
+    <message>
+        <source>Next: accept the tip.</source>
+        <translation>下一步：接受测头。</translation>
+    </message>
+    <message>
+        <source>Next: capture more images; those of this swing are kept.</source>
+        <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
+    </message>
+    <message>
+        <source>Next: check the intrinsics file and the LED file, then repeat.</source>
+        <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: repeat the swing with the tip pressed in.</source>
+        <translation>下一步：压紧测头，重做摆动。</translation>
+    </message>
+    <message>
+        <source>No image came for {waited:.1f} s. Check the camera.</source>
+        <translation>{waited:.1f} s 内没有收到图像。请检查相机。</translation>
+    </message>
+    <message>
+        <source>No image of {place} can be read any more. Connect its disk or put the images back, or choose others.</source>
+        <translation>{place} 的图像已无法读取。请连接磁盘或放回图像，或选择其他图像。</translation>
+    </message>
+    <message>
+        <source>Nominal tip, {axis}: {flaw}</source>
+        <translation>标称测头，{axis}：{flaw}</translation>
+    </message>
+    <message>
+        <source>None of the {n_images} images can be read. {why}</source>
+        <translation>{n_images} 幅图像都无法读取。{why}</translation>
+    </message>
+    <message>
+        <source>Odd and even images put the tip {difference:.4f} mm apart, {usual:.4f} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
+        <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
     <message>
-        <source>Seat and swing</source>
-        <translation>就位并摆动</translation>
-    </message>
-    <message>
         <source>Press the tip into the cone and swing the pen gently.</source>
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
     </message>
     <message>
-        <source>Seated</source>
-        <translation>已就位</translation>
+        <source>RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.</source>
+        <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
+        <translation>LED 中心最远到 ({x:.0f}, {y:.0f}) px，而内参文件适用于 {width} × {height} px。请选择这台相机的文件。</translation>
+    </message>
+    <message>
+        <source>The LED discs cannot be {diameter:g} mm wide. Give a diameter of up to {most:g} mm.</source>
+        <translation>LED 发光面直径不可能是 {diameter:g} mm。请给出不超过 {most:g} mm 的直径。</translation>
+    </message>
+    <message>
+        <source>The LED file is off by {sigma:.3f} mm a coordinate, which alone makes U (k = 2) {uncertainty:.4f} mm. Is this the LED file of this pen? More images hardly help.</source>
+        <translation>LED 文件每个坐标的误差约为 {sigma:.3f} mm，仅此就使 U (k = 2) 达到 {uncertainty:.4f} mm。这是该光笔的 LED 文件吗？增加图像作用不大。</translation>
+    </message>
+    <message>
+        <source>The LED positions do not fit the images: {sigma:.1f} px, {usual} px or less is usual. Check that the pen file is of this pen with its LEDs in order, and the camera file of this camera.</source>
+        <translation>LED 位置与图像不符：{sigma:.1f} px，通常不超过 {usual} px。请检查 LED 文件是否属于这支光笔且编号顺序正确，内参文件是否属于这台相机。</translation>
+    </message>
+    <message>
+        <source>The LEDs are a mirror image of the pen: seen from the front with LED 4 above LED 1, LEDs 5 to 7 must be on the left and 8 to 10 on the right. If the machine&apos;s axes are left-handed, change the sign of one coordinate; if the columns are exchanged, number them anew.</source>
+        <translation>LED 是光笔的镜像：从正面看，LED 4 在 LED 1 上方时，LED 5 至 7 必须在左，8 至 10 在右。若测量机为左手坐标系，请改变一个坐标的符号；若两列颠倒，请重新编号。</translation>
+    </message>
+    <message>
+        <source>The LEDs are mirrored in {axis}, a left-handed frame: LED {led} has {axis} = {found:.2f} mm in place of {needed:.2f} mm. {rule}</source>
+        <translation>LED 沿 {axis} 镜像，是左手坐标系：LED {led} 的 {axis} = {found:.2f} mm，应为 {needed:.2f} mm。{rule}</translation>
+    </message>
+    <message>
+        <source>The LEDs are neither in the pen frame nor right-handed: they are a mirror image of the pen. Change the sign of one coordinate, then put them into the pen frame.</source>
+        <translation>LED 既不在光笔坐标系中，也不是右手系：它们是光笔的镜像。请改变一个坐标的符号，再转换到光笔坐标系。</translation>
+    </message>
+    <message>
+        <source>The LEDs are not in the pen frame: LED {led} is {distance:.2f} mm from where the frame puts it (origin in front of LED 1, y along LEDs 1 to 4, LEDs 5 to 10 at z = 0). If these are a measuring machine&apos;s coordinates, put them into the pen frame.</source>
+        <translation>LED 不在光笔坐标系中：LED {led} 偏离坐标系规定的位置 {distance:.2f} mm（原点在 LED 1 前方，y 轴沿 LED 1 至 4，LED 5 至 10 位于 z = 0）。如果是测量机坐标，请转换到光笔坐标系。</translation>
+    </message>
+    <message>
+        <source>The LEDs are out of order: LED {places}. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Number them so.</source>
+        <translation>LED 编号顺序错误：{places}。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请照此编号。</translation>
+    </message>
+    <message>
+        <source>The LEDs are smeared. Swing the pen slowly.</source>
+        <translation>LED 有拖影。请慢慢摆动光笔。</translation>
+    </message>
+    <message>
+        <source>The LEDs do not stand as the pen frame needs it: ten LEDs, 1 to 4 in a line behind the plane of 5 to 10, and these in two columns of three parallel to the line, all within {tolerance:g} mm. {misfit} Measure the LEDs again, or give a pen of another layout in a frame of its own.</source>
+        <translation>LED 的排列不符合光笔坐标系的要求：十个 LED，1 至 4 在 5 至 10 的平面后方成一直线，5 至 10 分成两列、每列三个并与该直线平行，偏差均在 {tolerance:g} mm 以内。{misfit}请重新测量 LED，或用其自身坐标系给出其他布局的光笔。</translation>
+    </message>
+    <message>
+        <source>The LEDs look about {factor:g} times as large as the pen file says ({diameter:g} mm). Check the disc diameter and the unit of the coordinates.</source>
+        <translation>LED 看起来约为 LED 文件所述大小（{diameter:g} mm）的 {factor:g} 倍。请检查发光面直径和坐标单位。</translation>
+    </message>
+    <message>
+        <source>The LEDs of this pen look the same when it is turned or mirrored, so they cannot be told apart. Move an LED, or give the LED centres.</source>
+        <translation>这支光笔旋转或镜像后 LED 看起来一样，因此无法区分。请移动一个 LED，或直接给出 LED 中心。</translation>
+    </message>
+    <message>
+        <source>The LEDs span only {extent:.4g} mm, less than one disc of {diameter:g} mm. Are the coordinates in metres? Then name the units, such as in the header: x_m, y_m, z_m.</source>
+        <translation>LED 的跨度仅 {extent:.4g} mm，小于一个 {diameter:g} mm 的发光面。坐标是以米为单位吗？那就请指定单位，例如在表头中写 x_m, y_m, z_m。</translation>
+    </message>
+    <message>
+        <source>The LEDs span {extent:.6g} m; a pen spans at most {most:g} m. Check that the coordinates are in millimetres, in the header too, or name their units.</source>
+        <translation>LED 的跨度为 {extent:.6g} m；光笔最多为 {most:g} m。请检查坐标及表头是否以毫米为单位，或指定单位。</translation>
+    </message>
+    <message>
+        <source>The LEDs stand in a line within {off_line:.2f} mm over {extent:.0f} mm, so a turn about it could not be seen. At least one LED must stand {needed:.1f} mm off the line.</source>
+        <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
+    </message>
+    <message>
+        <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
+        <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} did not stop within {waited:.0f} s. Unplug it, and start the program again before you use it.</source>
+        <translation>相机 {serial} 在 {waited:.0f} s 内没有停止。请拔下相机，重新启动程序后再使用。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} sent no image for {silence:.0f} s. Check its cable and its power.</source>
+        <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The file has {n_leds} LEDs.</source>
+        <translation>文件有 {n_leds} 个 LED。</translation>
+    </message>
+    <message>
+        <source>The file {path} cannot be read: {reason}. Check the name and that it is yours to read.</source>
+        <translation>文件 {path} 无法读取：{reason}。请检查名称和读取权限。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} cannot be made or read: {reason}. Choose another folder.</source>
+        <translation>文件夹 {folder} 无法创建或读取：{reason}。请选择其他文件夹。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} cannot be made: {reason}. Make sure that it is yours to write.</source>
+        <translation>无法创建文件夹 {folder}：{reason}。请确认您有写入权限。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} cannot be read: {reason}. Interrupted swings in it are not offered; make sure that it is yours to read.</source>
+        <translation>文件夹 {folder} 无法读取：{reason}。其中未完成的摆动不会列出；请确认您有读取权限。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} holds no images ({suffixes}). Name the folder that the images are in.</source>
+        <translation>文件夹 {folder} 中没有图像 ({suffixes})。请指定图像所在的文件夹。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} holds {n_files} other files, such as {example}, which would get mixed up with the new images. Choose an empty folder.</source>
+        <translation>文件夹 {folder} 中有 {n_files} 个其他文件，例如 {example}，会与新图像混在一起。请选择空文件夹。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} is not empty. Choose another for this swing; nothing is overwritten.</source>
+        <translation>文件夹 {folder} 不是空的。请为本次摆动选择其他文件夹；不会覆盖任何内容。</translation>
+    </message>
+    <message>
+        <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
+        <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
+    </message>
+    <message>
+        <source>The images fit LED coordinates {factor:g} times those of the pen file. Check its unit: millimetres are needed.</source>
+        <translation>图像与 LED 文件坐标的 {factor:g} 倍相符。请检查文件的单位：需要毫米。</translation>
+    </message>
+    <message>
+        <source>The images fit the mirror image of the pen: with the opposite sign of {axis} its LEDs match. Change the sign of {axis} in the pen file.</source>
+        <translation>图像与光笔的镜像相符：{axis} 取相反符号时 LED 吻合。请在 LED 文件中改变 {axis} 的符号。</translation>
+    </message>
+    <message>
+        <source>The images fit the pen with about {factor:g} times the focal length of the camera file. Choose the file of this camera and lens, or calibrate the camera again.</source>
+        <translation>图像与内参文件焦距的约 {factor:g} 倍相符。请选择这台相机和镜头的文件，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The intrinsics_covariance of {name} is not a covariance: it must be symmetric, with correlations from -1 to 1. Correct or remove it.</source>
+        <translation>{name} 的 intrinsics_covariance 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除。</translation>
+    </message>
+    <message>
+        <source>The joint fit did not settle in {n_steps} steps. The images may not be of this pen and camera: check both files.</source>
+        <translation>联合拟合在 {n_steps} 步内未收敛。图像可能不属于这支光笔和这台相机：请检查两个文件。</translation>
+    </message>
+    <message>
+        <source>The lens distortion of the camera file cannot be undone for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
+        <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The line, the plane and the columns are not parallel, or too close.</source>
+        <translation>直线、平面和两列不平行，或相距太近。</translation>
+    </message>
+    <message>
+        <source>The next image of {place} comes {seconds:.1f} s later. Wait, or replay the images faster.</source>
+        <translation>{place} 的下一幅图像还要 {seconds:.1f} s。请等待，或加快回放。</translation>
+    </message>
+    <message>
+        <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
+        <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
+    </message>
+    <message>
+        <source>The pen hardly moved: its postures differ by {found:.1f} degrees (rms), {needed:.0f} degrees are needed. Tilt the pen to all sides, by 20 degrees or more, and turn it about its own axis.</source>
+        <translation>光笔几乎没有动：各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请把光笔向各个方向倾斜 20° 以上，并绕自身轴线转动。</translation>
+    </message>
+    <message>
+        <source>The pen is lifted. Put the tip back to go on.</source>
+        <translation>光笔已抬起。放回测头即可继续。</translation>
+    </message>
+    <message>
+        <source>The pen was swung about one axis only, {axis}: that axis itself turned by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the tip&apos;s place along it is not fixed. {advice}</source>
+        <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
+    </message>
+    <message>
+        <source>The program made a mistake of its own and looks at no more images. Open the camera again.</source>
+        <translation>程序自身出错，不再查看图像。请重新打开相机。</translation>
+    </message>
+    <message>
+        <source>The record {name} holds no images. Resume the swing, or begin a new one.</source>
+        <translation>记录 {name} 中没有图像。请继续该摆动，或开始新的摆动。</translation>
+    </message>
+    <message>
+        <source>The recorded images are {found}, not {wanted}. Choose {found}.</source>
+        <translation>录制的图像为 {found}，而不是 {wanted}。请选择 {found}。</translation>
+    </message>
+    <message>
+        <source>The residuals are large: {sigma:.2f} px, {usual} px or less is usual. Check that the camera file is of this camera, lens and focus, and the pen file of this pen: the uncertainty does not cover a wrong file.</source>
+        <translation>残差很大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于这台相机、镜头和对焦，LED 文件是否属于这支光笔：不确定度不包含用错文件的影响。</translation>
+    </message>
+    <message>
+        <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
+        <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
+    </message>
+    <message>
+        <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
+        <translation>结果 {file} 已损坏。请用备份恢复，或移走后不用它继续。</translation>
+    </message>
+    <message>
+        <source>The settings cannot be saved: {file} cannot be written. Make sure that its folder is yours to write and that the disk is not full.</source>
+        <translation>设置无法保存：无法写入 {file}。请确认您有该文件夹的写入权限，且磁盘未满。</translation>
+    </message>
+    <message>
+        <source>The simulated camera has no pixel format {wanted}; it has {offered}. Choose one of these.</source>
+        <translation>模拟相机没有像素格式 {wanted}；可用的有 {offered}。请从中选择。</translation>
+    </message>
+    <message>
+        <source>The simulated camera {serial} is not plugged in. Plug it in.</source>
+        <translation>模拟相机 {serial} 未插上。请插上。</translation>
+    </message>
+    <message>
+        <source>The simulated camera {serial} no longer answers. Check its cable and its power.</source>
+        <translation>模拟相机 {serial} 不再响应。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The simulated camera {serial} sent no image for {waited:.1f} s. Check its cable.</source>
+        <translation>模拟相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆。</translation>
+    </message>
+    <message>
+        <source>The swing in {folder} cannot be read: {reason}. Make sure that it is yours to read, or move the folder away.</source>
+        <translation>{folder} 中的摆动无法读取：{reason}。请确认您有读取权限，或移走该文件夹。</translation>
+    </message>
+    <message>
+        <source>The swing in {folder} has changed since it was read: another program wrote to it. Read it again to go on with all of its images.</source>
+        <translation>{folder} 中的摆动在读取后有变化：另一个程序写入过。请重新读取，以便用全部图像继续。</translation>
+    </message>
+    <message>
+        <source>The swing is paused.</source>
+        <translation>摆动已暂停。</translation>
+    </message>
+    <message>
+        <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped.</source>
+        <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
+    </message>
+    <message>
+        <source>The tip is being computed. Put the pen down.</source>
+        <translation>正在计算测头。可以放下光笔。</translation>
     </message>
     <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
     </message>
     <message>
-        <source>Starts in {0}</source>
-        <translation>{0} 秒后开始</translation>
+        <source>The video {path} cannot be opened, or holds no frames. Check that it plays, or save its frames as images.</source>
+        <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
+    </message>
+    <message>
+        <source>The {what} of recorded images cannot be changed. Choose a live camera.</source>
+        <translation>录制图像的{what}无法更改。请选择实时相机。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} cannot be read: {reason}. Check that it is yours to read and that its disk is connected.</source>
+        <translation>{what} {path} 无法读取：{reason}。请检查您是否有读取权限，磁盘是否已连接。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} does not exist. Check the name and the folder.</source>
+        <translation>{what} {path} 不存在。请检查名称和文件夹。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} has {size:.1f} MB, more than the {limit:g} MB such a file may have. Check that the right file is named.</source>
+        <translation>{what} {path} 有 {size:.1f} MB，超过此类文件允许的 {limit:g} MB。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} holds nothing but blanks. Save it again.</source>
+        <translation>{what} {path} 只有空白。请重新保存。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} is a folder. Name the file itself.</source>
+        <translation>{what} {path} 是文件夹。请选择文件本身。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} is a pipe or a device. Name a file on a disk.</source>
+        <translation>{what} {path} 是管道或设备。请选择磁盘上的文件。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} is empty. Check how it was saved or copied.</source>
+        <translation>{what} {path} 是空的。请检查它是如何保存或复制的。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} is not text: byte {byte} fits no known encoding. Check that the right file is named, or save it as UTF-8.</source>
+        <translation>{what} {path} 不是文本：第 {byte} 个字节不符合任何已知编码。请检查是否选对了文件，或另存为 UTF-8。</translation>
+    </message>
+    <message>
+        <source>The {what} {path} is not text: line {line} holds the control character {character}. Check that the right file is named, or save it as UTF-8.</source>
+        <translation>{what} {path} 不是文本：第 {line} 行含有控制字符 {character}。请检查是否选对了文件，或另存为 UTF-8。</translation>
+    </message>
+    <message>
+        <source>There is no display to open a window on. Start the program at a screen, or give a command; lightpen --help lists them.</source>
+        <translation>没有可以打开窗口的显示器。请在屏幕前启动程序，或给出命令；用 lightpen --help 查看命令。</translation>
+    </message>
+    <message>
+        <source>There is no folder, video or image at {place}. Check the name.</source>
+        <translation>{place} 处没有文件夹、视频或图像。请检查名称。</translation>
+    </message>
+    <message>
+        <source>This computer is too slow: {n_missed} of {n_offered} images were not measured. Close other programs, or the swing takes longer.</source>
+        <translation>本机速度不够：{n_offered} 幅图像中有 {n_missed} 幅未测量。请关闭其他程序，否则摆动会更久。</translation>
+    </message>
+    <message>
+        <source>Tilt the pen to all sides, by 20 degrees or more, not only about its own axis.</source>
+        <translation>请把光笔向各个方向倾斜 20° 以上，而不只是绕自身轴线转动。</translation>
+    </message>
+    <message>
+        <source>To YOUR right: it tells the program where you stand.</source>
+        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
+    </message>
+    <message>
+        <source>Too little tilt {sides}. Lean the pen further that way. Images still needed: about {n_images}.</source>
+        <translation>{sides}倾斜不足。请朝该方向再倾斜一些：约需 {n_images} 幅图像。</translation>
+    </message>
+    <message>
+        <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
+        <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. Capture more images in postures that differ.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>a cell is empty where a number is needed.</source>
+        <translation>需要数字的单元格为空。</translation>
+    </message>
+    <message>
+        <source>a dash in place of a minus sign</source>
+        <translation>用破折号代替减号</translation>
+    </message>
+    <message>
+        <source>a typographic minus sign</source>
+        <translation>排版用减号</translation>
+    </message>
+    <message>
+        <source>ambiguous</source>
+        <translation>有歧义</translation>
+    </message>
+    <message>
+        <source>away from the camera</source>
+        <translation>远离相机方向</translation>
+    </message>
+    <message>
+        <source>away to the left</source>
+        <translation>远离相机偏左</translation>
+    </message>
+    <message>
+        <source>away to the right</source>
+        <translation>远离相机偏右</translation>
+    </message>
+    <message>
+        <source>blank inside</source>
+        <translation>中间有空格</translation>
+    </message>
+    <message>
+        <source>blurred</source>
+        <translation>图像模糊</translation>
+    </message>
+    <message>
+        <source>c11 to c66 are not a covariance: they must be symmetric, with correlations from -1 to 1. Correct or remove these columns.</source>
+        <translation>c11 至 c66 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除这些列。</translation>
+    </message>
+    <message>
+        <source>camera file</source>
+        <translation>内参文件</translation>
+    </message>
+    <message>
+        <source>exposure</source>
+        <translation>曝光</translation>
+    </message>
+    <message>
+        <source>file of LED centres</source>
+        <translation>LED 中心文件</translation>
+    </message>
+    <message>
+        <source>folder</source>
+        <translation>文件夹</translation>
+    </message>
+    <message>
+        <source>gain</source>
+        <translation>增益</translation>
+    </message>
+    <message>
+        <source>image</source>
+        <translation>图像</translation>
+    </message>
+    <message>
+        <source>it is not a list of numbers.</source>
+        <translation>不是数字列表。</translation>
+    </message>
+    <message>
+        <source>its folder does not exist. Create the folder, or choose another.</source>
+        <translation>所在文件夹不存在。请创建文件夹，或选择其他文件夹。</translation>
+    </message>
+    <message>
+        <source>its folder is not a folder. Check the path.</source>
+        <translation>所在位置不是文件夹。请检查路径。</translation>
+    </message>
+    <message>
+        <source>journal</source>
+        <translation>日志文件</translation>
+    </message>
+    <message>
+        <source>leds in {name} is no list of LEDs. Write it as [{{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}, ...].</source>
+        <translation>{name} 中的 leds 不是 LED 列表。请写成 [{{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}, ...]。</translation>
+    </message>
+    <message>
+        <source>letter {letter}</source>
+        <translation>字母 {letter}</translation>
+    </message>
+    <message>
+        <source>no LED seen</source>
+        <translation>看不到 LED</translation>
+    </message>
+    <message>
+        <source>pen file</source>
+        <translation>LED 文件</translation>
+    </message>
+    <message>
+        <source>permission is denied. Choose another folder, or ask for access.</source>
+        <translation>没有权限。请选择其他文件夹，或申请权限。</translation>
+    </message>
+    <message>
+        <source>pose file</source>
+        <translation>位姿文件</translation>
+    </message>
+    <message>
+        <source>pose {pose:g} is given on line {line} already. Remove what was copied twice.</source>
+        <translation>位姿 {pose:g} 已在第 {line} 行给出。请删除重复复制的内容。</translation>
+    </message>
+    <message>
+        <source>poses</source>
+        <translation>位姿</translation>
+    </message>
+    <message>
+        <source>r11 to r33 are a mirrored rotation (determinant -1). Give the poses in right-handed frames.</source>
+        <translation>r11 至 r33 是镜像旋转（行列式为 -1）。请用右手坐标系给出位姿。</translation>
+    </message>
+    <message>
+        <source>r11 to r33 are not a rotation: their rows must have the length 1 and be at right angles to each other. Check the order of the columns.</source>
+        <translation>r11 至 r33 不是旋转矩阵：各行长度必须为 1 且相互垂直。请检查列的顺序。</translation>
+    </message>
+    <message>
+        <source>record&apos;s header</source>
+        <translation>记录头文件</translation>
+    </message>
+    <message>
+        <source>result</source>
+        <translation>结果</translation>
+    </message>
+    <message>
+        <source>source of images</source>
+        <translation>图像来源</translation>
+    </message>
+    <message>
+        <source>spots do not fit the pen</source>
+        <translation>光点与光笔不匹配</translation>
+    </message>
+    <message>
+        <source>taken out</source>
+        <translation>已剔除</translation>
+    </message>
+    <message>
+        <source>the LEDs of a pen</source>
+        <translation>光笔的 LED</translation>
+    </message>
+    <message>
+        <source>the covariance c11 to c66 leaves a direction without any uncertainty, which no measurement does. Correct or remove these columns.</source>
+        <translation>协方差 c11 至 c66 使某个方向没有不确定度，这在测量中不可能。请改正或删除这些列。</translation>
+    </message>
+    <message>
+        <source>the diameter is {diameter:g} where the first LED has {first:g}. All LEDs of a pen must be equally wide.</source>
+        <translation>直径为 {diameter:g}，而第一个 LED 为 {first:g}。同一支光笔的 LED 必须一样大。</translation>
+    </message>
+    <message>
+        <source>the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen</source>
+        <translation>光笔的方向 ({x:.2f}, {y:.2f}, {z:.2f})</translation>
+    </message>
+    <message>
+        <source>the disk is full. Free some space, or write to another disk.</source>
+        <translation>磁盘已满。请清理空间，或写到其他磁盘。</translation>
+    </message>
+    <message>
+        <source>the disk is read-only. Choose another folder.</source>
+        <translation>磁盘是只读的。请选择其他文件夹。</translation>
+    </message>
+    <message>
+        <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
+        <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
+    </message>
+    <message>
+        <source>the file has decimal points and decimal commas, the other ones on line {line}. Use one of them throughout.</source>
+        <translation>文件中小数点和小数逗号混用，另一种在第 {line} 行。请统一使用一种。</translation>
+    </message>
+    <message>
+        <source>the file would be larger than allowed here. Write to another disk.</source>
+        <translation>文件超过此处允许的大小。请写到其他磁盘。</translation>
+    </message>
+    <message>
+        <source>the name is too long. Choose a shorter one.</source>
+        <translation>名称太长。请选择较短的名称。</translation>
+    </message>
+    <message>
+        <source>the pen&apos;s {axis} axis</source>
+        <translation>光笔的 {axis} 轴</translation>
+    </message>
+    <message>
+        <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
+        <translation>平移超过 {most:g} m。请检查单位：需要毫米。</translation>
+    </message>
+    <message>
+        <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the pen file is of this pen, and that LEDs are numbered from 1.</source>
+        <translation>没有 LED {led}；光笔有 LED 1 至 {n_leds}。请检查 LED 文件是否属于这支光笔，LED 是否从 1 开始编号。</translation>
+    </message>
+    <message>
+        <source>tip slipped</source>
+        <translation>测头滑动</translation>
+    </message>
+    <message>
+        <source>to most sides</source>
+        <translation>向多数方向</translation>
+    </message>
+    <message>
+        <source>to the left</source>
+        <translation>向左</translation>
+    </message>
+    <message>
+        <source>to the right</source>
+        <translation>向右</translation>
+    </message>
+    <message>
+        <source>too few LEDs</source>
+        <translation>LED 太少</translation>
+    </message>
+    <message>
+        <source>towards the camera</source>
+        <translation>朝向相机方向</translation>
+    </message>
+    <message>
+        <source>towards the camera to the left</source>
+        <translation>朝向相机偏左</translation>
+    </message>
+    <message>
+        <source>towards the camera to the right</source>
+        <translation>朝向相机偏右</translation>
+    </message>
+    <message>
+        <source>underscore</source>
+        <translation>下划线</translation>
+    </message>
+    <message>
+        <source>unreadable</source>
+        <translation>无法读取</translation>
+    </message>
+    <message>
+        <source>wrong size</source>
+        <translation>尺寸不符</translation>
+    </message>
+    <message>
+        <source>y must grow from LED 1 to LED 4. Change the sign of all y.</source>
+        <translation>y 必须从 LED 1 到 LED 4 递增。请改变所有 y 的符号。</translation>
+    </message>
+    <message>
+        <source>your disk quota is used up. Free some space, or write elsewhere.</source>
+        <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
+    </message>
+    <message>
+        <source>{cell} is not a finite number.</source>
+        <translation>{cell} 不是有限数。</translation>
+    </message>
+    <message>
+        <source>{cell} is not a number ({meaning}).</source>
+        <translation>{cell} 不是数字（{meaning}）。</translation>
+    </message>
+    <message>
+        <source>{cell} is not a number.</source>
+        <translation>{cell} 不是数字。</translation>
+    </message>
+    <message>
+        <source>{cell} is not a whole number.</source>
+        <translation>{cell} 不是整数。</translation>
+    </message>
+    <message>
+        <source>{cell} is too large a number.</source>
+        <translation>{cell} 数值过大。</translation>
+    </message>
+    <message>
+        <source>{count} columns</source>
+        <translation>{count} 列</translation>
+    </message>
+    <message>
+        <source>{count} distortion coefficients</source>
+        <translation>{count} 个畸变系数</translation>
+    </message>
+    <message>
+        <source>{count} numbers</source>
+        <translation>{count} 个数</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} cannot be read: {flaw} Correct it, or export the file again.</source>
+        <translation>{name} 中的 {entry} 无法读取：{flaw}请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} has no named values below it. The file may be cut short: copy or export it again.</source>
+        <translation>{name} 中的 {entry} 下面没有命名的值。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} has {counted} where its {rows:g} rows of {cols:g} need {needed:g}. The file may be cut short: copy or export it again.</source>
+        <translation>{name} 中的 {entry} 有 {counted}，而 {rows:g} 行 {cols:g} 列需要 {needed:g} 个。文件可能不完整：请重新复制或导出。</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} has {counted} where {needed} are needed. Correct it, or export the file again.</source>
+        <translation>{name} 中的 {entry} 有 {counted}，需要 {needed} 个。请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>{entry} in {name} must hold {needed} numbers, none of them negative: of fx fy cx cy and the {n_coefficients} distortion coefficients. Correct or remove it.</source>
+        <translation>{name} 中的 {entry} 必须含 {needed} 个非负数：fx fy cx cy 以及 {n_coefficients} 个畸变系数。请改正或删除。</translation>
+    </message>
+    <message>
+        <source>{folder} holds images of a swing, but no {name}. Restore this file from a copy, or move the folder away.</source>
+        <translation>{folder} 中有摆动的图像，但没有 {name}。请用备份恢复该文件，或移走文件夹。</translation>
+    </message>
+    <message>
+        <source>{journal} knows none of the {n_images} images in its folder. Restore this file from a copy.</source>
+        <translation>{journal} 中没有其文件夹内 {n_images} 幅图像的任何一幅。请用备份恢复该文件。</translation>
+    </message>
+    <message>
+        <source>{key} is given a second time in {name}. Keep the right one.</source>
+        <translation>{name} 中重复给出 {key}。请保留正确的一个。</translation>
+    </message>
+    <message>
+        <source>{key} is given a second time on line {line} in {name}. Keep the right one.</source>
+        <translation>{name} 第 {line} 行重复给出 {key}。请保留正确的一个。</translation>
+    </message>
+    <message>
+        <source>{led} where {other} belongs</source>
+        <translation>{other} 的位置上是 {led}</translation>
+    </message>
+    <message>
+        <source>{n_dropped} of {n_images} images do not take part. Repeat the swing if the tip slipped.</source>
+        <translation>{n_images} 幅图像中有 {n_dropped} 幅未参与计算。若测头滑动过，请重做摆动。</translation>
+    </message>
+    <message>
+        <source>{n_images} {reason}</source>
+        <translation>{reason} {n_images} 幅</translation>
+    </message>
+    <message>
+        <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>
+        <translation>可用位姿 {n_poses} 个；求测头至少需要 {needed} 个。请采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_poses} poses are usable; the two-stage method starts from {needed}. Capture more images.</source>
+        <translation>可用位姿 {n_poses} 个；两步法至少需要 {needed} 个。请采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_usable} of {n_images} images are usable</source>
+        <translation>{n_images} 幅图像中有 {n_usable} 幅可用</translation>
+    </message>
+    <message>
+        <source>{n_wrong} of {n_readable} images are {size}, the camera file was made for {width} x {height} px. Choose the file for this camera, or switch off binning and cropping.</source>
+        <translation>{n_readable} 幅图像中有 {n_wrong} 幅为 {size}，而内参文件适用于 {width} × {height} px。请选择这台相机的文件，或关闭像素合并和裁剪。</translation>
+    </message>
+    <message>
+        <source>{name} begins with {start}, which names no values. Check that the right file is named.</source>
+        <translation>{name} 以 {start} 开头，其中没有命名的值。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} cannot be decoded.</source>
+        <translation>{name} 无法解码。</translation>
+    </message>
+    <message>
+        <source>{name} cannot be decoded: {problem}.</source>
+        <translation>{name} 无法解码：{problem}。</translation>
+    </message>
+    <message>
+        <source>{name} describes a camera of the model {model}; the model pinhole is needed. Calibrate the camera again with pinhole-radtan.</source>
+        <translation>{name} 描述的相机模型为 {model}；需要 pinhole 模型。请用 pinhole-radtan 重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} describes a fisheye lens ({model}). A pinhole camera is needed: calibrate the camera again with the distortion model plumb_bob (radtan) or rational_polynomial.</source>
+        <translation>{name} 描述的是鱼眼镜头（{model}）。需要针孔相机：请用畸变模型 plumb_bob (radtan) 或 rational_polynomial 重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} describes {n_cameras} cameras. Keep the one that looks at the pen, and remove the others.</source>
+        <translation>{name} 描述了 {n_cameras} 台相机。请保留观察光笔的那一台，删除其他相机。</translation>
+    </message>
+    <message>
+        <source>{name} does not say how large the images are. Add the lines image_width and image_height, in pixels.</source>
+        <translation>{name} 没有说明图像尺寸。请加上 image_width 和 image_height 两行，单位为像素。</translation>
+    </message>
+    <message>
+        <source>{name} does not say which units its coordinates have. Name them, or write them into the header: led,x_mm,y_mm,z_mm.</source>
+        <translation>{name} 未注明坐标单位。请指定单位，或写入表头：led,x_mm,y_mm,z_mm。</translation>
+    </message>
+    <message>
+        <source>{name} gives an image size of {width:g} x {height:g} px. Two whole numbers from 1 to {most} are needed.</source>
+        <translation>{name} 给出的图像尺寸为 {width:g} × {height:g} px。需要两个 1 到 {most} 的整数。</translation>
+    </message>
+    <message>
+        <source>{name} has LED discs {diameter:g} mm wide. A diameter of up to {most:g} mm is needed; check its units.</source>
+        <translation>{name} 的 LED 发光面直径为 {diameter:g} mm。直径不得超过 {most:g} mm；请检查单位。</translation>
+    </message>
+    <message>
+        <source>{name} has a header but no rows below it.</source>
+        <translation>{name} 只有表头，下面没有数据行。</translation>
+    </message>
+    <message>
+        <source>{name} has a skew of {skew:g} px; cameras without skew are needed. Calibrate the camera again without estimating a skew.</source>
+        <translation>{name} 的倾斜系数为 {skew:g} px；需要无倾斜的相机。请不估计倾斜系数，重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has coordinates in {one} and in {other}. Give all of them in one unit.</source>
+        <translation>{name} 的坐标既有 {one} 又有 {other}。请全部使用同一单位。</translation>
+    </message>
+    <message>
+        <source>{name} has its principal point at ({cx:g}, {cy:g}) px, far outside the image of {width} x {height} px. Check that both belong to the same camera and image size.</source>
+        <translation>{name} 的主点位于 ({cx:g}, {cy:g}) px，远在 {width} × {height} px 的图像之外。请检查两者是否属于同一台相机和同一图像尺寸。</translation>
+    </message>
+    <message>
+        <source>{name} has more than {most} lines. Check that the right file is named, or divide it.</source>
+        <translation>{name} 超过 {most} 行。请检查是否选对了文件，或把它分开。</translation>
+    </message>
+    <message>
+        <source>{name} has no column {column}; {what} need the columns {wanted}. Its header is {header}. Name the columns so.</source>
+        <translation>{name} 没有 {column} 列；{what}需要 {wanted} 各列。其表头为 {header}。请照此命名各列。</translation>
+    </message>
+    <message>
+        <source>{name} has no header and {n_columns} columns; poses need the 12 columns r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm, with the number of the pose before them and the covariance c11 to c66 behind them if known. Put a header line with these names on top.</source>
+        <translation>{name} 没有表头，有 {n_columns} 列；位姿需要 12 列 r11,r12,r13,r21,r22,r23,r31,r32,r33,tx_mm,ty_mm,tz_mm，如已知，前面是位姿编号，后面是协方差 c11 至 c66。请在最上面加一行含这些名称的表头。</translation>
+    </message>
+    <message>
+        <source>{name} has no header and {n_columns}; {what} need the {n_needed} columns {wanted}. Put a header line with these names on top, and separate the columns by commas, semicolons or tabs.</source>
+        <translation>{name} 没有表头，有 {n_columns}；{what}需要 {n_needed} 列 {wanted}。请在最上面加一行含这些名称的表头，并用逗号、分号或制表符分隔各列。</translation>
+    </message>
+    <message>
+        <source>{name} has no lines but comments. Check that it is complete.</source>
+        <translation>{name} 只有注释行。请检查文件是否完整。</translation>
+    </message>
+    <message>
+        <source>{name} has no rows. Check that it is complete.</source>
+        <translation>{name} 没有数据行。请检查文件是否完整。</translation>
+    </message>
+    <message>
+        <source>{name} has no {entry}. Check that the right file is named and that it is complete.</source>
+        <translation>{name} 中没有 {entry}。请检查是否选对了文件，文件是否完整。</translation>
+    </message>
+    <message>
+        <source>{name} has the distortion model {model}, which is not known here. Calibrate the camera again with plumb_bob (radtan) or rational_polynomial.</source>
+        <translation>{name} 的畸变模型为 {model}，本程序不支持。请用 plumb_bob (radtan) 或 rational_polynomial 重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has the focal lengths {fx:g} and {fy:g} px along u and v; with the pixels of a camera these are nearly alike. Export the file again, or calibrate the camera again.</source>
+        <translation>{name} 沿 u 和 v 的焦距为 {fx:g} 和 {fy:g} px；相机的这两个值应几乎相同。请重新导出文件，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has the focal lengths {fx:g} and {fy:g} px, too short for images of {width} x {height} px; they may be in millimetres. Give them in pixels.</source>
+        <translation>{name} 的焦距为 {fx:g} 和 {fy:g} px，对 {width} × {height} px 的图像来说太短；可能以毫米为单位。请以像素给出。</translation>
+    </message>
+    <message>
+        <source>{name} has the focal lengths {fx:g} and {fy:g} px; both must be positive. Export the file again, or calibrate the camera again.</source>
+        <translation>{name} 的焦距为 {fx:g} 和 {fy:g} px；两者都必须为正。请重新导出文件，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has the units {unit}, which are not known here. Use one of {known}.</source>
+        <translation>{name} 的单位 {unit} 不受支持。请使用 {known} 之一。</translation>
+    </message>
+    <message>
+        <source>{name} has {bits} bits, the first image is {first}. Replay only images of one camera together.</source>
+        <translation>{name} 为 {bits} 位，第一幅图像为 {first}。请只回放同一台相机的图像。</translation>
+    </message>
+    <message>
+        <source>{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again.</source>
+        <translation>{name} 有 {counted}；需要 4、5 或 8 个 (k1 k2 p1 p2 k3 k4 k5 k6)。请重新导出文件。</translation>
+    </message>
+    <message>
+        <source>{name} has {count} distortion coefficients with a thin prism or a tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again without these terms.</source>
+        <translation>{name} 有 {count} 个畸变系数，含薄棱镜或倾斜传感器项；支持 4、5 或 8 个。请不用这些项重新标定相机。</translation>
+    </message>
+    <message>
+        <source>{name} has {first} and {second}, which mean the same. Keep the right one.</source>
+        <translation>{name} 中有含义相同的 {first} 和 {second}。请保留正确的一个。</translation>
+    </message>
+    <message>
+        <source>{name} has {key}, which means nothing here. Remove it, or correct it to one of {known}.</source>
+        <translation>{name} 中的 {key} 没有意义。请删除，或改为 {known} 之一。</translation>
+    </message>
+    <message>
+        <source>{name} has {n_frames} frames; at most {most} are read. Check that the right file is named, or divide it.</source>
+        <translation>{name} 有 {n_frames} 帧；最多读取 {most} 帧。请检查是否选对了文件，或把它分开。</translation>
+    </message>
+    <message>
+        <source>{name} holds more than one YAML document. Keep one of them.</source>
+        <translation>{name} 含有多个 YAML 文档。请只保留一个。</translation>
+    </message>
+    <message>
+        <source>{name} holds values of type {value_type}; grey values of 8 or 16 bit are needed. Save the images without conversion.</source>
+        <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
+    </message>
+    <message>
+        <source>{name} is a list; a pen file is a mapping with leds and units. Write it so.</source>
+        <translation>{name} 是列表；LED 文件应为含 leds 和 units 的映射。请照此编写。</translation>
+    </message>
+    <message>
+        <source>{name} is a table, which has no place for the name and the nominal tip of the pen. Choose a name that ends in .json.</source>
+        <translation>{name} 是表格，无法存放光笔的名称和标称测头。请选择以 .json 结尾的名称。</translation>
+    </message>
+    <message>
+        <source>{name} is cut off. Capture or copy it again.</source>
+        <translation>{name} 不完整。请重新拍摄或复制。</translation>
+    </message>
+    <message>
+        <source>{name} is damaged (wrong checksum). Capture or copy it again.</source>
+        <translation>{name} 已损坏（校验和错误）。请重新拍摄或复制。</translation>
+    </message>
+    <message>
+        <source>{name} is damaged or no image. Capture or copy it again.</source>
+        <translation>{name} 已损坏或不是图像。请重新拍摄或复制。</translation>
+    </message>
+    <message>
+        <source>{name} is nested more than {n_levels} levels deep. Check that the right file is named.</source>
+        <translation>{name} 的嵌套超过 {n_levels} 层。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
+        <translation>{name} 与记录时不同（校验和错误）。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{name} is not valid YAML. Check that the right file is named.</source>
+        <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} is {width} x {height} px, the first image is {first_width} x {first_height} px. Replay only images of one camera together.</source>
+        <translation>{name} 为 {width} × {height} px，第一幅图像为 {first_width} × {first_height} px。请只回放同一台相机的图像。</translation>
+    </message>
+    <message>
+        <source>{name} is {width} x {height} px; at most {most:,} px are read. Choose images of the calibrated camera.</source>
+        <translation>{name} 为 {width} × {height} px；最多读取 {most:,} px。请选择已标定相机的图像。</translation>
+    </message>
+    <message>
+        <source>{name} states its lengths in {stated}, but the unit {given} is given. Leave the unit away, or correct the file.</source>
+        <translation>{name} 注明的长度单位是 {stated}，但给出的单位是 {given}。请不要另给单位，或改正文件。</translation>
+    </message>
+    <message>
+        <source>{name}: {flaw}</source>
+        <translation>{name}：{flaw}</translation>
+    </message>
+    <message>
+        <source>{noise:.3f} px in this image, {usual:.3f} px in the others. A finger or a reflection may cover part of an LED.</source>
+        <translation>本图像 {noise:.3f} px，其他图像 {usual:.3f} px。LED 可能被手指或反光遮住一部分。</translation>
+    </message>
+    <message>
+        <source>{others} and {last}</source>
+        <translation>{others}和{last}</translation>
+    </message>
+    <message>
+        <source>{path} cannot be written: it is a folder. Name a file.</source>
+        <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
+    </message>
+    <message>
+        <source>{path} cannot be written: {reason} What was there before is unchanged.</source>
+        <translation>无法写入 {path}：{reason}原有内容未变。</translation>
+    </message>
+    <message>
+        <source>{path} cannot be written: {reason}. Free some space or choose another folder; the images recorded so far are safe.</source>
+        <translation>无法写入 {path}：{reason}。请清理空间或选择其他文件夹；已记录的图像是安全的。</translation>
+    </message>
+    <message>
+        <source>{path} is damaged. Restore it from a copy.</source>
+        <translation>{path} 已损坏。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
+        <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} was written by a later version of the program (format {number}; this version reads {known}). Open the record with that version.</source>
+        <translation>{path} 由更新版本的程序写入（格式 {number}；本版本读取 {known}）。请用该版本打开记录。</translation>
+    </message>
+    <message>
+        <source>{place} holds no images. Choose a recording that holds some.</source>
+        <translation>{place} 中没有图像。请选择有图像的录制。</translation>
+    </message>
+    <message>
+        <source>{place} is no mapping. Write it as {{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}.</source>
+        <translation>{place} 不是映射。请写成 {{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}。</translation>
+    </message>
+    <message>
+        <source>{place}: the normal {normal} does not have the length 1. Correct it, or leave the normals away if all discs face +z.</source>
+        <translation>{place}：法向量 {normal} 的长度不为 1。请改正；若所有发光面都朝 +z，可以不给法向量。</translation>
+    </message>
+    <message>
+        <source>{reason}. Choose another folder or name.</source>
+        <translation>{reason}。请选择其他文件夹或名称。</translation>
+    </message>
+    <message>
+        <source>{unit} is not a unit of length known here. Choose one of {known}.</source>
+        <translation>{unit} 不是本程序支持的长度单位。请从 {known} 中选择。</translation>
+    </message>
+    <message>
+        <source>{usable} (left out: {left_out})</source>
+        <translation>{usable}（舍去：{left_out}）</translation>
+    </message>
+    <message>
+        <source>{usable}; the tip needs at least {needed}. {advice}</source>
+        <translation>{usable}；求测头至少需要 {needed} 幅。{advice}</translation>
+    </message>
+    <message>
+        <source>{why}</source>
+        <translation>{why}</translation>
+    </message>
+    <message>
+        <source>{width} x {height} px</source>
+        <translation>{width} × {height} px</translation>
+    </message>
+</context>
+<context>
+    <name>phrases</name>
+    <message>
+        <source>Show the pen</source>
+        <translation>请出示光笔</translation>
+    </message>
+    <message>
+        <source>Seat the tip</source>
+        <translation>测头就位</translation>
+    </message>
+    <message>
+        <source>Seat and swing</source>
+        <translation>就位并摆动</translation>
+    </message>
+    <message>
+        <source>Seated</source>
+        <translation>已就位</translation>
+    </message>
+    <message>
+        <source>{0} Review has their reasons.</source>
+        <translation>{0}原因见“复核”步骤。</translation>
+    </message>
+    <message>
+        <source>{0} Accept it at the screen.</source>
+        <translation>{0}请在屏幕前接受。</translation>
     </message>
     <message>
         <source>Keep the tip pressed into the cone.</source>
@@ -2260,10 +3439,6 @@
     <message>
         <source>Lean RIGHT</source>
         <translation>向右倾斜</translation>
-    </message>
-    <message>
-        <source>To YOUR right: it tells the program where you stand.</source>
-        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
     </message>
     <message>
         <source>Follow the arrow</source>
@@ -2278,16 +3453,8 @@
         <translation>慢一点</translation>
     </message>
     <message>
-        <source>The LEDs are smeared. Swing the pen slowly.</source>
-        <translation>LED 有拖影。请慢慢摆动光笔。</translation>
-    </message>
-    <message>
         <source>LEDs do not fit</source>
         <translation>LED 不匹配</translation>
-    </message>
-    <message>
-        <source>{0} px in this image, {1} px in the others. A finger or a reflection may cover part of an LED.</source>
-        <translation>本图像 {0} px，其他图像 {1} px。LED 可能被手指或反光遮住一部分。</translation>
     </message>
     <message>
         <source>Tip slipped</source>
@@ -2298,24 +3465,12 @@
         <translation>看不到光笔</translation>
     </message>
     <message>
-        <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
-        <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
-    </message>
-    <message>
         <source>Paused</source>
         <translation>已暂停</translation>
     </message>
     <message>
-        <source>The pen is lifted. Put the tip back to go on.</source>
-        <translation>光笔已抬起。放回测头即可继续。</translation>
-    </message>
-    <message>
         <source>Tip not in place</source>
         <translation>测头不在原位</translation>
-    </message>
-    <message>
-        <source>It rests {0} mm from where it was. Put it back into the cone; check that the cone is clamped.</source>
-        <translation>测头偏离原位 {0} mm。请放回锥孔，并检查锥孔是否夹紧。</translation>
     </message>
     <message>
         <source>Press Space to go on.</source>
@@ -2326,8 +3481,8 @@
         <translation>采集完毕</translation>
     </message>
     <message>
-        <source>The tip is being computed. Put the pen down.</source>
-        <translation>正在计算测头。可以放下光笔。</translation>
+        <source>Starts in {seconds}</source>
+        <translation>{seconds} 秒后开始</translation>
     </message>
     <message>
         <source>More images</source>
@@ -2342,72 +3497,24 @@
         <translation>竖直握住</translation>
     </message>
     <message>
-        <source>LEDs seen: {0}, needed: {1}. A finger may cover them; or lean back a little.</source>
-        <translation>看到 {0} 个 LED，需要 {1} 个。可能被手指遮住；或稍微往回倾斜。</translation>
-    </message>
-    <message>
-        <source>Images dropped: {0}. Press the tip into the cone again.</source>
-        <translation>已丢弃 {0} 幅图像。请把测头重新压入锥孔。</translation>
-    </message>
-    <message>
-        <source>Images kept: {0} of at least {1}.</source>
-        <translation>已保留 {0} 幅图像，至少需要 {1} 幅。</translation>
-    </message>
-    <message>
-        <source>Too little tilt {1}. Lean the pen further that way. Images still needed: about {0}.</source>
-        <translation>{1}倾斜不足。请朝该方向再倾斜一些：约需 {0} 幅图像。</translation>
-    </message>
-    <message>
-        <source>Images of the upright pen still needed: {0}.</source>
-        <translation>还需 {0} 幅光笔竖直的图像。</translation>
-    </message>
-    <message>
         <source>Not known yet</source>
         <translation>尚未确定</translation>
-    </message>
-    <message>
-        <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
-        <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
     </message>
     <message>
         <source>Not certain enough</source>
         <translation>不确定度过大</translation>
     </message>
     <message>
-        <source>U (k = 2) of the tip is {0} mm, the limit {1} mm. Capture more images in postures that differ.</source>
-        <translation>测头的 U (k = 2) 为 {0} mm，限值 {1} mm。请以不同姿态继续采集。</translation>
-    </message>
-    <message>
         <source>Halves differ</source>
         <translation>奇偶结果不一致</translation>
-    </message>
-    <message>
-        <source>Odd and even images put the tip {0} mm apart, {1} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
-        <translation>奇数与偶数图像求得的测头相差 {0} mm，通常为 {1} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
         <source>Many images dropped</source>
         <translation>丢弃图像过多</translation>
     </message>
     <message>
-        <source>{0} of {1} images do not take part. Review has their reasons; repeat the swing if the tip slipped.</source>
-        <translation>{1} 幅图像中有 {0} 幅未参与计算。原因见“复核”步骤；若测头滑动过，请重做摆动。</translation>
-    </message>
-    <message>
-        <source>The LED file is off by {0} mm a coordinate, which alone makes U (k = 2) {1} mm. Is this the LED file of this pen? More images hardly help.</source>
-        <translation>LED 文件每个坐标的误差约为 {0} mm，仅此就使 U (k = 2) 达到 {1} mm。这是该光笔的 LED 文件吗？增加图像作用不大。</translation>
-    </message>
-    <message>
         <source>LED out of place</source>
         <translation>LED 位置不符</translation>
-    </message>
-    <message>
-        <source>LED {0} sits {1} mm off its place in the LED file. Is this the LED file of this pen?</source>
-        <translation>LED {0} 偏离 LED 文件中的位置 {1} mm。这是该光笔的 LED 文件吗？</translation>
-    </message>
-    <message>
-        <source>The residuals are {0} px, {1} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
-        <translation>残差为 {0} px，通常不超过 {1} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
     <message>
         <source>No tip found</source>
@@ -2416,10 +3523,6 @@
     <message>
         <source>Good</source>
         <translation>良好</translation>
-    </message>
-    <message>
-        <source>U (k = 2) of the tip is {0} mm. Accept it at the screen.</source>
-        <translation>测头的 U (k = 2) 为 {0} mm。请在屏幕前接受。</translation>
     </message>
     <message>
         <source>Enter the name of the station.</source>
@@ -2464,42 +3567,6 @@
     <message>
         <source>Save or discard the changes of the LED table.</source>
         <translation>请保存或放弃 LED 表的更改。</translation>
-    </message>
-    <message>
-        <source>unreadable</source>
-        <translation>无法读取</translation>
-    </message>
-    <message>
-        <source>wrong size</source>
-        <translation>尺寸不符</translation>
-    </message>
-    <message>
-        <source>no LED seen</source>
-        <translation>看不到 LED</translation>
-    </message>
-    <message>
-        <source>blurred</source>
-        <translation>图像模糊</translation>
-    </message>
-    <message>
-        <source>too few LEDs</source>
-        <translation>LED 太少</translation>
-    </message>
-    <message>
-        <source>spots do not fit the pen</source>
-        <translation>光点与光笔不匹配</translation>
-    </message>
-    <message>
-        <source>ambiguous</source>
-        <translation>有歧义</translation>
-    </message>
-    <message>
-        <source>tip slipped</source>
-        <translation>测头滑动</translation>
-    </message>
-    <message>
-        <source>taken out</source>
-        <translation>已剔除</translation>
     </message>
     <message>
         <source>WAITING</source>
@@ -2640,14 +3707,6 @@
     <message>
         <source>Turn it clockwise, seen from above.</source>
         <translation>从上方看，顺时针转动。</translation>
-    </message>
-    <message>
-        <source>to most sides</source>
-        <translation>向多数方向</translation>
-    </message>
-    <message>
-        <source>, </source>
-        <translation>、</translation>
     </message>
     <message>
         <source>1 image</source>

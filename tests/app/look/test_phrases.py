@@ -4,19 +4,39 @@ import math
 
 import pytest
 
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    FOLLOW_ARROW,
+    HOLD_STILL,
+    LEAN_TO_YOUR_RIGHT,
+    PAUSED,
+    PEN_LIFTED,
+    PEN_LOST,
+    SEAT_TIP,
+    SHOW_PEN,
+    SOLVING,
+    SWING_TO_SEAT,
+    TOO_FAST,
+    Code,
+    bad_fit,
+    few_leds,
+    starts_in,
+    tip_elsewhere,
+    tip_is_good,
+    tip_slipped,
+    too_little_tilt,
+)
 from lightpen.model.posture import Posture
+from lightpen.sentences import Sentence
 from lightpen.swing.state import Pause, Phase
-from lightpen_app.look.phrases import lean_phrase, phase_text, phrase, sides_text
+from lightpen_app.look.phrases import lean_phrase, phase_text, phrase
 
 FAR, LITTLE = math.radians(28), math.radians(14)
 RIGHT, AWAY, LEFT, TOWARDS = (quarter * math.pi / 2 for quarter in range(4))
 LONGEST = 20  # letters that are read from 3 m on a screen of 1920 px
 DURING_A_SWING = (
-    *(Code.SHOW_PEN, Code.SEAT_TIP, Code.SWING_TO_SEAT, Code.HOLD_STILL),
-    *(Code.STARTS_IN, Code.LEAN_TO_YOUR_RIGHT, Code.FOLLOW_ARROW, Code.FEW_LEDS),
-    *(Code.TOO_FAST, Code.BAD_FIT, Code.TIP_SLIPPED, Code.PEN_LOST, Code.PEN_LIFTED),
-    *(Code.TIP_ELSEWHERE, Code.PAUSED, Code.SOLVING),
+    *(SHOW_PEN, SEAT_TIP, SWING_TO_SEAT, HOLD_STILL, starts_in(3)),
+    *(LEAN_TO_YOUR_RIGHT, FOLLOW_ARROW, few_leds(3, 6), TOO_FAST, bad_fit(3, 6)),
+    *(tip_slipped(3), PEN_LOST, PEN_LIFTED, tip_elsewhere(3), PAUSED, SOLVING),
 )
 
 
@@ -53,13 +73,30 @@ def test_the_hint_tells_how_far_and_which_way_to_turn() -> None:
 
 
 def test_some_missing_sides_are_named_and_many_are_not() -> None:
-    assert sides_text([0, 2]) == "to the right, away from you"
-    assert sides_text(range(7)) == "to most sides"
+    seen_by_the_camera = phrase(too_little_tilt(4, [2, 0])).hint
+    seen_by_an_operator_who_faces_it = phrase(too_little_tilt(4, [2, 0]), math.pi).hint
+
+    assert "tilt to the right, away from the camera. Lean" in seen_by_the_camera
+    assert "tilt to the left, towards you. Lean" in seen_by_an_operator_who_faces_it
+    assert "tilt to most sides." in phrase(too_little_tilt(9, range(7)), math.pi).hint
 
 
-@pytest.mark.parametrize("code", DURING_A_SWING)
-def test_instructions_are_short_enough_for_the_distance(code: Code) -> None:
-    assert len(phrase(Message(code, (3, 6))).short) <= LONGEST
+def test_what_to_do_at_the_screen_is_told_there_alone() -> None:
+    good = tip_is_good(0.00412)
+
+    assert str(good) == "U (k = 2) of the tip is 0.0041 mm."
+    assert phrase(good).hint == f"{good} Accept it at the screen."
+    assert phrase(PAUSED).hint == "Press Space to go on."
+
+
+@pytest.mark.parametrize("code", list(Code))
+def test_every_message_has_a_few_words_to_be_read_from_afar(code: Code) -> None:
+    assert phrase(Sentence(code, "", {"seconds": 3})).short
+
+
+@pytest.mark.parametrize("message", DURING_A_SWING, ids=lambda each: each.code)
+def test_instructions_are_short_enough_for_the_distance(message: Sentence) -> None:
+    assert len(phrase(message).short) <= LONGEST
 
 
 def test_every_state_and_pause_has_a_word_of_its_own() -> None:

@@ -20,6 +20,7 @@ from lightpen_app.shell.notice_bar import NoticeBar
 
 ROOT = RESOURCES.parents[1]
 APPLICATION = ROOT / "app" / "lightpen_app"
+CORE = ROOT / "core" / "lightpen"
 TRANSLATIONS = RESOURCES / "translations"
 CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
 HELP_TOPICS = ("start", "camera", "leds", "swing", "review")
@@ -115,20 +116,24 @@ def test_every_text_is_translated(tmp_path: Path) -> None:
     fresh = tmp_path / CHINESE.name
     fresh.write_bytes(CHINESE.read_bytes())
 
-    TOOL.collect(fresh, APPLICATION)
+    TOOL.collect(fresh, APPLICATION, CORE)
 
     assert untranslated(fresh) == []
 
 
 def test_a_text_that_is_not_translated_is_noticed(tmp_path: Path) -> None:
-    (tmp_path / "page.py").write_text(
+    application, core = tmp_path / "app", tmp_path / "core"
+    application.mkdir()
+    core.mkdir()
+    (application / "page.py").write_text(
         "class Page(QWidget):\n    def f(self):\n        self.tr('New text')\n"
     )
+    (core / "files.py").write_text("error = sentence('file.new', 'New {what}')\n")
     fresh = tmp_path / CHINESE.name
 
-    TOOL.collect(fresh, tmp_path)
+    TOOL.collect(fresh, application, core)
 
-    assert untranslated(fresh) == ["Page: New text"]
+    assert sorted(untranslated(fresh)) == ["Page: New text", "core: New {what}"]
 
 
 def test_no_text_reaches_the_screen_untranslatable() -> None:
@@ -150,11 +155,19 @@ def test_the_compiled_translations_are_fresh(ts_file: Path, tmp_path: Path) -> N
     assert compiled.read_bytes() == ts_file.with_suffix(".qm").read_bytes()
 
 
-def test_a_translation_keeps_the_places_of_the_values() -> None:
+def places_in(text: str) -> list[str]:
+    """The places of values in a text, each with its format."""
+    return sorted(re.findall(r"\{[^{}]*\}|%n", text))
+
+
+def test_a_translation_keeps_the_places_and_formats_of_the_values() -> None:
     for _, source, translation in messages(CHINESE):
-        places = sorted(re.findall(r"\{\d*\}|%n", source))
         for text in texts_of(translation):
-            assert sorted(re.findall(r"\{\d*\}|%n", text)) == places, source
+            assert places_in(text) == places_in(source), source
+
+
+def test_a_place_with_another_format_is_noticed() -> None:
+    assert places_in("U = {limit:.3f} mm") != places_in("U = {limit:.4f} mm")
 
 
 def test_the_language_changes_while_a_widget_is_shown(

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.errors import CalibrationError
+from lightpen.sentences import sentence
 from lightpen_app.work.job import Job, Report
 
 
@@ -34,7 +35,7 @@ def test_the_result_arrives_on_the_gui_thread(qtbot: QtBot) -> None:
 
 def test_a_failure_carries_the_text_for_the_user(qtbot: QtBot) -> None:
     def refuse(report: Report) -> None:
-        raise CalibrationError("Tilt the pen further.")
+        raise CalibrationError(sentence("test.tilt", "Tilt the pen further."))
 
     job = Job(refuse)
     with qtbot.waitSignal(job.failed) as blocker:

@@ -22,6 +22,7 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.errors import FileError
 from lightpen.formats.images import ImageSource
+from lightpen.sentences import sentence
 
 N_IMAGES = 5
 
@@ -229,7 +230,7 @@ def test_a_video_that_is_gone_is_a_lost_camera(tmp_path: Path) -> None:
 
 def test_a_whole_round_of_damaged_images_is_a_lost_camera() -> None:
     def damaged() -> Image:
-        raise FileError("It is damaged.")
+        raise FileError(sentence("test.trouble", "It is damaged."))
 
     def loaders() -> Iterator[Callable[[], Image]]:
         good = partial(np.full, (4, 6), 0, np.uint8)

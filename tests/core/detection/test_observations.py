@@ -18,6 +18,7 @@ from lightpen.errors import FileError
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import ellipse_centers
+from lightpen.sentences import sentence
 from lightpen.simulator.image_plans import ScenePlan, plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera, paper_camera, paper_pen
@@ -38,7 +39,7 @@ def images(plan: ScenePlan) -> list[Image]:
 
 
 def damaged() -> Image:
-    raise FileError("frame_2.png is cut off. Capture or copy it again.")
+    raise FileError(sentence("image.cut-off", "frame_2.png is cut off."))
 
 
 def observe(loaders: list[Callable[[], Image]]) -> Observations:
@@ -70,7 +71,7 @@ def test_all_leds_of_clean_images_are_found_where_they_are(
 
     assert found.reasons == (Reason.NONE,) * 6
     assert np.sqrt(np.mean(np.sum(errors**2, axis=2))) < 0.006
-    assert found.advice == ""
+    assert found.advice is None
 
 
 def test_images_that_cannot_be_used_are_named_with_their_reason(
@@ -85,10 +86,10 @@ def test_images_that_cannot_be_used_are_named_with_their_reason(
     found = observe(loaders)
 
     assert found.reasons[2] is Reason.UNREADABLE
-    assert "cut off" in found.details[2]
+    assert "cut off" in str(found.details[2])
     assert found.reasons[7] is Reason.EMPTY
     assert found.reasons[8] is Reason.WRONG_SIZE
-    assert "2448 x 1000" in found.details[8]
+    assert "2448 x 1000" in str(found.details[8])
     assert found.reasons[9] is Reason.BLURRED
     assert found.reasons.count(Reason.NONE) == 6
     assert np.isnan(found.pixels[[2, 7, 8, 9]]).all()

@@ -128,10 +128,12 @@ def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> No
 
 
 def test_an_led_that_was_never_found_is_warned_of() -> None:
-    (sentence,) = record()["warnings"]
+    (warning,) = record()["warnings"]
 
-    assert sentence.startswith("LED 10 was found in no image.")
-    assert sentence in calibration_text(calibration(), "joint", None)
+    assert warning["code"] == "warning.led-unseen"
+    assert warning["values"] == {"led": 10}
+    assert warning["text"].startswith("LED 10 was found in no image.")
+    assert warning["text"] in calibration_text(calibration(), "joint", None)
 
 
 def test_large_residuals_are_warned_of() -> None:
@@ -143,10 +145,10 @@ def test_large_residuals_are_warned_of() -> None:
     centers = Centers(np.arange(20) + 1, pixels, Path("centers.csv"))
     noisy = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
 
-    (sentence,) = warnings_of(noisy)
+    (warning,) = warnings_of(noisy)
 
-    assert "residuals are large" in sentence
-    assert "camera file" in sentence
+    assert "residuals are large" in str(warning)
+    assert "camera file" in str(warning)
 
 
 def test_a_pivot_calibration_is_recorded_and_shown() -> None:

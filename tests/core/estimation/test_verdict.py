@@ -21,8 +21,17 @@ from lightpen.estimation.verdict import (
     judge,
 )
 from lightpen.formats.observation_files import Centers
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    Code,
+    halves_differ,
+    leds_off,
+    many_dropped,
+    tip_is_good,
+    too_few_images,
+    too_little_tilt,
+)
 from lightpen.model.limits import SwingLimits
+from lightpen.sentences import Sentence
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     Swing,
@@ -53,8 +62,7 @@ def good() -> Calibration:
 def test_a_good_calibration_passes_with_its_uncertainty(good: Calibration) -> None:
     verdict = judge(good, SwingLimits(max_uncertainty=0.01))
     assert verdict.grade is Grade.PASS
-    assert verdict.reason.code is Code.GOOD
-    assert verdict.reason.arguments == (good.budget.weakest_uncertainty,)
+    assert verdict.reason == tip_is_good(good.budget.weakest_uncertainty)
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, Grade.CHECK), (0.3, Grade.REPEAT)])
@@ -64,7 +72,7 @@ def test_a_larger_uncertainty_is_checked_and_a_far_larger_one_repeated(
     limit = share * good.budget.weakest_uncertainty
     verdict = judge(good, SwingLimits(max_uncertainty=limit))
     assert verdict.grade is grade
-    assert verdict.reason.code is Code.UNCERTAIN
+    assert verdict.reason.code == Code.UNCERTAIN
 
 
 def test_halves_that_differ_are_checked(good: Calibration) -> None:
@@ -72,8 +80,11 @@ def test_halves_that_differ_are_checked(good: Calibration) -> None:
     halves = Halves(np.array([0.0, -1.6, 1.0]) * uncertainty, uncertainty)
     verdict = judge(replace(good, halves=halves), SwingLimits(max_uncertainty=0.01))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason.code is Code.HALVES_DIFFER
-    assert verdict.reason.arguments == (1.6 * uncertainty[1], uncertainty[1])
+    assert verdict.reason.code == Code.HALVES_DIFFER
+    assert verdict.reason.values == {
+        "difference": 1.6 * uncertainty[1],
+        "usual": uncertainty[1],
+    }
 
 
 def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
@@ -83,14 +94,15 @@ def test_halves_that_differ_along_any_axis_by_more_than_is_allowed_are_checked(
     uncertainty = np.array([0.0005, 0.005, 0.005])
     halves = Halves(np.array([0.004, 0.020, 0.0]), uncertainty)
     limits = SwingLimits(max_uncertainty=0.01)
-    assert judge(replace(good, halves=halves), limits).reason.arguments == (0.02, 0.005)
+    verdict = judge(replace(good, halves=halves), limits)
+    assert verdict.reason == halves_differ(0.02, 0.005)
 
     small = Halves(np.array([0.004, 0.006, 0.0]), uncertainty)
     assert judge(replace(good, halves=small), limits).grade is Grade.PASS
 
 
 def test_what_must_be_repeated_cannot_be_accepted() -> None:
-    good = Message(Code.GOOD)
+    good = tip_is_good(0.004)
     assert [Verdict(grade, good).can_be_accepted for grade in Grade] == [
         *(True, True, False)
     ]
@@ -99,8 +111,8 @@ def test_what_must_be_repeated_cannot_be_accepted() -> None:
 def test_leds_that_do_not_fit_are_checked() -> None:
     noisy = calibrated(swing_poses(300, np.random.default_rng(0)), sigma=0.15)
     verdict = judge(noisy, SwingLimits(max_uncertainty=0.05))
-    assert verdict.reason.code is Code.LEDS_MISFIT
-    assert verdict.reason.arguments[0] == noisy.joint.sigma
+    assert verdict.reason.code == Code.LEDS_MISFIT
+    assert verdict.reason.values["sigma"] == noisy.joint.sigma
 
 
 def test_an_uncertainty_by_the_led_file_is_told_as_such(good: Calibration) -> None:
@@ -110,13 +122,13 @@ def test_an_uncertainty_by_the_led_file_is_told_as_such(good: Calibration) -> No
 
     verdict = judge(off, SwingLimits(max_uncertainty=0.015))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason == Message(Code.LEDS_OFF, (0.1, budget.led_uncertainty))
+    assert verdict.reason == leds_off(0.1, budget.led_uncertainty)
     assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
-    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code is Code.GOOD
+    assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code == Code.GOOD
 
     exact = replace(off, geometry=replace(good.geometry, led_sigma=0.01))
     verdict = judge(exact, SwingLimits(max_uncertainty=0.015))
-    assert verdict.reason.code is Code.UNCERTAIN
+    assert verdict.reason.code == Code.UNCERTAIN
 
 
 def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
@@ -133,10 +145,9 @@ def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
 
     verdict = judge(calibration, SwingLimits(max_uncertainty=0.05))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason.code is Code.LED_DISPLACED
-    led, length = verdict.reason.arguments
-    assert led == 9
-    assert length == pytest.approx(3.0, abs=0.05)
+    assert verdict.reason.code == Code.LED_DISPLACED
+    assert verdict.reason.values["led"] == 9
+    assert verdict.reason.values["distance"] == pytest.approx(3.0, abs=0.05)
 
 
 def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
@@ -150,8 +161,7 @@ def test_many_dropped_images_are_checked(good: Calibration) -> None:
     used = good.used.copy()
     used[::4] = False
     verdict = judge(replace(good, used=used), SwingLimits(max_uncertainty=0.01))
-    assert verdict.reason.code is Code.MANY_DROPPED
-    assert verdict.reason.arguments == (38, 150)
+    assert verdict.reason == many_dropped(38, 150)
 
 
 def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
@@ -162,7 +172,7 @@ def test_fewer_images_than_asked_for_are_checked_also_if_they_suffice(
 
     verdict = judge(good, replace(limits, min_images=151))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason == Message(Code.TOO_FEW_IMAGES, (150, 151))
+    assert verdict.reason == too_few_images(150, 151)
 
 
 def test_sides_that_the_pen_never_leant_to_are_named() -> None:
@@ -176,8 +186,12 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         calibrated(swing_from_postures(postures)), SwingLimits(max_uncertainty=0.05)
     )
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason.code is Code.TOO_LITTLE_TILT
-    assert verdict.reason.arguments == (8, 4, 5, 6, 7)
+    assert verdict.reason == too_little_tilt(8, (4, 5, 6, 7))
+    assert str(verdict.reason) == (
+        "Too little tilt to the left, towards the camera to the left, towards the "
+        "camera, towards the camera to the right. Lean the pen further that way. "
+        "Images still needed: about 8."
+    )
 
 
 @pytest.mark.parametrize(
@@ -195,7 +209,7 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
     ],
 )
 def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:
-    assert Verdict(Grade.CHECK, Message(code)).next_step is step
+    assert Verdict(Grade.CHECK, Sentence(code, "")).next_step is step
 
 
 def test_halves_may_differ_by_what_chance_leaves() -> None:

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lightpen.errors import FileError
+from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import (
     printable,
     quoted,
@@ -21,6 +22,7 @@ from lightpen.formats.files import (
     sha256,
     write_whole,
 )
+from lightpen.formats.pen_files import PEN_FILE
 
 LIMIT = 1000
 
@@ -48,28 +50,28 @@ def open_folder() -> Iterator[Path]:
 
 def test_a_file_is_read_whole(tmp_path: Path) -> None:
     data = bytes(range(256))
-    assert read_bytes(file(tmp_path, data), "camera file", 256) == data
+    assert read_bytes(file(tmp_path, data), CAMERA_FILE, 256) == data
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"The camera file .*none\.yaml does not exist"):
-        read_bytes(tmp_path / "none.yaml", "camera file", LIMIT)
+        read_bytes(tmp_path / "none.yaml", CAMERA_FILE, LIMIT)
 
 
 def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path) -> None:
     path = file(tmp_path, b"x")
     with pytest.raises(FileError, match="does not exist"):
-        read_bytes(path / "cam.yaml", "camera file", LIMIT)
+        read_bytes(path / "cam.yaml", CAMERA_FILE, LIMIT)
 
 
 def test_a_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="is a folder"):
-        read_bytes(tmp_path, "camera file", LIMIT)
+        read_bytes(tmp_path, CAMERA_FILE, LIMIT)
 
 
 def test_an_empty_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="is empty"):
-        read_bytes(file(tmp_path, b""), "camera file", LIMIT)
+        read_bytes(file(tmp_path, b""), CAMERA_FILE, LIMIT)
 
 
 def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
@@ -77,12 +79,12 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     with path.open("wb") as stream:
         stream.truncate(10**12)  # sparse: a terabyte to whoever tries to read it
     with pytest.raises(FileError, match=r"1000000\.0 MB, more than the 0\.001 MB"):
-        read_bytes(path, "camera file", LIMIT)
+        read_bytes(path, CAMERA_FILE, LIMIT)
 
 
 def test_a_name_too_long_for_the_disk_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="cannot be read"):
-        read_bytes(tmp_path / ("n" * 5000), "camera file", LIMIT)
+        read_bytes(tmp_path / ("n" * 5000), CAMERA_FILE, LIMIT)
 
 
 @posix_only
@@ -90,14 +92,14 @@ def test_a_pipe_is_refused_without_waiting_for_it(tmp_path: Path) -> None:
     path = tmp_path / "pipe"
     os.mkfifo(path)
     with pytest.raises(FileError, match="pipe or a device"):
-        read_bytes(path, "camera file", LIMIT)
+        read_bytes(path, CAMERA_FILE, LIMIT)
 
 
 @posix_only
 def test_a_file_of_somebody_else_is_refused(open_folder: Path) -> None:
     path = file(open_folder, b"secret")
     path.chmod(0)
-    result = as_nobody(f"read_bytes(Path({str(path)!r}), 'camera file', 99)")
+    result = as_nobody(f"read_bytes(Path({str(path)!r}), CAMERA_FILE, 99)")
     assert "cannot be read: Permission denied" in result
 
 
@@ -113,12 +115,12 @@ def test_text_is_read_in_the_encodings_of_instruments(
         if encoding.endswith("mark")
         else text.encode(encoding)
     )
-    assert read_text(file(tmp_path, data), "pen file", LIMIT) == text
+    assert read_text(file(tmp_path, data), PEN_FILE, LIMIT) == text
 
 
 def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
     path = file(tmp_path, b"a\r\nb\rc\n")
-    assert read_text(path, "pen file", LIMIT) == "a\nb\nc\n"
+    assert read_text(path, PEN_FILE, LIMIT) == "a\nb\nc\n"
 
 
 @pytest.mark.parametrize(
@@ -135,7 +137,7 @@ def test_line_ends_of_every_system_are_one(tmp_path: Path) -> None:
 )
 def test_what_is_not_text_is_refused(tmp_path: Path, data: bytes, what: str) -> None:
     with pytest.raises(FileError, match=what):
-        read_text(file(tmp_path, data), "pen file", LIMIT)
+        read_text(file(tmp_path, data), PEN_FILE, LIMIT)
 
 
 @given(st.binary(max_size=200))
@@ -144,7 +146,7 @@ def test_any_bytes_are_text_or_are_refused(
 ) -> None:
     path = file(tmp_path_factory.mktemp("any"), data)
     try:
-        text = read_text(path, "pen file", LIMIT)
+        text = read_text(path, PEN_FILE, LIMIT)
     except FileError:
         return
     assert "\r" not in text
@@ -299,6 +301,7 @@ def in_other_process(preparation: str, call: str) -> str:
         "import os\n"
         "from pathlib import Path\n"
         "from lightpen.errors import FileError\n"
+        "from lightpen.formats.camera_files import CAMERA_FILE\n"
         "from lightpen.formats.files import read_bytes, write_whole\n"
         f"{preparation}\n"
         f"try:\n    {call}\nexcept FileError as error:\n    print(error)\n"

@@ -103,16 +103,16 @@ def test_units_in_the_header_are_followed(
 @pytest.mark.parametrize("header", ["", "led,x,y,z"])
 def test_units_that_are_not_stated_are_asked_for(tmp_path: Path, header: str) -> None:
     text = table(LEDS / 1000, header)
-    assert "--units mm" in refusal(tmp_path, text)
+    assert "does not say which units" in refusal(tmp_path, text)
     found = read_pen(saved(tmp_path, text), units="m")
     np.testing.assert_array_equal(found.leds, LEDS / 1000 * 1000)
 
 
 def test_units_that_contradict_the_file_are_refused(tmp_path: Path) -> None:
-    assert "states its lengths in mm, but --units m" in refusal(
+    assert "states its lengths in mm, but the unit m" in refusal(
         tmp_path, table(), units="m"
     )
-    assert "states its lengths in mm, but --units m" in refusal(
+    assert "states its lengths in mm, but the unit m" in refusal(
         tmp_path, document(), units="m"
     )
 
@@ -261,7 +261,7 @@ def test_discs_of_different_width_are_refused(tmp_path: Path) -> None:
         (LEDS / 1000, "leds.csv: The LEDs span only 0.18 mm"),
         (LEDS * [1, 1, -1], "leds.csv: The LEDs are mirrored in z"),
         (LEDS[[0, 2, 1, *range(3, 10)]], "leds.csv: LEDs 2 and 3 are exchanged"),
-        (LEDS + np.array([0, 0, 500]), "lightpen pen RAW.csv OUT.csv"),
+        (LEDS + np.array([0, 0, 500]), "put them into the pen frame"),
     ],
 )
 def test_wrong_geometry_is_refused_with_the_name_of_the_file(

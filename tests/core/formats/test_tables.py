@@ -11,14 +11,17 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
+from lightpen.formats.pen_files import PEN_FILE
 from lightpen.formats.tables import Table, number_flaw, parse_table, read_table
+from lightpen.sentences import sentence
 
+LEDS = sentence("test.leds", "the LEDs")
 COLUMNS = (("led",), ("x_mm",), ("y_mm",))
 NUMBERS = [[1, 0.5, -2.25], [2, 60.125, 1e-7], [3, 120.0, 3e2]]
 
 
 def numbers(table: Table) -> list[list[float]]:
-    rows: list[list[float]] = table.numbers(table.columns(COLUMNS, "the LEDs")).tolist()
+    rows: list[list[float]] = table.numbers(table.columns(COLUMNS, LEDS)).tolist()
     return rows
 
 
@@ -70,7 +73,7 @@ def test_every_layout_gives_the_same_numbers(text: str) -> None:
 def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "leds.csv"
     path.write_bytes(b"\xef\xbb\xbfled,x_mm,y_mm\r\n1,0.5,-2.25\r\n")
-    table = read_table(path, "pen file", 1000)
+    table = read_table(path, PEN_FILE, 1000)
     assert (table.name, table.lines) == ("leds.csv", [2])
     assert numbers(table) == NUMBERS[:1]
 
@@ -78,7 +81,10 @@ def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
 def test_rows_know_their_lines() -> None:
     table = parse_table("# one\nled,x\n\n1,2\n# five\n3,4\n", "t.csv")
     assert table.lines == [4, 6]
-    assert str(table.error(1, "wrong.")) == "Line 6 of t.csv: wrong."
+    assert (
+        str(table.error(1, sentence("test.flaw", "wrong.")))
+        == "Line 6 of t.csv: wrong."
+    )
 
 
 def test_a_letter_in_a_number_is_named_with_its_line() -> None:
@@ -140,19 +146,19 @@ def test_a_column_named_twice_is_refused() -> None:
 def test_columns_that_mean_the_same_are_refused() -> None:
     table = parse_table("led,x,x_px\n1,2,3\n", "t.csv")
     with pytest.raises(FileError, match=r"Columns 2 and 3 of t\.csv both hold x_px"):
-        table.columns((("led",), ("x_px", "x")), "centres")
+        table.columns((("led",), ("x_px", "x")), sentence("test.centres", "centres"))
 
 
 def test_a_missing_column_is_named() -> None:
     table = parse_table("led,x_mm\n1,2\n", "t.csv")
     with pytest.raises(FileError, match=r"no column y_mm; .* columns led,x_mm,y_mm"):
-        table.columns(COLUMNS, "the LEDs")
+        table.columns(COLUMNS, LEDS)
 
 
 def test_a_wrong_number_of_columns_without_header_is_refused() -> None:
     table = parse_table("1,2\n", "t.csv")
     with pytest.raises(FileError, match="no header and 2 columns; the LEDs need the 3"):
-        table.columns(COLUMNS, "the LEDs")
+        table.columns(COLUMNS, LEDS)
 
 
 @pytest.mark.parametrize(

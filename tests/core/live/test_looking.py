@@ -25,6 +25,7 @@ from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import IMAGES, Record, open_record
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
@@ -391,7 +392,7 @@ def test_a_paused_swing_keeps_nothing_until_it_is_resumed(stage: Stage) -> None:
     n_images = len(stage.record().images)
     stage.audience.wait_for_images(40)
     assert stage.audience.state.pause is Pause.BY_USER
-    assert stage.audience.state.message.code is Code.PAUSED
+    assert stage.audience.state.message.code == Code.PAUSED
     assert len(stage.record().images) == n_images
 
     live.resume()
@@ -523,7 +524,7 @@ def test_what_fails_after_the_swing_was_abandoned_is_told(stage: Stage) -> None:
     live = stage.capture(1)
 
     def fail() -> None:
-        raise FileError("The disk is full.")
+        raise FileError(sentence("test.trouble", "The disk is full."))
 
     live.abandon(fail)
     stage.audience.wait_until(lambda: len(stage.audience.troubles) == 1)

@@ -41,7 +41,7 @@ def test_a_cell_that_is_no_number_is_named() -> None:
     (flaw,) = draft.flaws()
 
     assert (flaw.row, flaw.column) == (4, 1)
-    assert flaw.sentence == 'LED 5, y: "12,4O" is not a number (letter O).'
+    assert str(flaw.sentence) == 'LED 5, y: "12,4O" is not a number (letter O).'
     with pytest.raises(FileError, match="LED 5, y"):
         draft.pen()
 
@@ -97,7 +97,7 @@ def test_a_good_draft_is_usable_and_sought() -> None:
     check = check_draft(DRAFT)
 
     assert check.usable is check.pen is check.sought
-    assert check.flaw == ""
+    assert check.flaw is None
 
 
 def test_an_unchanged_draft_stands_for_the_very_pen() -> None:
@@ -107,13 +107,13 @@ def test_an_unchanged_draft_stands_for_the_very_pen() -> None:
 def test_an_empty_draft_has_nothing_wrong_but_is_no_pen() -> None:
     check = check_draft(PenDraft())
 
-    assert (check.flaw, check.pen, check.sought, check.usable) == ("", None, None, None)
+    assert (check.flaw, check.pen, check.sought, check.usable) == (None,) * 4
 
 
 def test_a_flawed_draft_tells_its_cell() -> None:
     check = check_draft(DRAFT.with_cell(0, 0, "x"))
 
-    assert check.flaw == 'LED 1, x: "x" is not a number.'
+    assert str(check.flaw) == 'LED 1, x: "x" is not a number.'
     assert check.pen is None
 
 

@@ -38,7 +38,7 @@ def test_the_paper_pen_meets_every_rule() -> None:
     check = examine_frame(PEN)
 
     assert set(outcomes(check).values()) == {RuleStatus.MET}
-    assert (check.error, check.remark, check.can_be_moved) == ("", "", False)
+    assert (check.error, check.remark, check.can_be_moved) == (None, None, False)
 
 
 @pytest.mark.parametrize("pair", list(combinations(range(10), 2)))
@@ -49,7 +49,7 @@ def test_each_pair_of_exchanged_leds_is_named(pair: tuple[int, int]) -> None:
     check = examine_frame(with_leds(leds))
 
     assert broken(check) == {Rule.NUMBERS}
-    assert f"LEDs {pair[0] + 1} and {pair[1] + 1} are exchanged" in check.error
+    assert f"LEDs {pair[0] + 1} and {pair[1] + 1} are exchanged" in str(check.error)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -100,14 +100,14 @@ def test_discs_that_face_away_are_told() -> None:
     check = examine_frame(replace(PEN, normals=normals))
 
     assert broken(check) == {Rule.NORMALS}
-    assert "normal of LED 4" in check.error
+    assert "normal of LED 4" in str(check.error)
 
 
 def test_a_pen_of_another_layout_keeps_its_frame() -> None:
     check = examine_frame(six_led_pen())
 
-    assert check.error == ""
-    assert "do not stand as the pen frame needs it" in check.remark
+    assert check.error is None
+    assert "do not stand as the pen frame needs it" in str(check.remark)
     assert outcomes(check)[Rule.LINE] is RuleStatus.OPEN
     assert check.is_a_pen
 
@@ -125,8 +125,8 @@ def test_a_pen_is_in_error_exactly_where_the_frame_refuses_it(name: str) -> None
     pen = SAMPLE_PENS[name]()
     try:
         check_frame(pen)
-        refusal = ""
+        refusal = None
     except FileError as error:
-        refusal = str(error)
+        refusal = error.sentence
 
     assert examine_frame(pen).error == refusal

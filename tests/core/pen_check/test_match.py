@@ -176,7 +176,7 @@ def test_an_exchanged_coordinate_is_named() -> None:
             pair = (one + 1, other + 1)
             # LEDs of one plane: exchanging x or y gives the same two places.
             named = "x/y" if PEN.leds[one, 2] == PEN.leds[other, 2] else "xyz"[axis]
-            if findings != (Finding(What.EXCHANGED, pair, text=named),):
+            if findings != (Finding(What.EXCHANGED, pair, axes=named),):
                 wrong.append((pair, axis, findings))
     assert wrong == []
 
@@ -224,7 +224,7 @@ def test_a_mirrored_file_is_told_as_such() -> None:
     finding = the_finding(match_pen(CAMERA, mirrored, SWUNG))
 
     assert finding.what is What.ADVICE
-    assert "mirror image" in finding.text
+    assert "mirror image" in str(finding.advice)
 
 
 def test_another_pen_is_told_as_such() -> None:
@@ -233,7 +233,7 @@ def test_another_pen_is_told_as_such() -> None:
     match = match_pen(CAMERA, other, SWUNG)
 
     assert (match.n_labelled, match.fits) == (0, False)
-    assert "do not fit the pen file" in the_finding(match).text
+    assert "do not fit the pen file" in str(the_finding(match).advice)
 
 
 def test_leds_that_are_all_a_little_off_are_a_misfit_of_none() -> None:

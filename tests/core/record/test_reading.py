@@ -15,9 +15,9 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.images import decode_image
-from lightpen.formats.pen_files import write_pen
+from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.record.reading import (
     FileCopy,
     Header,
@@ -52,8 +52,8 @@ def header(tmp_path: Path) -> Header:
     write_camera(paper_camera(), tmp_path / "station 3.YAML")
     write_pen(paper_pen(), tmp_path / "lp04.json")
     return Header(
-        camera=FileCopy.of(tmp_path / "station 3.YAML", "camera file"),
-        pen=FileCopy.of(tmp_path / "lp04.json", "pen file"),
+        camera=FileCopy.of(tmp_path / "station 3.YAML", CAMERA_FILE),
+        pen=FileCopy.of(tmp_path / "lp04.json", PEN_FILE),
         created=datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
         program="lightpen 0.1.0",
         station="Halle 3",

@@ -7,7 +7,7 @@ import pytest
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.messages import Code, Message
+from lightpen.messages import HOLD_STILL, SEAT_TIP, SWING_TO_SEAT
 from lightpen.model.posture import Posture
 from lightpen.simulator.follower import FIRST_LEAN, GENTLE_LEANS, UPRIGHT, Follower
 from lightpen.simulator.hand import Operator
@@ -95,7 +95,7 @@ def test_the_hand_is_led_only_while_images_are_captured(
 @pytest.fixture
 def seeking(state: SwingState) -> SwingState:
     """Return a swing that asks for a gentle swing, to find where the tip rests."""
-    return replace(state, phase=Phase.SEEN, message=Message(Code.SWING_TO_SEAT))
+    return replace(state, phase=Phase.SEEN, message=SWING_TO_SEAT)
 
 
 def test_asked_to_swing_gently_the_pen_goes_round_upright(
@@ -111,7 +111,7 @@ def test_asked_to_swing_gently_the_pen_goes_round_upright(
 def test_asked_to_put_the_tip_in_only_the_hand_stays(
     operator: ToldOperator, seeking: SwingState
 ) -> None:
-    Follower(operator).follow(replace(seeking, message=Message(Code.SEAT_TIP)))
+    Follower(operator).follow(replace(seeking, message=SEAT_TIP))
 
     assert operator.told == []
 
@@ -122,7 +122,7 @@ def test_after_the_gentle_swing_the_pen_is_held_upright_until_it_is_led(
     follower = Follower(operator)
     follower.follow(seeking)
     for phase in (Phase.SETTLED, Phase.COUNTDOWN, Phase.COUNTDOWN):
-        follower.follow(replace(seeking, phase=phase, message=Message(Code.HOLD_STILL)))
+        follower.follow(replace(seeking, phase=phase, message=HOLD_STILL))
     follower.follow(replace(seeking, phase=Phase.CAPTURING))
 
     assert operator.told == [GENTLE_LEANS[0], UPRIGHT, ASKED]

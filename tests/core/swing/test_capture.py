@@ -19,11 +19,12 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.report import (
     calibration_json,
 )
-from lightpen.formats.camera_files import write_camera
+from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
-from lightpen.formats.pen_files import write_pen
+from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.record.reading import FileCopy, Header, open_record, source
 from lightpen.record.writing import RecordWriter
+from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP, paper_camera
@@ -57,8 +58,8 @@ class Wizard:
         write_camera(scene.camera, folder / "camera.yaml")
         write_pen(scene.pen, folder / "lp04.json")
         header = Header(
-            camera=FileCopy.of(folder / "camera.yaml", "camera file"),
-            pen=FileCopy.of(folder / "lp04.json", "pen file"),
+            camera=FileCopy.of(folder / "camera.yaml", CAMERA_FILE),
+            pen=FileCopy.of(folder / "lp04.json", PEN_FILE),
             created=datetime(2026, 1, 2, tzinfo=UTC),
         )
         self.folder = folder / "swing"
@@ -217,7 +218,7 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
         return Transition(replace(state, next_number=5), events)
 
     def fail(writer: RecordWriter, numbers: Sequence[int], reason: str) -> None:
-        raise FileError("The disk is full.")
+        raise FileError(sentence("test.trouble", "The disk is full."))
 
     with monkeypatch.context() as patch:
         patch.setattr("lightpen.swing.capture.advance", slipped_and_kept)

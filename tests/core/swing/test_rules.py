@@ -8,7 +8,20 @@ import pytest
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, sight_centers
-from lightpen.messages import Code, Message
+from lightpen.messages import (
+    FOLLOW_ARROW,
+    LEAN_TO_YOUR_RIGHT,
+    PEN_LOST,
+    SEAT_TIP,
+    SWING_TO_SEAT,
+    Code,
+    few_leds,
+    tip_is_good,
+    tip_slipped,
+    too_few_images,
+    too_little_tilt,
+    uncertain,
+)
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import angles_between
@@ -100,7 +113,7 @@ class Station:
     def follow(self) -> None:
         """Do what the screen asks for."""
         target = self.state.target
-        if self.state.message.code is Code.LEAN_TO_YOUR_RIGHT:
+        if self.state.message.code == Code.LEAN_TO_YOUR_RIGHT:
             wish: object = "right"
         else:
             wish = target
@@ -200,11 +213,12 @@ def test_the_countdown_counts_three_two_one() -> None:
     station = Station()
     station.operator.seat()
     station.run(60.0, until=Phase.COUNTDOWN)
-    counted = [station.state.message.arguments]
+    counted = [station.state.message.values]
     while station.state.phase is Phase.COUNTDOWN:
         station.run(PERIOD)
-        counted.append(station.state.message.arguments)
-    assert list(dict.fromkeys(counted)) == [(3,), (2,), (1,), ()]
+        counted.append(station.state.message.values)
+    told = [values.get("seconds") for values in counted]
+    assert list(dict.fromkeys(told)) == [3, 2, 1, None]
     assert station.state.n_kept <= 1
 
 
@@ -212,13 +226,13 @@ def test_the_first_lean_teaches_the_operators_side() -> None:
     station = Station()
     station.operator.seat()
     station.run(60.0, until=Phase.CAPTURING)
-    assert station.state.message == Message(Code.LEAN_TO_YOUR_RIGHT)
+    assert station.state.message == LEAN_TO_YOUR_RIGHT
     assert station.state.target is None
     station.told = "right"
     station.operator.lean_towards(np.radians(20), np.pi, 0.0)  # facing the camera
     station.run(2.0)
     assert station.state.heading == np.pi
-    assert station.state.message == Message(Code.FOLLOW_ARROW)
+    assert station.state.message == FOLLOW_ARROW
     assert station.state.target is not None
 
 
@@ -227,14 +241,14 @@ def test_a_pen_held_in_the_air_is_not_seated() -> None:
     station.operator.lift()
     station.run(10.0)
     assert station.phases == [Phase.WAIT, Phase.SEEN]
-    assert station.state.message == Message(Code.SEAT_TIP)
+    assert station.state.message == SEAT_TIP
 
 
 def test_without_a_nominal_tip_a_still_pen_is_asked_to_swing() -> None:
     station = Station(pen=replace(paper_pen(), nominal_tip=None))
     station.operator.seat()
     station.run(6.0)
-    assert station.state.message == Message(Code.SWING_TO_SEAT)
+    assert station.state.message == SWING_TO_SEAT
 
     station.operator.swing()
     station.run(10.0, until=Phase.SETTLED)
@@ -270,12 +284,11 @@ def test_a_slip_says_so_once_with_the_number_of_images() -> None:
     station = capturing()
     station.operator.slip(0.3, 2.0)
     station.run(1.5)
-    message = station.state.message
-    assert message.code is Code.TIP_SLIPPED
-    assert message.arguments == (station.state.n_dropped[Reason.SLIPPED],)
+    n_slipped = station.state.n_dropped[Reason.SLIPPED]
+    assert station.state.message == tip_slipped(n_slipped)
     station.run(2.5)
     assert station.happenings().count(Happening.SLIPPED) == 1
-    assert station.state.message == Message(Code.FOLLOW_ARROW)
+    assert station.state.message == FOLLOW_ARROW
 
 
 def test_images_that_slipped_are_found_when_more_is_known() -> None:
@@ -305,8 +318,8 @@ def test_a_tip_that_stays_elsewhere_pauses_until_it_is_put_back() -> None:
     station.operator.slip(0.5, 5.0)
     station.run(4.0)
     assert station.state.pause is Pause.ELSEWHERE
-    assert station.state.message.code is Code.TIP_ELSEWHERE
-    assert float(station.state.message.arguments[0]) == pytest.approx(0.5, abs=0.05)
+    assert station.state.message.code == Code.TIP_ELSEWHERE
+    assert station.state.message.values["distance"] == pytest.approx(0.5, abs=0.05)
     assert abs(station.state.n_kept - n_kept) <= 2
 
     station.run(3.0)
@@ -356,7 +369,7 @@ def test_hidden_leds_pause_after_seven_tenths_of_a_second() -> None:
     assert station.state.phase is Phase.CAPTURING
     station.run(0.3)
     assert station.state.pause is Pause.LOST
-    assert station.state.message == Message(Code.PEN_LOST)
+    assert station.state.message == PEN_LOST
     station.run(4.0)
     assert station.state.phase is Phase.CAPTURING
 
@@ -367,13 +380,13 @@ def test_too_few_leds_are_said_and_not_kept() -> None:
     station.operator.cover(leds=[1, 2, 3, 4, 5])
     station.run(3.0)
     assert station.state.n_kept <= n_kept + 1
-    assert station.state.message == Message(Code.FEW_LEDS, (5, 6))
+    assert station.state.message == few_leds(5, 6)
     # Some 60 images, but counted once a posture.
     assert 1 <= station.state.n_dropped[Reason.TOO_FEW_LEDS] < 20
 
     station.operator.uncover()
     station.run(1.0)
-    assert station.state.message == Message(Code.FOLLOW_ARROW)
+    assert station.state.message == FOLLOW_ARROW
 
 
 def test_the_users_pause_keeps_nothing_until_the_user_goes_on() -> None:
@@ -393,19 +406,12 @@ def test_the_users_pause_keeps_nothing_until_the_user_goes_on() -> None:
 
 def test_finishing_early_says_what_is_missing() -> None:
     station = capturing(4.0)
-    said = {
-        message.code: message.arguments
-        for message in missing(station.setup, station.state)
-    }
-    assert said[Code.TOO_FEW_IMAGES] == (station.state.n_kept, 60)
-    uncertainty, limit, n_more = said[Code.UNCERTAIN]
-    assert isinstance(n_more, int)
-    assert (uncertainty, limit) == (station.state.kept.uncertainty, 0.005)
-    assert n_more > 100
-    n_images, *directions = said[Code.TOO_LITTLE_TILT]
-    assert n_images == int(np.maximum(2 - station.state.counts[1:], 0).sum())
+    n_images = int(np.maximum(2 - station.state.counts[1:], 0).sum())
     bare = np.flatnonzero((station.state.counts[1:] < 2).any(axis=0))
-    assert directions == bare.tolist()
+    said = missing(station.setup, station.state)
+    assert too_few_images(station.state.n_kept, 60) in said
+    assert uncertain(station.state.kept.uncertainty, 0.005) in said
+    assert too_little_tilt(n_images, bare.tolist()) in said
 
     transition = finish(station.state)
     assert transition.state.phase is Phase.SOLVING
@@ -418,7 +424,7 @@ def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
     station.operator.seat()
     station.run(120.0, until=Phase.SOLVING)
     assert station.state.n_kept == 70
-    assert missing(station.setup, station.state)[-1].code is Code.UNCERTAIN
+    assert missing(station.setup, station.state)[-1].code == Code.UNCERTAIN
 
 
 def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
@@ -431,7 +437,7 @@ def test_fields_the_camera_cannot_see_are_not_asked_for() -> None:
 
 
 def test_the_verdict_is_told(whole: Station) -> None:
-    good = Message(Code.GOOD, (0.004,))
+    good = tip_is_good(0.004)
     transition = conclude(whole.state, good, passed=True)
     assert transition.state.phase is Phase.VERDICT
     assert transition.state.message == good

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.detection.sighting import sight_centers
-from lightpen.messages import Code
+from lightpen.messages import SIDES, Code
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import rotations_of
 from lightpen.simulator.postures import Postures
@@ -122,8 +122,8 @@ def test_missing_directions_are_named() -> None:
     setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=1.0))
     state = state_of(setup, to_the_right(120))
     (message,) = missing(setup, state)
-    assert message.code is Code.TOO_LITTLE_TILT
-    assert set(message.arguments[1:]) == {3, 4, 5}
+    assert message.code == Code.TOO_LITTLE_TILT
+    assert message.values["sides"] == SIDES[3:6]
 
 
 def test_the_target_is_in_a_bare_field_once_the_uncertainty_suffices() -> None:

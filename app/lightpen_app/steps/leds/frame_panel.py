@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.pen_check.frame import FrameCheck, Rule, RuleCheck, RuleStatus
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.leds.pen_view import PenPicture, PenView
@@ -115,7 +116,7 @@ class FramePanel(Translated, QGroupBox):
                 "it is."
             )
             note = Remark(words, Sign.WARNING, Tone.QUIET)
-            self._layout_note.setToolTip(value.remark)
+            self._layout_note.setToolTip(worded(value.remark))
         self._layout_note.set_value(note)
 
     def _show(self, rule: Rule, check: RuleCheck | None) -> None:

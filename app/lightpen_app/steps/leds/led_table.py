@@ -26,6 +26,7 @@ from typing_extensions import override
 
 from lightpen.pen_check.draft import COLUMNS, CellFlaw, PenDraft
 from lightpen_app.look.quantities import number_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, Tone, colors_of
 from lightpen_app.widgets.keys import ENTER_KEYS
@@ -294,7 +295,7 @@ class _DraftModel(QAbstractTableModel):
         if column in (0, MISFIT):
             return self._reasons.get(row + 1, "") if column == 0 else ""
         flaw = self._flaws.get((row, column - 1))
-        return "" if flaw is None else flaw.sentence
+        return "" if flaw is None else worded(flaw.sentence)
 
     def _tell_all(self) -> None:
         last = self.index(self.rowCount() - 1, N_COLUMNS - 1)

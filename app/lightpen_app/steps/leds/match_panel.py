@@ -16,6 +16,7 @@ from lightpen.pen_check.match import Finding, PenMatch, What
 from lightpen.pen_check.shifts import MIN_SHIFT
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import number_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
 from lightpen_app.widgets.image_view import ImageView, Marker
@@ -209,10 +210,10 @@ class MatchPanel(Translated, QGroupBox):
         length = f"{math.hypot(*finding.by):.2f}"
         match finding.what:
             case What.ADVICE:
-                return finding.text
+                return worded(finding.advice)
             case What.EXCHANGED:
                 words = self.tr("{0} of LEDs {1} and {2} are exchanged in the table.")
-                return words.format(finding.text, *finding.leds)
+                return words.format(finding.axes, *finding.leds)
             case What.SHIFTED if finding.is_sure:
                 words = self.tr("LED {0} sits {1} mm off its place: {2}, {3}, {4} mm.")
                 return words.format(finding.leds[0], length, *place)

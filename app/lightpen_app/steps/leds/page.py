@@ -16,6 +16,7 @@ from lightpen.pen_check.match import PenMatch
 from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
@@ -218,8 +219,8 @@ class LedsPage(Rearranged, Page):
         in_use = None if self._is_pending else self._in_use
         self._check = check_draft(draft, None if in_use is None else in_use.pen)
         frame = self._check.frame
-        self._table.set_flaw(self._check.flaw)
-        self._file.set_problem("" if frame is None else frame.error)
+        self._table.set_flaw(worded(self._check.flaw))
+        self._file.set_problem("" if frame is None else worded(frame.error))
         self._match.set_has_frame(frame is None or not frame.error)
         preparation = self._workbench.preparation
         if preparation.has_unsaved_leds is not self._is_pending:
@@ -290,7 +291,7 @@ class LedsPage(Rearranged, Page):
         self._start(lambda _: open_pen(path, units), self._on_opened)
 
     def _on_opened(self, opened: OpenedPen) -> None:
-        problem = "" if opened.problem is None else str(opened.problem)
+        problem = "" if opened.problem is None else worded(opened.problem)
         if opened.file is not None:
             self._use(opened.file)
         elif opened.draft is not None:  # those in use stay in use

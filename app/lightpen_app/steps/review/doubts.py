@@ -5,6 +5,7 @@ from PySide6.QtCore import QObject
 from lightpen.estimation.report import warnings_of
 from lightpen.estimation.verdict import USUAL_CHANGE, distance_from_nominal
 from lightpen.record.names import Names
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.review.result_panel import Outcome
 
@@ -26,7 +27,7 @@ class ReviewDoubts(QObject):
             self._of_change(outcome),
             self._of_nominal(outcome),
         )
-        warnings = warnings_of(outcome.solution.calibration)
+        warnings = map(worded, warnings_of(outcome.solution.calibration))
         return (*filter(None, own), *warnings)
 
     def _of_names(self, swung: Names, named: Names) -> str:

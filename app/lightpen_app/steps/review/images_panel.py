@@ -15,6 +15,7 @@ from lightpen.record.reading import RecordSource
 from lightpen.record.solving import Solution, load_image
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.pooling import pooled
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.plot_card import PlotCard
@@ -237,7 +238,7 @@ class ImagesPanel(Translated, QWidget):
             self._caption.setText(text.format(number, f"{scale:g}"))
         else:
             text = self.tr("Image {0}: the pen is not found. {1}")
-            self._caption.setText(text.format(number, detail))
+            self._caption.setText(text.format(number, worded(detail)))
 
     def _on_number_changed(self, number: int) -> None:
         self._mark()

@@ -22,6 +22,7 @@ from lightpen.record.solving import Solution
 from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text, phrase
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
 from lightpen_app.steps.page import MainAction, Page
@@ -131,18 +132,11 @@ class ReviewPage(Rearranged, Page):
             return self.tr("Next: start the next calibration, or close the program.")
         if self._run.status.verdict is None:
             return self.tr("Nothing is in force until it is accepted.")
-        return {
-            NextStep.ACCEPT: self.tr(
-                "Next: accept the tip. The old one stays in force until then."
-            ),
-            NextStep.CAPTURE_MORE: self.tr(
-                "Next: capture more images; those of this swing are kept."
-            ),
-            NextStep.REPEAT: self.tr("Next: repeat the swing with the tip pressed in."),
-            NextStep.CHECK_FILES: self.tr(
-                "Next: check the intrinsics file and the LED file, then repeat."
-            ),
-        }[self._run.status.verdict.next_step]
+        next_step = self._run.status.verdict.next_step
+        text = worded(next_step.sentence)
+        if next_step is NextStep.ACCEPT:
+            text = self.tr("{0} The old one stays in force until then.").format(text)
+        return text
 
     @override
     def is_complete(self) -> bool:
@@ -336,7 +330,7 @@ class ReviewPage(Rearranged, Page):
         try:
             return last_result(self._run.results_folder, names.pen, names.tip)
         except FileError as error:
-            self.notice_raised.emit(str(error))
+            self.notice_raised.emit(worded(error.sentence))
             return None
 
     def _refresh_words(self) -> None:

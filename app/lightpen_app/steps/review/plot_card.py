@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.errors import FileError
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.translated import Translated
@@ -95,7 +96,7 @@ class PlotCard(Translated, QFrame):
             else:
                 self._plot.save_png(path)
         except FileError as error:
-            self.failed.emit(str(error))
+            self.failed.emit(worded(error.sentence))
             return
         self.saved.emit(self.tr("Saved as {0}").format(path))
 

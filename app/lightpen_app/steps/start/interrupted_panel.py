@@ -18,6 +18,7 @@ from typing_extensions import override
 from lightpen.record.reading import Record, recorded_names
 from lightpen.record.unfinished import DamagedSwing, Unfinished
 from lightpen_app.look.phrases import n_images_text
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text, shortened, unbroken
 from lightpen_app.widgets.page_scroll import PageScroll
@@ -146,7 +147,7 @@ class InterruptedRow(Translated, QFrame):
 
     def _description(self) -> str:
         if isinstance(self._swing, DamagedSwing):
-            return breakable(self._swing.sentence)
+            return breakable(worded(self._swing.sentence))
         if self._is_under_way:
             return self.tr("Another program is capturing it.")
         names, n_images = recorded_names(self._swing), len(self._swing.images)

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject
 
 from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
-from lightpen.messages import Code, Message
+from lightpen.messages import SHOW_PEN, Code
 from lightpen.model.posture import Posture, posture_of
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
@@ -23,6 +23,7 @@ from lightpen_app.look.phrases import (
     phase_text,
     phrase,
 )
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.operator_view import OperatorValue
@@ -123,12 +124,12 @@ class SwingWords(QObject):
             Whether images come, so that a swing begins at any moment.
         """
         if is_near and refusal is None:
-            told = phrase(Message(Code.SHOW_PEN))
+            told = phrase(SHOW_PEN)
             state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
             return OperatorValue(told.short, told.hint, state, dial=DialValue())
         told = self._no_images()
         if refusal is not None:
-            told = Phrase(self.tr("No swing"), str(refusal))
+            told = Phrase(self.tr("No swing"), worded(refusal))
         return OperatorValue(
             instruction=told.short,
             hint=told.hint,
@@ -172,13 +173,13 @@ class SwingWords(QObject):
                 "it, then press Space."
             )
             return Phrase(told.short, hint)
-        if message.code is Code.SHOW_PEN and moment.is_simulated:
+        if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat, and lean the pen by "
                 "dragging the dial."
             )
             return Phrase(told.short, hint)
-        if message.code is Code.FOLLOW_ARROW and state.target and heading is not None:
+        if message.code == Code.FOLLOW_ARROW and state.target and heading is not None:
             return lean_phrase(state.target, _posture(moment), heading)
         return told
 
@@ -242,7 +243,7 @@ class SwingWords(QObject):
     def _count(self, moment: Moment) -> str:
         state, n_kept = moment.state, moment.state.n_kept
         if state.phase is Phase.COUNTDOWN:
-            return str(state.message.arguments[0])
+            return str(state.message.values["seconds"])
         if state.phase in ENDED:
             return n_images_text(n_kept)
         if not isfinite(state.kept.uncertainty):

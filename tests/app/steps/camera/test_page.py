@@ -38,6 +38,7 @@ from lightpen.swing.preparation import (
     SourceChoice,
     SourceKind,
 )
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import unbroken
 from lightpen_app.shell.main_window import MainWindow
@@ -405,6 +406,20 @@ def test_the_complaint_goes_with_a_fit_file(
     live.until(lambda: "does not exist" not in live.words)
     assert workbench.preparation.camera_file is not None
     assert workbench.preparation.camera_file.path.name == "other.yaml"
+
+
+def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
+    live: Seen, qapp: QApplication, tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("image_width: 1224\ncamera_matrix: [1, 2\n")
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+    live.wait("遮住光笔")
+
+    live.enter("内参文件", str(broken))
+
+    live.wait("broken.yaml 第 3 行不是有效的 YAML")
+    assert "is not valid" not in live.words
 
 
 def test_a_file_is_opened_in_the_dialog(

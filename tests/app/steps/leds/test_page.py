@@ -810,7 +810,7 @@ def test_too_few_views_do_not_say_that_a_pen_fits(seen: Seen) -> None:
     ("finding", "sentence"),
     [
         (
-            Finding(What.EXCHANGED, (5, 8), text="y"),
+            Finding(What.EXCHANGED, (5, 8), axes="y"),
             "y of LEDs 5 and 8 are exchanged in the table.",
         ),
         (
