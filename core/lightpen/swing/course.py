@@ -103,6 +103,7 @@ class SwingCourse:
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
         self._task: Task | None = None
+        self._stopped_at: SwingStatus | None = None  # by a bug
 
     @property
     def status(self) -> SwingStatus:
@@ -110,16 +111,24 @@ class SwingCourse:
         return self._status
 
     def recover(self) -> None:
-        """Carry on after a bug, which costs no more than what was being done."""
-        self._drop_task()
-        self.pause()
-        self._tell_trouble(
-            sentence(
-                "swing.bug",
-                "The program made a mistake of its own. The images kept so far are "
-                "safe; go on, or start the program again.",
+        """Carry on after a bug, which costs no more than what was being done.
+
+        Images are not taken until something else has changed: they may all have it.
+        """
+        if self._task is None:  # it may have ended by this bug
+            self._status = replace(self._status, activity=Activity.NONE)
+        try:
+            self.pause()
+            self._republish()
+            self._tell_trouble(
+                sentence(
+                    "swing.bug",
+                    "The program made a mistake of its own. The images kept so far "
+                    "are safe; go on, or start the program again.",
+                )
             )
-        )
+        finally:
+            self._stopped_at = self._status
 
     def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
         """Become this status, and tell of it."""
@@ -217,21 +226,23 @@ class SwingCourse:
         status, record = self._status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
             return  # it goes on already
+        names, limits = recorded_names(record), recorded_limits(record)
         writer = RecordWriter.resume(record)
         self._drop_task()
         self._close_record()
         self._writer = writer
-        self._limits = recorded_limits(record)  # asking for more does not raise them
+        self._limits = limits  # asking for more does not raise them
         self._wanted = {}
         self._n_since_kept = 0
-        self._attendance = self._attendance.begun()
+        if record.folder != status.record_folder:
+            self._attendance = self._attendance.begun()
         self._relieve()
         self._publish(
             SwingStatus(
                 setup=swing.setup,
                 state=swing.state,
                 record_folder=record.folder,
-                names=recorded_names(record),
+                names=names,
             )
         )
         self._hold_back()
@@ -245,6 +256,8 @@ class SwingCourse:
     ) -> None:
         """Take an image, as `SwingRunner.take` has it."""
         status, choices = self._status, self._attendance.choices
+        if status is self._stopped_at:
+            return
         if status.state is None:
             if self._attendance.is_due and choices is not None:
                 self.begin(choices)
