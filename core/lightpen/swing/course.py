@@ -317,6 +317,7 @@ class SwingCourse:
 
     def resume(self) -> None:
         """Go on after a pause of the user."""
+        self._attendance = replace(self._attendance, paused_by_leaving=False)
         self._change(lambda state: Transition(resume(state)))
 
     def _change(self, act: Callable[[SwingState], Transition]) -> None:
@@ -347,19 +348,18 @@ class SwingCourse:
         self._trying(self._discard)
 
     def _discard(self) -> None:
-        folder = self._status.record_folder
-        if folder is None:
+        status = self._status
+        if status.record_folder is None or status.result is not None:
             return
         if self._writer is None:
-            discard_swing(folder)
+            discard_swing(status.record_folder)
         else:
             self._writer.conclude(DISCARDED)
         self.abandon()
 
     def start_over(self) -> None:
         """Set the swing aside, if its tip is not in force, and begin anew."""
-        status = self._status
-        if status.state is not None and status.result is None:
+        if self._status.result is None:
             self.set_aside()
         else:
             self.abandon()
@@ -371,9 +371,9 @@ class SwingCourse:
         folder, state = status.record_folder, status.state
         if folder is None or state is None or status.result is not None:
             return
-        if state.phase is not Phase.VERDICT or status.activity is Activity.READING:
+        if state.phase is not Phase.VERDICT or status.is_reading:
             return
-        self._drop_task()
+        self.cancel()
         self._start(
             *(Activity.READING, lambda _: read_for_more(folder)),
             *(self._on_read, self._on_unread),
@@ -400,8 +400,10 @@ class SwingCourse:
 
     def solve(self) -> None:
         """Have the tip computed."""
-        folder = self._status.record_folder
-        if folder is not None and not self._status.is_capturing and not self._task:
+        status, folder = self._status, self._status.record_folder
+        if folder is None or self._task is not None:
+            return
+        if not status.is_capturing and status.result is None:
             self._compute(lambda report: solve_record(open_record(folder), report))
 
     def finish(self) -> None:
@@ -420,17 +422,18 @@ class SwingCourse:
     def _want(self, taken_out: Mapping[int, str]) -> None:
         """Solve without these images, or once what is being computed is there."""
         status = self._status
-        if status.solution is None or status.result is not None:
+        if status.solution is None or status.result is not None or status.is_reading:
             return
         self._wanted = taken_out
         if self._task is None:
             self._solve_again(status.solution)
 
     def _solve_again(self, solution: Solution) -> None:
-        wanted = self._tried = self._wanted
+        wanted = self._wanted
         self._compute(lambda _: solve_again(solution, wanted))
 
     def _compute(self, work: Callable[[Report], Solution]) -> None:
+        self._tried = self._wanted
         self._start(Activity.SOLVING, work, self._on_solved, self._on_unsolved)
 
     def _start(
@@ -527,5 +530,6 @@ class SwingCourse:
         try:
             result = accept(self._archive, solution, verdict, status.names, self._now())
             status = replace(status, result=result)
+            self._relieve()
         finally:
             self._publish(status)
