@@ -329,9 +329,10 @@ class SwingCourse:
     def _become(self, transition: Transition, *, is_troubled: bool = False) -> None:
         state = transition.state
         ends = state.phase is Phase.SOLVING
+        status = replace(self._status, state=state)
         if ends:
             self._close_record()
-        status = replace(self._status, state=state)
+            status = replace(status, activity=Activity.SOLVING)
         is_troubled = is_troubled or (status.is_troubled and status.is_paused_by_user)
         self._publish(replace(status, is_troubled=is_troubled), *transition.events)
         if ends:
@@ -478,18 +479,21 @@ class SwingCourse:
                 return
         self._relieve()
         verdict = judge(solution.calibration, self._limits)
-        status = replace(status, solution=solution, verdict=verdict, result=None)
+        goes_on = self._wanted != solution.taken_out
+        activity = Activity.SOLVING if goes_on else Activity.NONE
+        status = replace(
+            status, solution=solution, verdict=verdict, result=None, activity=activity
+        )
         self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
-        if self._wanted != solution.taken_out:
+        if goes_on:
             self._solve_again(solution)
 
     def _on_unsolved(self, why: Sentence) -> None:
         self._task = None
         solution = self._status.solution
         if solution is None:
-            self._conclude(
-                self._status, Message(Code.NO_TIP, (str(why),)), passed=False
-            )
+            status = replace(self._status, activity=Activity.NONE)
+            self._conclude(status, Message(Code.NO_TIP, (str(why),)), passed=False)
             return
         if set(self._tried) > set(solution.taken_out):
             why = sentence(
@@ -512,7 +516,7 @@ class SwingCourse:
         assert status.state is not None
         is_first = status.state.phase is not Phase.VERDICT
         transition = conclude(status.state, reason, passed)
-        status = replace(status, state=transition.state, activity=Activity.NONE)
+        status = replace(status, state=transition.state)
         self._publish(status, *(transition.events if is_first else ()))
 
     def accept(self) -> None:
