@@ -1,5 +1,6 @@
 """A swing without a window: a runner, the simulated pen, and who hears of it."""
 
+import json
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -13,9 +14,11 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
-from lightpen.record.reading import open_record
+from lightpen.record.reading import HEADER, open_record
 from lightpen.record.results import Result, last_result
 from lightpen.record.solving import Solution
+from lightpen.record.unfinished import find_unfinished
+from lightpen.record.writing import RecordWriter
 from lightpen.sentences import Sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
@@ -139,6 +142,21 @@ class Station:
     def tip(self) -> list[float]:
         tip: list[float] = self.solution.calibration.joint.tip_pen.tolist()
         return tip
+
+    def interrupted(self) -> list[Path]:
+        """Return the folders of the swings that can be gone on with."""
+        return [each.folder for each in find_unfinished(self.records).interrupted]
+
+    def is_free(self, folder: Path) -> bool:
+        """Return that a record can be written to; `FileError` while it cannot."""
+        with RecordWriter.resume(open_record(folder)):
+            return True
+
+    def limit_uncertainty(self, folder: Path, limit: float) -> None:
+        """Have a record ask for this U at most, mm."""
+        header = json.loads((folder / HEADER).read_text("utf-8"))
+        header["settings"]["max_uncertainty_mm"] = limit
+        (folder / HEADER).write_text(json.dumps(header), "utf-8")
 
     def in_force(self) -> Result | None:
         names = self.preparation.names
