@@ -103,6 +103,7 @@ class SwingCourse:
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
         self._task: Task | None = None
+        self._stopped_at: SwingStatus | None = None  # by a bug
 
     @property
     def status(self) -> SwingStatus:
@@ -110,16 +111,24 @@ class SwingCourse:
         return self._status
 
     def recover(self) -> None:
-        """Carry on after a bug, which costs no more than what was being done."""
-        self._drop_task()
-        self.pause()
-        self._tell_trouble(
-            sentence(
-                "swing.bug",
-                "The program made a mistake of its own. The images kept so far are "
-                "safe; go on, or start the program again.",
+        """Carry on after a bug, which costs no more than what was being done.
+
+        Images are not taken until something else has changed: they may all have it.
+        """
+        if self._task is None:  # it may have ended by this bug
+            self._status = replace(self._status, activity=Activity.NONE)
+        try:
+            self.pause()
+            self._republish()
+            self._tell_trouble(
+                sentence(
+                    "swing.bug",
+                    "The program made a mistake of its own. The images kept so far "
+                    "are safe; go on, or start the program again.",
+                )
             )
-        )
+        finally:
+            self._stopped_at = self._status
 
     def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
         """Become this status, and tell of it."""
@@ -217,21 +226,23 @@ class SwingCourse:
         status, record = self._status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
             return  # it goes on already
+        names, limits = recorded_names(record), recorded_limits(record)
         writer = RecordWriter.resume(record)
         self._drop_task()
         self._close_record()
         self._writer = writer
-        self._limits = recorded_limits(record)  # asking for more does not raise them
+        self._limits = limits  # asking for more does not raise them
         self._wanted = {}
         self._n_since_kept = 0
-        self._attendance = self._attendance.begun()
+        if record.folder != status.record_folder:
+            self._attendance = self._attendance.begun()
         self._relieve()
         self._publish(
             SwingStatus(
                 setup=swing.setup,
                 state=swing.state,
                 record_folder=record.folder,
-                names=recorded_names(record),
+                names=names,
             )
         )
         self._hold_back()
@@ -245,6 +256,8 @@ class SwingCourse:
     ) -> None:
         """Take an image, as `SwingRunner.take` has it."""
         status, choices = self._status, self._attendance.choices
+        if status is self._stopped_at:
+            return
         if status.state is None:
             if self._attendance.is_due and choices is not None:
                 self.begin(choices)
@@ -304,6 +317,7 @@ class SwingCourse:
 
     def resume(self) -> None:
         """Go on after a pause of the user."""
+        self._attendance = replace(self._attendance, paused_by_leaving=False)
         self._change(lambda state: Transition(resume(state)))
 
     def _change(self, act: Callable[[SwingState], Transition]) -> None:
@@ -315,9 +329,10 @@ class SwingCourse:
     def _become(self, transition: Transition, *, is_troubled: bool = False) -> None:
         state = transition.state
         ends = state.phase is Phase.SOLVING
+        status = replace(self._status, state=state)
         if ends:
             self._close_record()
-        status = replace(self._status, state=state)
+            status = replace(status, activity=Activity.SOLVING)
         is_troubled = is_troubled or (status.is_troubled and status.is_paused_by_user)
         self._publish(replace(status, is_troubled=is_troubled), *transition.events)
         if ends:
@@ -334,19 +349,18 @@ class SwingCourse:
         self._trying(self._discard)
 
     def _discard(self) -> None:
-        folder = self._status.record_folder
-        if folder is None:
+        status = self._status
+        if status.record_folder is None or status.result is not None:
             return
         if self._writer is None:
-            discard_swing(folder)
+            discard_swing(status.record_folder)
         else:
             self._writer.conclude(DISCARDED)
         self.abandon()
 
     def start_over(self) -> None:
         """Set the swing aside, if its tip is not in force, and begin anew."""
-        status = self._status
-        if status.state is not None and status.result is None:
+        if self._status.result is None:
             self.set_aside()
         else:
             self.abandon()
@@ -358,9 +372,9 @@ class SwingCourse:
         folder, state = status.record_folder, status.state
         if folder is None or state is None or status.result is not None:
             return
-        if state.phase is not Phase.VERDICT or status.activity is Activity.READING:
+        if state.phase is not Phase.VERDICT or status.is_reading:
             return
-        self._drop_task()
+        self.cancel()
         self._start(
             *(Activity.READING, lambda _: read_for_more(folder)),
             *(self._on_read, self._on_unread),
@@ -387,8 +401,10 @@ class SwingCourse:
 
     def solve(self) -> None:
         """Have the tip computed."""
-        folder = self._status.record_folder
-        if folder is not None and not self._status.is_capturing and not self._task:
+        status, folder = self._status, self._status.record_folder
+        if folder is None or self._task is not None:
+            return
+        if not status.is_capturing and status.result is None:
             self._compute(lambda report: solve_record(open_record(folder), report))
 
     def finish(self) -> None:
@@ -407,17 +423,18 @@ class SwingCourse:
     def _want(self, taken_out: Mapping[int, str]) -> None:
         """Solve without these images, or once what is being computed is there."""
         status = self._status
-        if status.solution is None or status.result is not None:
+        if status.solution is None or status.result is not None or status.is_reading:
             return
         self._wanted = taken_out
         if self._task is None:
             self._solve_again(status.solution)
 
     def _solve_again(self, solution: Solution) -> None:
-        wanted = self._tried = self._wanted
+        wanted = self._wanted
         self._compute(lambda _: solve_again(solution, wanted))
 
     def _compute(self, work: Callable[[Report], Solution]) -> None:
+        self._tried = self._wanted
         self._start(Activity.SOLVING, work, self._on_solved, self._on_unsolved)
 
     def _start(
@@ -462,16 +479,21 @@ class SwingCourse:
                 return
         self._relieve()
         verdict = judge(solution.calibration, self._limits)
-        status = replace(status, solution=solution, verdict=verdict, result=None)
+        goes_on = self._wanted != solution.taken_out
+        activity = Activity.SOLVING if goes_on else Activity.NONE
+        status = replace(
+            status, solution=solution, verdict=verdict, result=None, activity=activity
+        )
         self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
-        if self._wanted != solution.taken_out:
+        if goes_on:
             self._solve_again(solution)
 
     def _on_unsolved(self, why: Sentence) -> None:
         self._task = None
         solution = self._status.solution
         if solution is None:
-            self._conclude(self._status, no_tip(why), passed=False)
+            status = replace(self._status, activity=Activity.NONE)
+            self._conclude(status, no_tip(why), passed=False)
             return
         if set(self._tried) > set(solution.taken_out):
             why = sentence(
@@ -494,7 +516,7 @@ class SwingCourse:
         assert status.state is not None
         is_first = status.state.phase is not Phase.VERDICT
         transition = conclude(status.state, reason, passed)
-        status = replace(status, state=transition.state, activity=Activity.NONE)
+        status = replace(status, state=transition.state)
         self._publish(status, *(transition.events if is_first else ()))
 
     def accept(self) -> None:
@@ -512,5 +534,6 @@ class SwingCourse:
         try:
             result = accept(self._archive, solution, verdict, status.names, self._now())
             status = replace(status, result=result)
+            self._relieve()
         finally:
             self._publish(status)

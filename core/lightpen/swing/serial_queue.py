@@ -28,7 +28,7 @@ class SerialQueue:
     name : str
         Of the thread.
     on_bug : callable
-        Done next after an act that ended by a bug.
+        Done next after an act that ended by a bug; not after a bug of its own.
     """
 
     def __init__(self, name: str, on_bug: Act) -> None:
@@ -37,7 +37,7 @@ class SerialQueue:
         self._acts: SimpleQueue[Act] = SimpleQueue()
         self._ending = Event()
         self._tasks: list[Task] = []
-        self._thread = self._started()
+        self._begin()
 
     def ask(self, act: Act) -> None:
         """Have something done, from any thread; nothing is done after `end`."""
@@ -111,25 +111,31 @@ class SerialQueue:
     def await_end(self, timeout_s: float) -> bool:
         """Wait until the thread and all tasks have ended; return whether they have."""
         deadline = monotonic() + timeout_s
-        self._thread.join(timeout_s)
+        if not self._ending.wait(timeout_s):  # until then a bug may change the thread
+            return False
+        self._thread.join(max(0.0, deadline - monotonic()))
         for task in self._tasks:
             task.join(max(0.0, deadline - monotonic()))
         is_running = any(task.is_running for task in self._tasks)
         return not (self._thread.is_alive() or is_running)
 
-    def _started(self) -> Thread:
-        thread = Thread(target=self._run, name=self._name, daemon=True)
-        thread.start()
-        return thread
+    def _begin(self, *, after_bug: bool = False) -> None:
+        self._thread = Thread(
+            target=self._run, args=(after_bug,), name=self._name, daemon=True
+        )
+        self._thread.start()
 
-    def _run(self) -> None:
+    def _run(self, after_bug: bool) -> None:
+        act = self._on_bug if after_bug else self._acts.get()
         try:
-            while not self._ending.is_set():
-                self._acts.get()()
+            while True:
+                act()
+                if self._ending.is_set():
+                    return
+                act = self._acts.get()
         finally:
             if not self._ending.is_set():
-                self.ask(self._on_bug)
-                self._thread = self._started()
+                self._begin(after_bug=act is not self._on_bug)
 
     def _end(self) -> None:
         self._ending.set()

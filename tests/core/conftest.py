@@ -1,0 +1,266 @@
+"""A swing without a window: a runner, the simulated pen, and who hears of it."""
+
+import json
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pytest
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.detection.sighting import Sighting, look
+from lightpen.model.limits import SwingLimits
+from lightpen.record.names import Names
+from lightpen.record.reading import HEADER, open_record
+from lightpen.record.results import Result, last_result
+from lightpen.record.solving import Solution
+from lightpen.record.unfinished import find_unfinished
+from lightpen.record.writing import RecordWriter
+from lightpen.sentences import Sentence
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.follower import Follower
+from lightpen.simulator.hand import Operator
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
+from lightpen.swing.preparation import CameraFile, PenFile, Preparation
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.runner import SwingRunner
+from lightpen.swing.state import Happening, Phase, SwingEvent, SwingState
+from lightpen.swing.status import SwingStatus
+
+TIMEOUT = 60.0  # s until a test gives up, on a machine that does other things besides
+MANY = 600  # images, in which all that is to be seen is seen
+FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
+SHORT = SwingLimits(max_uncertainty=0.05, min_images=12, min_per_field=0)
+
+
+class Witness:
+    """Hears what a runner tells, and lets a test wait for it."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[SwingStatus, tuple[SwingEvent, ...]]] = []
+        self.troubles: list[str] = []
+        self.reliefs: list[str] = []
+        self.fractions: list[float] = []
+        self.threads: set[threading.Thread] = set()  # that told of the swing
+        self.follower: Follower | None = None
+        self._changed = threading.Condition()
+
+    def on_swing(self, status: SwingStatus, events: tuple[SwingEvent, ...]) -> None:
+        if self.follower is not None and status.state is not None:
+            self.follower.follow(status.state)
+        self.threads.add(threading.current_thread())
+        self._note(lambda: self.told.append((status, events)))
+
+    def on_progress(self, fraction: float) -> None:
+        self._note(lambda: self.fractions.append(fraction))
+
+    def on_trouble(self, sentence: Sentence) -> None:
+        self._note(lambda: self.troubles.append(str(sentence)))
+
+    def on_relief(self, sentence: Sentence) -> None:
+        self._note(lambda: self.reliefs.append(str(sentence)))
+
+    @property
+    def statuses(self) -> list[SwingStatus]:
+        return [status for status, _ in self.told]
+
+    @property
+    def events(self) -> list[SwingEvent]:
+        return [event for _, events in self.told for event in events]
+
+    @property
+    def happenings(self) -> list[Happening]:
+        return [event.what for event in self.events]
+
+    def wait_until(self, is_so: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(is_so, TIMEOUT)
+
+    def _note(self, note: Callable[[], None]) -> None:
+        with self._changed:
+            note()
+            self._changed.notify_all()
+
+
+@dataclass
+class Station:
+    """A runner, and a camera that sees the pen in its cone.
+
+    The images are taken one after the other by the test itself: see `see`.
+    """
+
+    folder: Path
+    preparation: Preparation
+    runner: SwingRunner
+    witness: Witness
+    clock: SkippingClock
+    operator: Operator
+    camera: SimulatedCamera
+    _last: Sighting | None = None
+    _first: SwingStatus = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._first = self.runner.status
+
+    @property
+    def status(self) -> SwingStatus:
+        return self.runner.status
+
+    @property
+    def state(self) -> SwingState:
+        assert self.status.state is not None
+        return self.status.state
+
+    @property
+    def solution(self) -> Solution:
+        assert self.status.solution is not None
+        return self.status.solution
+
+    @property
+    def record_folder(self) -> Path:
+        assert self.status.record_folder is not None
+        return self.status.record_folder
+
+    @property
+    def records(self) -> Path:
+        return self.folder / "records"
+
+    @property
+    def results(self) -> Path:
+        return self.folder / "results"
+
+    @property
+    def n_recorded(self) -> int:
+        return len(open_record(self.record_folder).images)
+
+    @property
+    def tip(self) -> list[float]:
+        tip: list[float] = self.solution.calibration.joint.tip_pen.tolist()
+        return tip
+
+    def interrupted(self) -> list[Path]:
+        """Return the folders of the swings that can be gone on with."""
+        return [each.folder for each in find_unfinished(self.records).interrupted]
+
+    def is_free(self, folder: Path) -> bool:
+        """Return that a record can be written to; `FileError` while it cannot."""
+        with RecordWriter.resume(open_record(folder)):
+            return True
+
+    def limit_uncertainty(self, folder: Path, limit: float) -> None:
+        """Have a record ask for this U at most, mm."""
+        header = json.loads((folder / HEADER).read_text("utf-8"))
+        header["settings"]["max_uncertainty_mm"] = limit
+        (folder / HEADER).write_text(json.dumps(header), "utf-8")
+
+    def in_force(self) -> Result | None:
+        names = self.preparation.names
+        return last_result(self.results, names.pen, names.tip)
+
+    def new_camera(self) -> SimulatedCamera:
+        """Return another camera before the same pen, not open yet."""
+        return SimulatedCamera(self.camera.scene, self.clock, self.operator)
+
+    def begin(self, limits: SwingLimits = SHORT) -> None:
+        """Begin a swing, and wait until it has begun."""
+        before = self.status.record_folder
+        self.runner.begin(replace(self.preparation, limits=limits))
+        self.wait_until(lambda: self.status.record_folder not in (None, before))
+
+    def go_on(self, folder: Path) -> None:
+        """Go on with an interrupted swing, and wait until it does."""
+        self.runner.go_on(read_resumable(folder))
+        self.wait_until(lambda: self.status.record_folder == folder)
+
+    def solve(self) -> None:
+        """End the capture, and wait for the verdict."""
+        self.runner.finish()
+        self.wait_for_phase(Phase.VERDICT)
+
+    def see(self, n_images: int = 1) -> None:
+        """Have so many images taken, after all that was commanded so far."""
+        for _ in range(n_images):
+            frame = self.camera.read(1.0)
+            setup = self.status.setup if self.status.is_capturing else None
+            wanted = setup or self.preparation.aim
+            assert wanted.camera is not None
+            assert wanted.pen is not None
+            self._last = look(
+                *(frame.image, wanted.camera, wanted.pen, wanted.mask, self._last)
+            )
+            self.runner.take(frame, self._last, setup)
+
+    def see_until(self, is_so: Callable[[], bool]) -> None:
+        """Have images taken until something is so."""
+        for _ in range(MANY):
+            if is_so():
+                return
+            self.see()
+        pytest.fail("It never came to that.")
+
+    def keep(self, n_images: int) -> None:
+        """Have images taken until so many more are kept."""
+        wanted = self.state.n_kept + n_images
+        self.see_until(lambda: self.state.n_kept >= wanted)
+
+    def wait_until(self, is_so: Callable[[], bool]) -> None:
+        """Wait until something is so, and the witness has heard of it."""
+        self.witness.wait_until(lambda: is_so() and self._is_told())
+
+    def wait_for_phase(self, phase: Phase) -> None:
+        self.wait_until(
+            lambda: self.status.state is not None and self.state.phase is phase
+        )
+
+    def wait_until_solved(self) -> None:
+        """Do what was commanded, and wait until nothing is computed any more."""
+        self.see()
+        self.wait_until(lambda: not self.status.is_solving)
+
+    def _is_told(self) -> bool:
+        told = self.witness.told
+        return self.status is (told[-1][0] if told else self._first)
+
+
+@pytest.fixture(scope="session")
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
+    """All that a swing needs; the camera has a quarter of the paper's pixels."""
+    scene = Scene(camera=paper_camera(binning=2))
+    files = write_sample_files(scene, tmp_path_factory.mktemp("files"))
+    return Preparation(
+        names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
+        camera_file=CameraFile.read(files.camera),
+        pen_file=PenFile.read(files.pen),
+        image_size=(scene.camera.width, scene.camera.height),
+        limits=SHORT,
+    )
+
+
+@pytest.fixture
+def station(tmp_path: Path, prepared: Preparation) -> Iterator[Station]:
+    witness, clock = Witness(), SkippingClock()
+    operator = Operator(clock, seated=True)
+    witness.follower = Follower(operator)
+    assert prepared.camera is not None
+    camera = SimulatedCamera(Scene(camera=prepared.camera), clock, operator)
+    camera.open()
+    camera.configure(CameraSettings(frame_rate=FRAME_RATE))
+    camera.start()
+    runner = SwingRunner(tmp_path / "records", tmp_path / "results", witness)
+    yield Station(tmp_path, prepared, runner, witness, clock, operator, camera)
+    runner.shut_down()
+    assert runner.await_end(TIMEOUT)
+    camera.close()
+
+
+@pytest.fixture
+def interrupted(station: Station, swung: Callable[..., Path]) -> Path:
+    """An interrupted swing of 20 images among the records."""
+    folder = station.records / "interrupted"
+    shutil.copytree(swung(), folder)
+    return folder

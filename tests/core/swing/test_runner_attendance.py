@@ -1,0 +1,329 @@
+"""A swing begins, waits and goes on as its user comes and goes."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lightpen.record.reading import DISCARDED, IMAGES, JOURNAL, open_record
+from lightpen.swing.preparation import (
+    Lack,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
+from lightpen.swing.state import Phase
+
+if TYPE_CHECKING:
+    from tests.core.conftest import Station
+
+N_IMAGES = 20  # of the record that is resumed
+
+
+def test_a_swing_begins_with_the_first_image_when_somebody_is_there(
+    present: "Station",
+) -> None:
+    assert present.status.state is None
+    present.see()
+    assert present.status.is_capturing
+    assert present.status.names == present.preparation.names
+
+    present.see()
+    assert present.state.phase is Phase.SEEN
+
+
+def test_no_swing_begins_while_something_lacks(station: "Station") -> None:
+    prepared = station.preparation
+    lacking = replace(prepared, image_size=None)
+    assert lacking.lacks() == (Lack.IMAGES,)
+    station.runner.come()
+    station.see()
+    assert station.status.state is None
+    station.runner.choose(lacking)
+    station.see()
+    assert station.status.state is None
+
+    station.runner.choose(prepared)
+    station.see()
+    assert station.status.is_capturing
+
+
+def test_no_swing_begins_while_nobody_is_there(station: "Station") -> None:
+    station.runner.choose(station.preparation)
+    station.see()
+    assert station.status.state is None
+    station.runner.come()
+    station.runner.leave()
+    station.see()
+    assert station.status.state is None
+    assert not station.records.exists()
+
+
+def test_a_record_that_cannot_be_made_is_told_once_and_tried_again_when_asked_for(
+    present: "Station",
+) -> None:
+    present.records.write_text("not a folder")
+    present.see(3)
+    (sentence,) = present.witness.troubles
+    assert "cannot be written" in sentence
+    assert str(present.status.refusal) == sentence
+    assert present.status.state is None
+
+    present.records.unlink()
+    present.see()
+    assert present.status.state is None
+    present.runner.try_again()
+    present.see()
+
+    assert present.status.is_capturing
+    assert present.status.refusal is None
+    assert present.witness.reliefs == [sentence]
+
+
+def test_whoever_comes_again_tries_again(present: "Station") -> None:
+    present.records.write_text("not a folder")
+    present.see()
+    present.records.unlink()
+    present.runner.leave()
+    present.runner.come()
+    present.see()
+
+    assert present.status.is_capturing
+    assert present.status.refusal is None
+
+
+def test_leaving_pauses_and_coming_back_goes_on(
+    present: "Station", interrupted: Path
+) -> None:
+    present.go_on(interrupted)
+    present.keep(1)
+    present.runner.leave()
+    present.wait_until(lambda: present.status.is_paused_by_user)
+    n_images = present.n_recorded
+    present.see(30)
+    assert present.n_recorded == n_images
+
+    present.runner.come()
+    present.keep(1)
+
+
+def test_a_swing_that_its_user_paused_stays_paused_when_he_comes_back(
+    present: "Station",
+) -> None:
+    present.see()
+    present.runner.pause()
+    present.runner.leave()
+    present.runner.come()
+    present.see()
+    assert present.status.is_paused_by_user
+
+    present.runner.resume()
+    present.see()
+    assert not present.status.is_paused_by_user
+
+
+def test_a_swing_that_is_paused_while_nobody_is_there_stays_paused(
+    present: "Station",
+) -> None:
+    present.see()
+    present.runner.leave()
+    present.runner.pause()
+    present.runner.come()
+    present.see()
+
+    assert present.status.is_paused_by_user
+
+
+def test_a_trouble_while_nobody_is_there_is_not_over_when_somebody_comes(
+    present: "Station", interrupted: Path
+) -> None:
+    present.go_on(interrupted)
+    present.runner.leave()
+    present.runner.resume()  # by somebody who is elsewhere
+    (interrupted / IMAGES).rename(interrupted / "elsewhere")
+    present.see_until(lambda: present.status.is_troubled)
+    present.runner.come()
+    present.see()
+
+    assert present.status.is_troubled
+    assert present.status.is_paused_by_user
+
+
+def test_a_swing_that_begins_while_everybody_is_away_waits(
+    present: "Station", interrupted: Path
+) -> None:
+    present.runner.leave()
+    present.go_on(interrupted)
+    present.wait_until(lambda: present.status.is_paused_by_user)
+    present.see(2)
+    assert present.status.is_paused_by_user
+
+    present.runner.come()
+    present.see()
+    assert not present.status.is_paused_by_user
+
+
+def test_more_that_is_captured_while_everybody_is_away_waits(
+    solved: "Station",
+) -> None:
+    solved.runner.leave()
+    solved.runner.capture_more()
+    solved.wait_until(lambda: solved.status.is_paused_by_user)
+    solved.runner.come()
+    solved.see()
+
+    assert solved.status.is_capturing
+    assert not solved.status.is_paused_by_user
+
+
+def test_a_swing_that_is_led_by_commands_waits_for_nobody(
+    station: "Station", interrupted: Path
+) -> None:
+    station.go_on(interrupted)
+    station.keep(1)
+
+    assert not station.status.is_paused_by_user
+
+
+def other_operator(prepared: Preparation) -> Preparation:
+    return replace(prepared, names=replace(prepared.names, operator="Bob"))
+
+
+def test_other_choices_do_not_change_a_swing_that_is_under_way(
+    present: "Station",
+) -> None:
+    present.see()
+    setup = present.status.setup
+    assert not present.status.has_other_choices
+    present.runner.choose(other_operator(present.preparation))
+    present.see()
+
+    assert present.status.has_other_choices
+    assert present.status.setup is setup
+    assert present.status.names.operator == "Ann"
+
+
+def test_other_choices_are_settled_when_they_are_kept_or_taken_back(
+    present: "Station",
+) -> None:
+    present.see()
+    present.runner.choose(other_operator(present.preparation))
+    present.runner.choose(present.preparation)
+    present.see()
+    assert not present.status.has_other_choices
+
+    present.runner.choose(other_operator(present.preparation))
+    present.runner.keep_choices()
+    present.see()
+    assert not present.status.has_other_choices
+    assert present.status.names.operator == "Ann"
+
+
+def test_other_choices_are_not_settled_by_capturing_more(
+    solved: "Station", interrupted: Path
+) -> None:
+    solved.runner.choose(solved.preparation)
+    solved.runner.abandon()
+    solved.go_on(interrupted)
+    solved.runner.choose(other_operator(solved.preparation))
+    solved.solve()
+    assert not solved.status.has_other_choices  # nothing more is captured with it
+    solved.runner.capture_more()
+    solved.wait_until(lambda: solved.status.is_capturing)
+
+    assert solved.status.has_other_choices
+
+
+def test_a_swing_that_starts_over_begins_with_what_is_chosen_now(
+    present: "Station",
+) -> None:
+    present.see()
+    before = present.record_folder
+    present.runner.choose(other_operator(present.preparation))
+    present.runner.start_over()
+    present.see()
+
+    assert present.record_folder != before
+    assert present.status.names.operator == "Bob"
+    assert not present.status.has_other_choices
+
+
+def test_starting_over_keeps_the_images_of_the_old_swing(
+    present: "Station", interrupted: Path
+) -> None:
+    present.go_on(interrupted)
+    present.runner.start_over()
+    present.see()
+
+    assert present.status.is_capturing
+    assert present.record_folder != interrupted
+    assert open_record(interrupted).verdict == DISCARDED
+    assert len(open_record(interrupted).images) == N_IMAGES
+    assert present.interrupted() == []
+
+
+def test_a_swing_that_cannot_be_set_aside_goes_on_instead_of_starting_over(
+    solved: "Station",
+) -> None:
+    journal = solved.record_folder / JOURNAL
+    journal.rename(journal.with_name("elsewhere"))
+    status = solved.status
+    for act in (solved.runner.start_over, solved.runner.set_aside):
+        act()
+        solved.see()
+        assert solved.status.record_folder == status.record_folder
+        assert solved.status.solution is status.solution
+    assert len(solved.witness.troubles) == 2
+
+
+def test_starting_over_a_swing_whose_tip_is_in_force_leaves_its_verdict(
+    in_force: "Station",
+) -> None:
+    folder, grade = in_force.record_folder, in_force.status.result
+    assert grade is not None
+    journal = (folder / JOURNAL).read_bytes()
+    in_force.runner.start_over()
+    in_force.wait_until(lambda: in_force.status.state is None)
+
+    assert (folder / JOURNAL).read_bytes() == journal
+    assert open_record(folder).verdict == grade.grade
+
+
+def test_an_accepted_swing_is_left_and_the_next_begins_when_somebody_comes_again(
+    in_force: "Station",
+) -> None:
+    folder = in_force.record_folder
+    journal = (folder / JOURNAL).read_bytes()
+    in_force.runner.choose(in_force.preparation)
+    in_force.runner.leave()
+    in_force.see()
+    assert in_force.record_folder == folder
+    in_force.runner.come()
+    in_force.see()
+
+    assert in_force.status.is_capturing
+    assert in_force.status.result is None
+    assert in_force.record_folder != folder
+    assert (folder / JOURNAL).read_bytes() == journal
+
+
+def test_another_source_leaves_the_swing_to_be_resumed(
+    present: "Station", interrupted: Path
+) -> None:
+    present.go_on(interrupted)
+    source = SourceChoice(SourceKind.RECORDED, str(interrupted))
+    present.runner.choose(replace(present.preparation, source=source, image_size=None))
+    present.see()
+
+    assert present.status.state is None
+    assert present.interrupted() == [interrupted]
+
+
+def test_another_source_leaves_a_swing_that_is_solved_to_be_accepted(
+    solved: "Station",
+) -> None:
+    solved.runner.choose(solved.preparation)
+    source = SourceChoice(SourceKind.RECORDED, str(solved.folder))
+    solved.runner.choose(replace(solved.preparation, source=source))
+    solved.see()
+
+    assert solved.status.solution is not None

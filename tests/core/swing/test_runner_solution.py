@@ -1,0 +1,399 @@
+"""From the end of the capture to the tip in force."""
+
+import json
+import shutil
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lightpen.estimation.report import calibration_json
+from lightpen.estimation.verdict import Grade
+from lightpen.messages import Code
+from lightpen.record.reading import DISCARDED, JOURNAL, open_record
+from lightpen.record.solving import record_inputs
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.rules import stillness
+from lightpen.swing.runner import SwingRunner
+from lightpen.swing.state import Happening, Phase
+from lightpen.swing.status import Activity
+
+if TYPE_CHECKING:
+    from tests.core.conftest import Station
+
+TIMEOUT = 60.0  # s until a test gives up
+N_IMAGES = 20  # of the record that is resumed
+Command = Callable[[Path], dict[str, Any]]
+
+
+# The solution
+
+
+def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
+    solved: "Station", command: Command
+) -> None:
+    solution = solved.solution
+    inputs = record_inputs(solution.source)
+    fields = json.loads(calibration_json(solution.calibration, inputs, "joint"))
+    fields.pop("created")
+
+    assert fields == command(solved.record_folder)
+
+
+def test_so_it_is_after_taking_images_out_and_putting_some_back(
+    solved: "Station", command: Command
+) -> None:
+    before = solved.tip
+    solved.runner.take_out([2, 5, 9])
+    solved.wait_until_solved()
+    without = solved.tip
+    solved.runner.put_back([5])
+    solved.wait_until_solved()
+    assert len({tuple(tip) for tip in (before, without, solved.tip)}) == 3
+    assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
+    assert set(open_record(solved.record_folder).taken_out) == {2, 9}
+
+    solved.runner.put_back([2, 9])
+    solved.wait_until_solved()
+    assert solved.tip == before == command(solved.record_folder)["tip_pen_mm"]
+
+
+def test_how_far_the_tip_is_computed_is_told_from_0_to_1(solved: "Station") -> None:
+    fractions = solved.witness.fractions
+
+    assert fractions == sorted(fractions)
+    assert len(fractions) >= N_IMAGES
+    assert (fractions[0] < 0.1, fractions[-1]) == (True, 1.0)
+
+
+def test_images_taken_out_in_quick_succession_all_count(
+    solved: "Station", command: Command
+) -> None:
+    for number in range(1, 8):
+        solved.runner.take_out([number])
+    solved.runner.put_back([4])
+    solved.wait_until_solved()
+
+    assert set(solved.solution.taken_out) == {1, 2, 3, 5, 6, 7}
+    assert set(open_record(solved.record_folder).taken_out) == {1, 2, 3, 5, 6, 7}
+    assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
+    happenings = solved.witness.happenings
+    assert happenings[-1] in (Happening.DONE, Happening.FAILED)
+    assert happenings.count(happenings[-1]) == 1  # the verdict is told once
+
+
+def test_too_few_images_left_keep_the_solution_and_the_record(
+    solved: "Station",
+) -> None:
+    solved.runner.take_out([1])
+    solved.wait_until_solved()
+    before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
+    solved.runner.take_out(range(1, N_IMAGES))
+    solved.wait_until_solved()
+
+    assert solved.solution is before
+    assert (solved.record_folder / JOURNAL).read_bytes() == journal
+    (sentence,) = solved.witness.troubles
+    assert "images are usable" in sentence
+    assert "Without these images there is no tip, so they stay in." in sentence
+    assert solved.witness.reliefs == []
+    solved.runner.take_out([2])  # what failed is not asked for again
+    solved.wait_until_solved()
+    assert set(solved.solution.taken_out) == {1, 2}
+    assert solved.witness.reliefs == solved.witness.troubles
+
+
+def test_what_is_wished_for_while_a_wish_fails_is_fulfilled(solved: "Station") -> None:
+    solved.runner.take_out(range(1, N_IMAGES))
+    solved.runner.put_back(range(4, N_IMAGES))
+    solved.wait_until_solved()
+
+    assert set(solved.solution.taken_out) == {1, 2, 3}
+    assert solved.witness.troubles == []
+
+
+def test_a_record_that_cannot_be_written_keeps_the_solution(solved: "Station") -> None:
+    before = solved.solution
+    journal = solved.record_folder / JOURNAL
+    journal.rename(journal.with_name("elsewhere"))
+    solved.runner.take_out([3])
+    solved.wait_until_solved()
+    journal.with_name("elsewhere").rename(journal)
+
+    assert solved.solution is before
+    (sentence,) = solved.witness.troubles
+    assert "does not exist" in sentence
+    assert "stay in" not in sentence
+    assert solved.witness.reliefs == []
+    solved.runner.take_out([3])
+    solved.wait_until_solved()
+    assert solved.witness.reliefs == [sentence]
+
+
+def test_solving_can_be_cancelled_and_done_again(
+    station: "Station", interrupted: Path
+) -> None:
+    station.go_on(interrupted)
+    station.runner.finish()
+    station.runner.cancel()
+    station.see()
+    assert Activity.SOLVING in [s.activity for s in station.witness.statuses]
+    assert not station.status.is_solving
+    assert station.state.phase is Phase.SOLVING
+    assert station.status.solution is None
+
+    station.runner.solve()
+    station.wait_for_phase(Phase.VERDICT)
+    assert station.status.solution is not None
+
+
+def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
+    solved: "Station",
+) -> None:
+    before, journal = solved.solution, (solved.record_folder / JOURNAL).read_bytes()
+    solved.runner.take_out([3])
+    solved.runner.cancel()
+    solved.see()
+    assert not solved.status.is_solving
+    solved.runner.take_out([7])
+    solved.wait_until_solved()
+
+    assert before.taken_out == {}
+    assert set(solved.solution.taken_out) == {7}
+    assert journal in (solved.record_folder / JOURNAL).read_bytes()
+    assert set(open_record(solved.record_folder).taken_out) == {7}
+
+
+# After the verdict
+
+
+def test_holding_the_pen_upright_and_still_after_the_verdict_is_told_once(
+    solved: "Station",
+) -> None:
+    solved.operator.lean(0.4, 0.0, 0.0)
+    solved.see(35)
+    assert Happening.CONFIRMED not in solved.witness.happenings
+
+    solved.operator.lean(0.0, 0.0, 0.0)
+    solved.see_until(lambda: Happening.CONFIRMED in solved.witness.happenings)
+    assert stillness(solved.state) == 1.0
+    solved.see(10)
+    assert solved.witness.happenings.count(Happening.CONFIRMED) == 1
+    assert solved.state.phase is Phase.VERDICT
+
+
+def test_more_images_can_be_captured_after_the_verdict(
+    solved: "Station", command: Command
+) -> None:
+    solved.runner.take_out([3])
+    solved.wait_until_solved()
+    solved.runner.capture_more()
+    solved.wait_until(lambda: solved.status.is_capturing)
+    assert solved.status.solution is None
+    assert not solved.status.is_reading
+    assert solved.state.n_kept == N_IMAGES - 1
+    solved.keep(1)
+    solved.solve()
+
+    assert solved.n_recorded == N_IMAGES + 1
+    assert set(solved.solution.taken_out) == {3}
+    assert solved.tip == command(solved.record_folder)["tip_pen_mm"]
+
+
+def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
+    solved: "Station",
+) -> None:
+    solved.runner.capture_more()
+    solved.wait_until(lambda: solved.status.is_capturing)
+    assert solved.status.setup is not None
+    assert solved.status.setup.limits.min_images > N_IMAGES + 1
+    solved.keep(1)
+    solved.solve()
+
+    assert solved.status.verdict is not None
+    assert solved.status.verdict.reason.code is not Code.TOO_FEW_IMAGES
+
+
+def test_more_images_can_be_captured_while_a_wish_is_computed(
+    solved: "Station",
+) -> None:
+    solved.runner.take_out([3])
+    solved.runner.capture_more()
+    solved.wait_until(lambda: solved.status.is_capturing)
+    solved.keep(1)
+
+    assert open_record(solved.record_folder).taken_out == {}
+    assert solved.status.solution is None
+
+
+def test_images_that_cannot_be_read_again_leave_the_solution_and_no_wish(
+    solved: "Station",
+) -> None:
+    before = solved.solution
+    journal = solved.record_folder / JOURNAL
+    journal.rename(journal.with_name("elsewhere"))
+    solved.runner.take_out([3])
+    solved.runner.capture_more()
+    solved.runner.take_out([4])  # while they are read nothing is taken out
+    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+    solved.wait_until(lambda: solved.status.activity is Activity.NONE)
+    journal.with_name("elsewhere").rename(journal)
+    assert solved.solution is before
+    assert not solved.status.is_capturing
+
+    solved.runner.take_out([7])
+    solved.wait_until_solved()
+    assert set(solved.solution.taken_out) == {7}
+
+
+def test_a_solved_swing_is_set_aside_with_its_images(solved: "Station") -> None:
+    folder = solved.record_folder
+    solved.runner.set_aside()
+    solved.wait_until(lambda: solved.status.state is None)
+
+    assert open_record(folder).verdict == DISCARDED
+    assert len(open_record(folder).images) == N_IMAGES
+    assert solved.interrupted() == []
+
+
+def test_a_swing_that_is_captured_is_set_aside_for_good(
+    station: "Station", interrupted: Path
+) -> None:
+    station.go_on(interrupted)
+    station.keep(1)
+    station.runner.set_aside()
+    station.wait_until(lambda: station.status.state is None)
+    assert open_record(interrupted).verdict == DISCARDED
+    station.begin()
+    station.see()
+
+    assert open_record(interrupted).verdict == DISCARDED
+    assert len(open_record(interrupted).images) == N_IMAGES + 1
+
+
+# Accepting, or not
+
+
+def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
+    in_force: "Station", swung: Callable[..., Path]
+) -> None:
+    first = in_force.status.result
+    assert first is not None
+    other = in_force.records / "other"
+    shutil.copytree(swung(), other)
+    in_force.limit_uncertainty(other, 1.0)
+    in_force.go_on(other)
+    in_force.solve()
+    assert in_force.status.result is None
+    before = in_force.in_force()
+    assert before is not None
+    assert before.accepted == first.accepted
+
+    in_force.runner.accept()
+    in_force.wait_until(lambda: in_force.status.result is not None)
+    after, second = in_force.in_force(), in_force.status.result
+    assert after is not None
+    assert second is not None
+    assert after.accepted == second.accepted > first.accepted
+    assert after.tip_pen.tolist() == in_force.tip
+
+
+def test_an_accepted_swing_is_concluded_and_no_longer_offered(
+    solved: "Station",
+) -> None:
+    assert solved.interrupted() == [solved.record_folder]
+    solved.runner.accept()
+    solved.wait_until(lambda: solved.status.result is not None)
+    result = solved.status.result
+    assert result is not None
+
+    assert open_record(solved.record_folder).verdict == result.grade
+    assert Path(result.record) == solved.record_folder
+    assert result.names == solved.status.names
+    assert solved.interrupted() == []
+
+
+def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
+    solved.runner.accept()
+    solved.runner.accept()
+    solved.see()
+
+    assert solved.status.result is not None
+    assert len(list(solved.results.iterdir())) == 1
+
+
+def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
+    solved.runner.take_out([3])
+    solved.runner.accept()
+    solved.wait_until_solved()
+
+    assert solved.status.result is None
+    assert solved.in_force() is None
+
+
+def test_a_tip_that_is_to_be_repeated_is_not_accepted(
+    station: "Station", interrupted: Path
+) -> None:
+    station.limit_uncertainty(interrupted, 1e-6)
+    station.go_on(interrupted)
+    station.solve()
+    assert station.status.verdict is not None
+    assert station.status.verdict.grade is Grade.REPEAT
+    assert station.witness.happenings[-1] is Happening.FAILED
+
+    station.runner.accept()
+    station.see()
+    assert station.status.result is None
+    assert station.in_force() is None
+    assert open_record(interrupted).verdict is None
+
+
+def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None:
+    solution, result = in_force.solution, in_force.status.result
+    journal = (in_force.record_folder / JOURNAL).read_bytes()
+    runner = in_force.runner
+    runner.take_out([1])
+    for act in (runner.solve, runner.capture_more, runner.set_aside, runner.accept):
+        act()
+    in_force.see()
+
+    assert in_force.status.activity is Activity.NONE
+    assert in_force.solution is solution
+    assert in_force.status.result is result
+    assert (in_force.record_folder / JOURNAL).read_bytes() == journal
+    assert len(list(in_force.results.iterdir())) == 1
+
+
+def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> None:
+    solved.results.write_text("not a folder")
+    solved.runner.accept()
+    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+    assert solved.status.result is None
+    assert solved.status.activity is Activity.NONE
+    assert open_record(solved.record_folder).verdict is None
+
+    solved.results.unlink()
+    solved.runner.accept()
+    solved.wait_until(lambda: solved.status.result is not None)
+    solved.see()
+    assert solved.witness.reliefs == solved.witness.troubles
+
+
+def test_a_result_bears_the_time_that_the_runner_goes_by(
+    station: "Station", interrupted: Path
+) -> None:
+    noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
+    runner = SwingRunner(
+        station.records, station.results, station.witness, now=lambda: noon
+    )
+    station.limit_uncertainty(interrupted, 1.0)
+    runner.go_on(read_resumable(interrupted))
+    runner.finish()
+    station.witness.wait_until(lambda: runner.status.verdict is not None)
+    runner.accept()
+    runner.shut_down()
+    assert runner.await_end(TIMEOUT)
+    result = station.in_force()
+
+    assert result is not None
+    assert result.accepted == noon
