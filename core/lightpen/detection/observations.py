@@ -213,8 +213,8 @@ def _detect(
         image = load()
     except FileError as error:
         return _Sighting(NO_SPOTS, Reason.UNREADABLE, str(error))
-    height, width = image.shape
-    if (width, height) != (camera.width, camera.height):
+    if not camera.fits(image):
+        height, width = image.shape
         return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, f"{width} x {height} px")
     spots = detect_spots(image, mask)
     if len(spots) == 0:
@@ -246,7 +246,7 @@ def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
 def _require_inside(pixels: FloatArray, camera: Camera) -> None:
     points = pixels[np.isfinite(pixels[..., 0])]
     far = points.max(axis=0, initial=0)
-    outside = np.any((points < -0.5) | (points > [camera.width, camera.height]), axis=1)
+    outside = np.any((points < -0.5) | (points > camera.image_size), axis=1)
     if 2 * outside.sum() > len(points):
         raise FileError(
             f"The LED centres reach to ({far[0]:.0f}, {far[1]:.0f}) px, the camera "

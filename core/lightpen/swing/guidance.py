@@ -124,7 +124,7 @@ def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
     cosines /= np.linalg.norm(leds, axis=2)
     pixels = camera.project(leds)
     radii = max(camera.fx, camera.fy) * pen.diameter / 2 / leds[..., 2]
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.image_size)
     room = np.minimum(pixels + 0.5, size - 0.5 - pixels).min(axis=2)
     apart = np.linalg.norm(pixels[:, :, None] - pixels[:, None], axis=3)
     apart -= radii[:, :, None] + radii[:, None]

@@ -7,7 +7,7 @@ from PySide6.QtCore import QObject, Signal
 
 from lightpen.live.looking import LiveImage
 from lightpen.swing.rules import advance, stillness
-from lightpen.swing.state import Phase, SwingSetup, SwingState
+from lightpen.swing.state import Phase, SwingState
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.swing_run import SwingRun
 
@@ -53,7 +53,7 @@ class SwingSight(QObject):
         seen, setup = self._seen, self._run.setup
         if seen is None or setup is None:
             return ""
-        if not _is_of_size(seen, setup):
+        if not setup.camera.fits(seen.frame.image):
             return self.tr("The images are not of the size that this swing needs.")
         n_leds = 0 if seen.sighting is None else seen.sighting.n_leds
         text = self.tr("{0} of {1} LEDs, {2} images/s")
@@ -80,7 +80,3 @@ class SwingSight(QObject):
             self._watched = advance(setup, before, seen.sighting, time).state
             if self.stillness() == 1.0 and not was_still:
                 self.continued.emit()
-
-
-def _is_of_size(seen: LiveImage, setup: SwingSetup) -> bool:
-    return seen.frame.image.shape == (setup.camera.height, setup.camera.width)
