@@ -29,7 +29,7 @@ from lightpen.detection.pose import (
     fit_poses,
     robust_sigma,
 )
-from lightpen.detection.spots import Flaw, Spots
+from lightpen.detection.spots import Spots
 from lightpen.estimation.calibrate import USUAL_SIGMA
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -121,8 +121,7 @@ def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
     It takes the place of a view that is alike, and of the oldest if there are too many;
     smeared images and those with too few spots are passed over.
     """
-    is_smeared = 2 * np.count_nonzero(spots.flaws & Flaw.BLURRED) > len(spots)
-    if len(spots) < MIN_LEDS or is_smeared:
+    if len(spots) < MIN_LEDS or spots.are_blurred:
         return views
     others = [view for view in views if _differ(view, spots)]
     return (*others, spots)[-MAX_VIEWS:]
