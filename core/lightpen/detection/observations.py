@@ -12,7 +12,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import label_images
-from lightpen.detection.pose import MIN_LEDS, start_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import (
     Sighting,
@@ -167,7 +167,7 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     """
     pixels = centers.pixels
     _require_inside(pixels, camera)
-    enough = np.isfinite(pixels[..., 0]).sum(axis=1) >= MIN_LEDS
+    enough = np.isfinite(pixels[..., 0]).sum(axis=1) >= MIN_POSE_LEDS
     rotations = np.full((len(pixels), 3, 3), np.nan)
     translations = np.full((len(pixels), 3), np.nan)
     rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])

@@ -18,7 +18,7 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
-from lightpen.detection.pose import MIN_LEDS, fit_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.model.camera import Camera
@@ -177,7 +177,7 @@ def sighting_of_centers(
     n_seen = _n_seen(pixels)
     if n_seen == 0:
         reason = Reason.EMPTY
-    elif n_seen < MIN_LEDS:
+    elif n_seen < MIN_POSE_LEDS:
         reason = Reason.TOO_FEW_LEDS
     elif np.isnan(translation).any():
         reason = Reason.MISFIT
@@ -216,7 +216,7 @@ def _sighting_of(spots: Spots, labels: Labels, seen: FloatArray) -> Sighting:
     pixels = np.where(labels.whole[:, None], seen, np.nan)
     sighting = partial(Sighting, pixels, seen, spots=spots, labels=labels)
     is_labelled = labels.reason is LabelStatus.LABELLED
-    if is_labelled and _n_seen(pixels) >= MIN_LEDS:
+    if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
         return sighting(Reason.NONE, labels.R, labels.t)
     return sighting(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
 

@@ -25,13 +25,13 @@ from lightpen.detection.disc_moments import (
     bounding_box,
     measure_disc,
 )
+from lightpen.detection.pose import MIN_POSE_LEDS
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
 MAX_REGIONS = 256  # looked at in one image
 MAX_CONTOURS = 4000
 
-MIN_SPOTS = 4  # fewer give no pose, so a closer look is worth its time
 NOISE_SAMPLES = 48  # per side of the image
 NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
 NOISE_OF_DIFFERENCE = 1.99  # that quantile for normal noise, in standard deviations
@@ -155,11 +155,12 @@ def detect_spots(
     budget = iter(range(MAX_REGIONS))
     scene = _survey(image, mask, stride)
     discs = _find_discs(scene, budget)
-    if len(discs) < MIN_SPOTS and stride > 1:
+    # Too few for a pose are worth a closer look.
+    if len(discs) < MIN_POSE_LEDS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
     has_smears = False
-    if len(discs) < MIN_SPOTS or next(budget, None) is None:
+    if len(discs) < MIN_POSE_LEDS or next(budget, None) is None:
         flat = _survey(_flattened(image), mask, stride)
         flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
         if len(flat_discs) > len(discs):

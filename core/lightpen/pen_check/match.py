@@ -23,7 +23,7 @@ from lightpen.detection.labelling.labels import (
     label_images,
 )
 from lightpen.detection.pose import (
-    MIN_LEDS,
+    MIN_POSE_LEDS,
     Poses,
     disc_residuals,
     fit_poses,
@@ -121,7 +121,7 @@ def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
     It takes the place of a view that is alike, and of the oldest if there are too many;
     smeared images and those with too few spots are passed over.
     """
-    if len(spots) < MIN_LEDS or spots.are_blurred:
+    if len(spots) < MIN_POSE_LEDS or spots.are_blurred:
         return views
     others = [view for view in views if _differ(view, spots)]
     return (*others, spots)[-MAX_VIEWS:]
@@ -141,7 +141,7 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
     found = [
         i
         for i, each in enumerate(labels)
-        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_LEDS
+        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_POSE_LEDS
     ]
     if not found or 2 * len(found) < len(views):
         sentence = diagnose(views, camera, pen) if views else ""
