@@ -11,15 +11,20 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
-from lightpen.detection.labelling.labels import Labels, LabelStatus, label_images
-from lightpen.detection.pose import MIN_LEDS, start_poses
+from lightpen.detection.labelling.labels import label_images
+from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.spots import Flaw, Spots, detect_spots, shows_smears
+from lightpen.detection.sighting import (
+    Sighting,
+    sighting_of_centers,
+    sightings_of,
+    unseen,
+)
+from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource, keep_freed_memory
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
-from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
 from lightpen.sentences import Sentence, sentence
 
@@ -36,9 +41,6 @@ NO_SPOTS = Spots(
 )
 
 Report = Callable[[float], None]
-
-
-UNSEEN = (Reason.UNREADABLE, Reason.WRONG_SIZE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +80,11 @@ class Observations:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sighting:
-    """The spots of one image, or why it cannot have any."""
+class _Searched:
+    """The spots of one image, or why it was not searched."""
 
     spots: Spots
-    reason: Reason
+    reason: Reason = Reason.NONE
     detail: Sentence | None = None
 
 
@@ -123,18 +125,27 @@ def observe_images(
         The images are of the mirror image of the pen.
     """
     keep_freed_memory()
-    sightings: list[_Sighting] = []
-    labels: list[Labels] = []
+    searched: list[_Searched] = []
+    sightings: list[Sighting] = []
     n_images = len(source.names)
-    detect = partial(_detect, camera=camera, mask=mask)
-    for sighting in _in_threads(source, detect, n_threads or os.cpu_count() or 1):
-        sightings.append(sighting)
-        if len(sightings) - len(labels) == LABELLED_AT_ONCE:
-            labels += _label(sightings[len(labels) :], camera, pen)
-        report(len(sightings) / n_images)
-    labels += _label(sightings[len(labels) :], camera, pen)
-    _require_size(sightings, camera)
-    return _assemble(source.names, sightings, labels, camera, pen)
+    search = partial(_search, camera=camera, mask=mask)
+    for image in _in_threads(source, search, n_threads or os.cpu_count() or 1):
+        searched.append(image)
+        n_left = len(searched) - len(sightings)
+        if n_left == LABELLED_AT_ONCE or len(searched) == n_images:
+            sightings += _sighted(searched[-n_left:], camera, pen)
+        report(len(searched) / n_images)
+    _require_size(searched, camera)
+    seen = _observations(source.names, sightings)
+    spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
+    mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_images
+    if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
+        _require_right_hand(spots, camera, pen)
+    return replace(
+        seen,
+        details=tuple(image.detail for image in searched),
+        advice=None if mostly_labelled else _advice(seen.reasons, spots, camera, pen),
+    )
 
 
 def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
@@ -157,24 +168,13 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     """
     pixels = centers.pixels
     _require_inside(pixels, camera)
-    n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
-    enough = n_seen >= MIN_LEDS
+    enough = np.isfinite(pixels[..., 0]).sum(axis=1) >= MIN_POSE_LEDS
     rotations = np.full((len(pixels), 3, 3), np.nan)
     translations = np.full((len(pixels), 3), np.nan)
     rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])
-    reasons = np.full(len(pixels), Reason.NONE, dtype=object)
-    reasons[np.isnan(translations[:, 0])] = Reason.MISFIT
-    reasons[~enough] = Reason.TOO_FEW_LEDS
-    return Observations(
-        names=tuple(f"frame {frame}" for frame in centers.frames),
-        pixels=pixels,
-        seen_pixels=pixels,
-        rotations=rotations,
-        translations=translations,
-        edge_widths=np.full(len(pixels), np.nan),
-        reasons=tuple(reasons.tolist()),
-        details=(None,) * len(pixels),
-    )
+    names = tuple(f"frame {frame}" for frame in centers.frames)
+    images = zip(pixels, rotations, translations, strict=True)
+    return _observations(names, [sighting_of_centers(*image) for image in images])
 
 
 def leave_out(
@@ -193,57 +193,72 @@ def leave_out(
 
 def _in_threads(
     source: ImageSource,
-    detect: Callable[[Callable[[], Image]], _Sighting],
+    search: Callable[[Callable[[], Image]], _Searched],
     n_threads: int,
-) -> Iterator[_Sighting]:
-    """Detect the spots of all images, in order, with a bounded number in memory."""
+) -> Iterator[_Searched]:
+    """Search all images, in order, with a bounded number in memory."""
     with ThreadPoolExecutor(n_threads) as executor:
-        waiting: deque[Future[_Sighting]] = deque()
+        waiting: deque[Future[_Searched]] = deque()
         for load in source.open():
-            waiting.append(executor.submit(detect, load))
+            waiting.append(executor.submit(search, load))
             if len(waiting) >= IN_FLIGHT * n_threads:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
 
 
-def _detect(
+def _search(
     load: Callable[[], Image], camera: Camera, mask: FloatArray | None
-) -> _Sighting:
+) -> _Searched:
     try:
         image = load()
     except FileError as error:
-        return _Sighting(NO_SPOTS, Reason.UNREADABLE, error.sentence)
-    height, width = image.shape
-    if (width, height) != (camera.width, camera.height):
+        return _Searched(NO_SPOTS, Reason.UNREADABLE, error.sentence)
+    if not camera.fits(image):
+        height, width = image.shape
         size = sentence(
             "image.size", "{width} x {height} px", width=width, height=height
         )
-        return _Sighting(NO_SPOTS, Reason.WRONG_SIZE, size)
-    spots = detect_spots(image, mask)
-    if len(spots) == 0:
-        return _Sighting(spots, Reason.BLURRED if shows_smears(image) else Reason.EMPTY)
-    return _Sighting(spots, Reason.NONE)
+        return _Searched(NO_SPOTS, Reason.WRONG_SIZE, size)
+    return _Searched(detect_spots(image, mask))
 
 
-def _label(sightings: list[_Sighting], camera: Camera, pen: Pen) -> list[Labels]:
-    return label_images([s.spots for s in sightings], camera, pen)
+def _sighted(searched: list[_Searched], camera: Camera, pen: Pen) -> list[Sighting]:
+    spots = [image.spots for image in searched]
+    sightings = sightings_of(spots, label_images(spots, camera, pen), camera)
+    return [
+        unseen(pen, image.reason) if image.reason else sighting
+        for image, sighting in zip(searched, sightings, strict=True)
+    ]
 
 
-def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
-    if all(s.reason is Reason.UNREADABLE for s in sightings):
-        why = sightings[0].detail
+def _observations(names: tuple[str, ...], sightings: list[Sighting]) -> Observations:
+    return Observations(
+        names=names,
+        pixels=np.array([sighting.pixels for sighting in sightings]),
+        seen_pixels=np.array([sighting.seen_pixels for sighting in sightings]),
+        rotations=np.array([sighting.rotation for sighting in sightings]),
+        translations=np.array([sighting.translation for sighting in sightings]),
+        edge_widths=np.array([sighting.edge_width for sighting in sightings]),
+        reasons=tuple(sighting.reason for sighting in sightings),
+        details=(None,) * len(sightings),
+    )
+
+
+def _require_size(searched: list[_Searched], camera: Camera) -> None:
+    if all(image.reason is Reason.UNREADABLE for image in searched):
+        why = searched[0].detail
         assert why is not None
         raise FileError(
             sentence(
                 "images.none-readable",
                 "None of the {n_images} images can be read. {why}",
-                n_images=len(sightings),
+                n_images=len(searched),
                 why=why,
             )
         )
-    wrong = [s.detail for s in sightings if s.reason is Reason.WRONG_SIZE and s.detail]
-    n_readable = sum(s.reason is not Reason.UNREADABLE for s in sightings)
+    wrong = [i.detail for i in searched if i.reason is Reason.WRONG_SIZE and i.detail]
+    n_readable = sum(image.reason is not Reason.UNREADABLE for image in searched)
     if 2 * len(wrong) > n_readable:
         raise FileError(
             sentence(
@@ -263,7 +278,7 @@ def _require_size(sightings: list[_Sighting], camera: Camera) -> None:
 def _require_inside(pixels: FloatArray, camera: Camera) -> None:
     points = pixels[np.isfinite(pixels[..., 0])]
     far = points.max(axis=0, initial=0)
-    outside = np.any((points < -0.5) | (points > [camera.width, camera.height]), axis=1)
+    outside = np.any((points < -0.5) | (points > camera.image_size), axis=1)
     if 2 * outside.sum() > len(points):
         raise FileError(
             sentence(
@@ -277,44 +292,6 @@ def _require_inside(pixels: FloatArray, camera: Camera) -> None:
                 height=camera.height,
             )
         )
-
-
-def _assemble(
-    names: tuple[str, ...],
-    sightings: list[_Sighting],
-    labels: list[Labels],
-    camera: Camera,
-    pen: Pen,
-) -> Observations:
-    n_images = len(names)
-    seen = np.full((n_images, pen.n_leds, 2), np.nan)
-    shapes = np.full((n_images, pen.n_leds, 2, 2), np.nan)
-    whole = np.zeros((n_images, pen.n_leds), dtype=bool)
-    edge_widths = np.full(n_images, np.nan)
-    for i, (sighting, label) in enumerate(zip(sightings, labels, strict=True)):
-        labelled = label.spot >= 0
-        if labelled.any():
-            seen[i, labelled] = sighting.spots.centers[label.spot[labelled]]
-            shapes[i, labelled] = sighting.spots.shapes[label.spot[labelled]]
-            whole[i] = label.whole & labelled
-            edge_widths[i] = sighting.spots.edge_widths[label.spot[labelled]].mean()
-    seen = centers_from_centroids(camera, seen, shapes)
-    reasons = tuple(map(_reason, sightings, labels))
-    spots = [s.spots for s in sightings if s.reason not in UNSEEN]
-    mostly_labelled = 2 * reasons.count(Reason.NONE) > n_images
-    if mostly_labelled and not np.isfinite(seen[..., 0]).any(axis=0).all():
-        _require_right_hand(spots, camera, pen)
-    return Observations(
-        names=names,
-        pixels=np.where(whole[..., None], seen, np.nan),
-        seen_pixels=seen,
-        rotations=np.array([label.R for label in labels]).reshape(-1, 3, 3),
-        translations=np.array([label.t for label in labels]).reshape(-1, 3),
-        edge_widths=edge_widths,
-        reasons=reasons,
-        details=tuple(s.detail for s in sightings),
-        advice=None if mostly_labelled else _advice(reasons, spots, camera, pen),
-    )
 
 
 def _advice(
@@ -334,17 +311,3 @@ def _require_right_hand(spots: list[Spots], camera: Camera, pen: Pen) -> None:
     mirrored = diagnose_mirror(spots, camera, pen)
     if mirrored:
         raise CalibrationError(mirrored)
-
-
-def _reason(sighting: _Sighting, label: Labels) -> Reason:
-    if sighting.reason is not Reason.NONE:
-        return sighting.reason
-    if label.reason is LabelStatus.LABELLED:
-        return Reason.NONE
-    if label.reason is LabelStatus.AMBIGUOUS:
-        return Reason.AMBIGUOUS
-    if np.mean((sighting.spots.flaws & Flaw.BLURRED) > 0) > 0.5:
-        return Reason.BLURRED
-    if label.reason is LabelStatus.TOO_FEW:
-        return Reason.TOO_FEW_LEDS
-    return Reason.NOT_THE_PEN

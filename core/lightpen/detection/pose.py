@@ -27,7 +27,7 @@ from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import nearest_rotation, rotation_from_vector
 
-MIN_LEDS = 4  # three leave up to four poses
+MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 STEP_TOLERANCE = 1e-9  # of an angle in rad and of a translation over its length
 ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
@@ -344,8 +344,10 @@ def _own_sigma(residuals: FloatArray, weights: FloatArray, sigma: float) -> Floa
 
 def _require_seen(pixels: FloatArray) -> None:
     n_seen = np.isfinite(pixels[..., 0]).sum(axis=1)
-    if np.any(n_seen < MIN_LEDS):
-        raise ValueError(f"Every image needs {MIN_LEDS} LEDs, one has {n_seen.min()}.")
+    if np.any(n_seen < MIN_POSE_LEDS):
+        raise ValueError(
+            f"Every image needs {MIN_POSE_LEDS} LEDs, one has {n_seen.min()}."
+        )
 
 
 def _descend(

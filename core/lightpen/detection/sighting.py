@@ -1,6 +1,13 @@
-"""What one live image shows of the pen: its LEDs and its pose."""
+"""What an image shows of the pen: its LEDs and its pose, or why it is of no use.
 
-from dataclasses import dataclass
+Live images and files go by one rule, `sightings_of`. Live, `look` asks it image by
+image and fits the pose; on files `lightpen.detection.observations` asks it for many at
+once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,15 +18,15 @@ from lightpen.detection.labelling.labels import (
     label_spots,
     track_spots,
 )
-from lightpen.detection.pose import MIN_LEDS, fit_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.detection.reasons import Reason
-from lightpen.detection.spots import Flaw, Spots, detect_spots
+from lightpen.detection.spots import Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
 
-_REASONS = {
-    LabelStatus.LABELLED: Reason.NONE,
+_REASONS = {  # of sharp spots without a pose
+    LabelStatus.LABELLED: Reason.TOO_FEW_LEDS,  # that are whole
     LabelStatus.NO_SPOTS: Reason.EMPTY,
     LabelStatus.TOO_FEW: Reason.TOO_FEW_LEDS,
     LabelStatus.NO_FIT: Reason.NOT_THE_PEN,
@@ -37,14 +44,16 @@ class Sighting:
         Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     seen_pixels : (L, 2) array
         Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
+    reason : Reason
+        Why there is no pose; `Reason.NONE` where there is one.
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen, mm; NaN without a pose.
     cofactors : (6, 6) array
-        Covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm.
+        Covariance of the pose's (theta, dt) for a noise of 1 px, rad and mm; NaN
+        without a pose or where it is a rough one.
     sigma : float
-        Standard deviation of one image coordinate, by this image alone, px.
-    reason : Reason
-        Why there is no pose; `Reason.NONE` where there is one.
+        Standard deviation of one image coordinate, by this image alone, px; NaN
+        likewise.
     spots : Spots or None
         All that was found in the image.
     labels : Labels or None
@@ -53,11 +62,11 @@ class Sighting:
 
     pixels: FloatArray
     seen_pixels: FloatArray
-    rotation: FloatArray
-    translation: FloatArray
-    cofactors: FloatArray
-    sigma: float
     reason: Reason
+    rotation: FloatArray = field(default_factory=lambda: np.full((3, 3), np.nan))
+    translation: FloatArray = field(default_factory=lambda: np.full(3, np.nan))
+    cofactors: FloatArray = field(default_factory=lambda: np.full((6, 6), np.nan))
+    sigma: float = float("nan")
     spots: Spots | None = None
     labels: Labels | None = None
 
@@ -69,12 +78,21 @@ class Sighting:
     @property
     def n_leds(self) -> int:
         """Number of LEDs fit for use."""
-        return int(np.isfinite(self.pixels[:, 0]).sum())
+        return _n_seen(self.pixels)
 
     @property
     def is_blurred(self) -> bool:
         """Whether most of the spots are smeared, as a fast hand smears them."""
-        return self.spots is not None and _is_blurred(self.spots)
+        return self.spots is not None and self.spots.are_blurred
+
+    @property
+    def edge_width(self) -> float:
+        """Mean width of the rims of the labelled LEDs, px; NaN without any."""
+        if self.spots is None or self.labels is None:
+            return float("nan")
+        labelled = self.labels.spot[self.labels.spot >= 0]
+        widths = self.spots.edge_widths[labelled]
+        return float(widths.mean()) if len(widths) else float("nan")
 
 
 def look(
@@ -84,37 +102,88 @@ def look(
     mask: FloatArray | None = None,
     before: Sighting | None = None,
 ) -> Sighting:
-    """Find the pen in an image.
+    """Find the pen in an image, and its pose by maximum likelihood.
 
     Parameters
     ----------
     image : (H, W) array
-        Grey image of the camera's size, 8 or 16 bit.
+        Grey image, 8 or 16 bit.
     camera : Camera
     pen : Pen
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     before : Sighting, optional
-        Of the image before, which tells where to look first.
+        Of the image before, which tells where to look first. Where the LEDs are there,
+        that settles it, also for an image that would be refused on its own; where they
+        are not, the image is looked at on its own.
     """
+    if not camera.fits(image):
+        return unseen(pen, Reason.WRONG_SIZE)
     spots = detect_spots(image, mask)
     labels = _label(spots, camera, pen, before)
-    seen = np.full((pen.n_leds, 2), np.nan)
-    labelled = labels.spot >= 0
-    if labelled.any():
-        chosen = labels.spot[labelled]
-        seen[labelled] = centers_from_centroids(
-            camera, spots.centers[chosen], spots.shapes[chosen]
-        )
-    pixels = np.where((labels.whole & labelled)[:, None], seen, np.nan)
-    reason = _REASONS[labels.reason]
-    if reason not in (Reason.NONE, Reason.EMPTY) and _is_blurred(spots):
-        reason = Reason.BLURRED
-    if reason is Reason.NONE and np.isfinite(pixels[:, 0]).sum() < MIN_LEDS:
+    return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
+
+
+def sightings_of(
+    spots: Sequence[Spots], labels: Sequence[Labels], camera: Camera
+) -> list[Sighting]:
+    """Return what images show, by their spots and by which of these are LEDs.
+
+    An image is of use if its LEDs are labelled and four of them or more are whole. If
+    not, the reason is the first that holds:
+
+    * blurred, where most spots are or where there is light but no spot, since stillness
+      comes first: it may part merged LEDs, and tell alike ones apart;
+    * empty, without any spot;
+    * too few LEDs, where there are not spots enough, or not enough whole LEDs;
+    * ambiguous, or not the pen.
+
+    Parameters
+    ----------
+    spots : sequence of Spots
+        One per image.
+    labels : sequence of Labels
+        Likewise.
+    camera : Camera
+
+    Returns
+    -------
+    list of Sighting
+        One per image, with the rough pose of its labels.
+    """
+    n_leds = len(labels[0].spot)
+    seen = np.full((len(labels), n_leds, 2), np.nan)
+    shapes = np.full((len(labels), n_leds, 2, 2), np.nan)
+    for i, (found, label) in enumerate(zip(spots, labels, strict=True)):
+        labelled = label.spot >= 0
+        seen[i, labelled] = found.centers[label.spot[labelled]]
+        shapes[i, labelled] = found.shapes[label.spot[labelled]]
+    seen = centers_from_centroids(camera, seen, shapes)
+    return [_sighting_of(*image) for image in zip(spots, labels, seen, strict=True)]
+
+
+def sighting_of_centers(
+    pixels: FloatArray, rotation: FloatArray, translation: FloatArray
+) -> Sighting:
+    """Return what LED centres show that were found and labelled elsewhere.
+
+    Parameters
+    ----------
+    pixels : (L, 2) array
+        px; NaN where an LED was not seen.
+    rotation, translation : (3, 3) and (3,) array
+        Rough cam_from_pen, mm; NaN where no pose fits.
+    """
+    n_seen = _n_seen(pixels)
+    if n_seen == 0:
+        reason = Reason.EMPTY
+    elif n_seen < MIN_POSE_LEDS:
         reason = Reason.TOO_FEW_LEDS
-    if reason is not Reason.NONE:
-        return _without_pose(pixels, seen, reason, spots, labels)
-    return _with_pose(camera, pen, pixels, seen, labels.R, labels.t, spots, labels)
+    elif np.isnan(translation).any():
+        reason = Reason.MISFIT
+    else:
+        return Sighting(pixels, pixels, Reason.NONE, rotation, translation)
+    return Sighting(pixels, pixels, reason)
 
 
 def sight_centers(
@@ -125,11 +194,13 @@ def sight_centers(
     translation: FloatArray,
 ) -> Sighting:
     """Return the sighting of labelled centres (L, 2), px, from a rough pose, mm."""
-    if np.isfinite(pixels[:, 0]).sum() < MIN_LEDS:
-        n_seen = np.isfinite(pixels[:, 0]).any()
-        reason = Reason.TOO_FEW_LEDS if n_seen else Reason.EMPTY
-        return _without_pose(pixels, pixels, reason)
-    return _with_pose(camera, pen, pixels, pixels, rotation, translation)
+    return _fitted(sighting_of_centers(pixels, rotation, translation), camera, pen)
+
+
+def unseen(pen: Pen, reason: Reason) -> Sighting:
+    """Return the sighting of an image that is not looked at, and why."""
+    nothing = np.full((pen.n_leds, 2), np.nan)
+    return Sighting(nothing, nothing, reason)
 
 
 def _label(spots: Spots, camera: Camera, pen: Pen, before: Sighting | None) -> Labels:
@@ -140,49 +211,35 @@ def _label(spots: Spots, camera: Camera, pen: Pen, before: Sighting | None) -> L
     return label_spots(spots, camera, pen)
 
 
-def _is_blurred(spots: Spots) -> bool:
-    return len(spots) > 0 and bool(np.mean((spots.flaws & Flaw.BLURRED) > 0) > 0.5)
+def _sighting_of(spots: Spots, labels: Labels, seen: FloatArray) -> Sighting:
+    """Return the sighting of an image whose labelled LEDs are seen there, (L, 2)."""
+    pixels = np.where(labels.whole[:, None], seen, np.nan)
+    sighting = partial(Sighting, pixels, seen, spots=spots, labels=labels)
+    is_labelled = labels.reason is LabelStatus.LABELLED
+    if is_labelled and _n_seen(pixels) >= MIN_POSE_LEDS:
+        return sighting(Reason.NONE, labels.R, labels.t)
+    return sighting(Reason.BLURRED if spots.are_blurred else _REASONS[labels.reason])
 
 
-def _with_pose(
-    camera: Camera,
-    pen: Pen,
-    pixels: FloatArray,
-    seen_pixels: FloatArray,
-    rotation: FloatArray,
-    translation: FloatArray,
-    spots: Spots | None = None,
-    labels: Labels | None = None,
-) -> Sighting:
-    poses = fit_poses(camera, pen, pixels[None], rotation[None], translation[None])
-    return Sighting(
-        pixels=pixels,
-        seen_pixels=seen_pixels,
+def _n_seen(pixels: FloatArray) -> int:
+    return int(np.isfinite(pixels[:, 0]).sum())
+
+
+def _fitted(sighting: Sighting, camera: Camera, pen: Pen) -> Sighting:
+    """Return a sighting with its pose, if it has one, fitted to the LEDs."""
+    if not sighting.has_pose:
+        return sighting
+    poses = fit_poses(
+        camera,
+        pen,
+        sighting.pixels[None],
+        sighting.rotation[None],
+        sighting.translation[None],
+    )
+    return replace(
+        sighting,
         rotation=poses.rotations[0],
         translation=poses.translations[0],
         cofactors=poses.covariances[0] / poses.sigma**2,
         sigma=poses.sigma,
-        reason=Reason.NONE,
-        spots=spots,
-        labels=labels,
-    )
-
-
-def _without_pose(
-    pixels: FloatArray,
-    seen_pixels: FloatArray,
-    reason: Reason,
-    spots: Spots | None = None,
-    labels: Labels | None = None,
-) -> Sighting:
-    return Sighting(
-        pixels=pixels,
-        seen_pixels=seen_pixels,
-        rotation=np.full((3, 3), np.nan),
-        translation=np.full(3, np.nan),
-        cofactors=np.full((6, 6), np.nan),
-        sigma=float("nan"),
-        reason=reason,
-        spots=spots,
-        labels=labels,
     )

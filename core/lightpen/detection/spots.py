@@ -8,7 +8,7 @@ What never becomes a disc is dropped, or kept and flagged if it resembles one.
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntFlag
 from math import ceil
 from statistics import median
@@ -25,13 +25,13 @@ from lightpen.detection.disc_moments import (
     bounding_box,
     measure_disc,
 )
+from lightpen.detection.pose import MIN_POSE_LEDS
 
 MAX_SPOTS = 64
 MAX_BOXES = 128  # the smallest of more are clutter
 MAX_REGIONS = 256  # looked at in one image
 MAX_CONTOURS = 4000
 
-MIN_SPOTS = 4  # fewer give no pose, so a closer look is worth its time
 NOISE_SAMPLES = 48  # per side of the image
 NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
 NOISE_OF_DIFFERENCE = 1.99  # that quantile for normal noise, in standard deviations
@@ -90,6 +90,9 @@ class Spots:
         Width of the rim from dark to bright, px; blur widens it.
     flaws : (N,) array
         `Flaw` of each spot.
+    has_smears : bool
+        Whether there is light, but no spot: discs moved by many times their size during
+        the exposure leave streaks, a dark image leaves nothing.
     """
 
     centers: FloatArray
@@ -98,9 +101,17 @@ class Spots:
     contrasts: FloatArray
     edge_widths: FloatArray
     flaws: IntArray
+    has_smears: bool = False
 
     def __len__(self) -> int:
         return len(self.centers)
+
+    @property
+    def are_blurred(self) -> bool:
+        """Whether most of the spots are blurred, or all light is smeared to none."""
+        if len(self) == 0:
+            return self.has_smears
+        return bool(np.mean((self.flaws & Flaw.BLURRED) > 0) > 0.5)
 
 
 def detect_spots(
@@ -144,38 +155,22 @@ def detect_spots(
     budget = iter(range(MAX_REGIONS))
     scene = _survey(image, mask, stride)
     discs = _find_discs(scene, budget)
-    if len(discs) < MIN_SPOTS and stride > 1:
+    # Too few for a pose are worth a closer look.
+    if len(discs) < MIN_POSE_LEDS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
-    if len(discs) < MIN_SPOTS or next(budget, None) is None:
+    has_smears = False
+    if len(discs) < MIN_POSE_LEDS or next(budget, None) is None:
         flat = _survey(_flattened(image), mask, stride)
         flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
         if len(flat_discs) > len(discs):
             scene, discs = flat, flat_discs
+        has_smears = not discs and _has_smears(flat)
     if full_scale is None:
         full_scale = 255 if image.dtype == np.uint8 else 4095
         full_scale = full_scale if scene.peak <= full_scale else 65535
-    return _as_spots(discs, full_scale, scene.noise)
-
-
-def shows_smears(image: Image) -> bool:
-    """Return whether an image in which no spot was found shows light all the same.
-
-    Discs moved by many times their size during the exposure leave streaks that are no
-    spots; a dark image leaves nothing.
-
-    Parameters
-    ----------
-    image : (H, W) array
-        Grey image, 8 or 16 bit.
-    """
-    if min(image.shape) < MIN_SIZE:
-        return False
-    scene = _survey(image, None, 4)
-    level = scene.background + LEVEL_SIGMAS * scene.noise
-    lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
-    low, high = SMEARED_FRACTIONS
-    return low < lit / scene.thinned.size < high
+    spots = _as_spots(discs, full_scale, scene.noise)
+    return replace(spots, has_smears=has_smears)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,6 +209,14 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
             center = (round(x), round(y))
             cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
     return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
+
+
+def _has_smears(scene: _Scene) -> bool:
+    """Return whether an image without spots, nor uneven background, shows light."""
+    level = scene.background + LEVEL_SIGMAS * scene.noise
+    lit = cv2.countNonZero(cv2.threshold(scene.thinned, level, 1, cv2.THRESH_BINARY)[1])
+    low, high = SMEARED_FRACTIONS
+    return low < lit / scene.thinned.size < high
 
 
 def _flattened(image: Image) -> Image:

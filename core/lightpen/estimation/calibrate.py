@@ -9,7 +9,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.observations import (
     Observations,
 )
-from lightpen.detection.pose import MIN_LEDS, Poses, fit_paper_poses, fit_poses
+from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.geometry import GeometryFit, fit_geometry
@@ -207,7 +207,7 @@ def _fitting(poses: Poses) -> BoolArray:
     """Return which images have a pose that most of their LEDs agree with."""
     n_seen = (poses.weights > 0).sum(axis=1)
     n_trusted = (poses.weights > TRUSTED_WEIGHT).sum(axis=1)
-    return np.asarray((n_trusted >= MIN_LEDS) & (2 * n_trusted > n_seen))
+    return np.asarray((n_trusted >= MIN_POSE_LEDS) & (2 * n_trusted > n_seen))
 
 
 def _require_images(

@@ -38,7 +38,7 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.sentences import sentence
 
 LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
-MIN_LEDS = 3  # in an image; fewer leave its rotation free
+MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 SETTLED = 1e-4  # mm, change of tip and cone after which the loss is dropped
 CONVERGED = 1e-7  # mm
 MAX_STEPS = 50
@@ -269,7 +269,7 @@ def _descend(
 def _gate(residuals: FloatArray) -> BoolArray:
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     within = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * robust_sigma(residuals, 3)
-    enough = within.sum(axis=1, keepdims=True) >= MIN_LEDS
+    enough = within.sum(axis=1, keepdims=True) >= MIN_TURN_LEDS
     return np.asarray(within & enough)
 
 

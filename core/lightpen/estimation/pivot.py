@@ -200,7 +200,9 @@ class _Equations:
 
     def residuals(self, solution: FloatArray) -> FloatArray:
         """Return where each pose puts the tip minus the pivot, (N, 3), mm."""
-        return self.rotations @ solution[:3] + self.translations - solution[3:]
+        return contact_residuals(
+            self.rotations, self.translations, solution[:3], solution[3:]
+        )
 
     def distances(self, solution: FloatArray) -> FloatArray:
         """Return the lengths of the residuals, in standard deviations if known."""
@@ -208,15 +210,38 @@ class _Equations:
         if self.covariances is None:
             return np.asarray(np.linalg.norm(residuals, axis=1))
         covariances = tip_covariances(self.rotations, self.covariances, solution[:3])
-        whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
-        squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
-        return np.sqrt(squares)
+        return in_deviations(residuals, covariances)
 
 
 def contact_matrix(rotations: FloatArray) -> FloatArray:
     """Return [R_i, -I], (N, 3, 6): the equations of tip and pivot are A x = -t_i."""
     minus_identity = np.broadcast_to(-np.eye(3), rotations.shape)
     return np.concatenate([rotations, minus_identity], axis=2)
+
+
+def contact_residuals(
+    rotations: FloatArray,
+    translations: FloatArray,
+    tip_pen: FloatArray,
+    pivot_cam: FloatArray,
+) -> FloatArray:
+    """Return R_i tip_pen + t_i - pivot_cam, (N, 3), mm, by which the equations miss."""
+    return rotations @ tip_pen + translations - pivot_cam
+
+
+def in_deviations(residuals: FloatArray, covariances: FloatArray) -> FloatArray:
+    """Return the lengths (N,) of residuals in standard deviations, 1.73 on average.
+
+    Parameters
+    ----------
+    residuals : (N, 3) array
+        mm.
+    covariances : (N, 3, 3) array
+        mm^2.
+    """
+    whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
+    squares: FloatArray = np.einsum("ni,ni->n", residuals, whitened)
+    return np.sqrt(squares)
 
 
 def tip_covariances(

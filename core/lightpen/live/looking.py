@@ -204,9 +204,7 @@ class Live:
 
     def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:
         camera, pen, mask = wanted.camera, wanted.pen, wanted.mask
-        height, width = frame.image.shape
-        fits = camera is not None and (camera.width, camera.height) == (width, height)
-        if camera is None or pen is None or not fits:
+        if camera is None or pen is None or not camera.fits(frame.image):
             return LiveImage(frame, detect_spots(frame.image, mask), None)
         sighting = look(frame.image, camera, pen, mask, self._last)
         self._last = sighting

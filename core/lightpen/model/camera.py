@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.errors import CalibrationError
 from lightpen.sentences import sentence
 
@@ -76,6 +76,15 @@ class Camera:
     distortion: FloatArray = field(default_factory=lambda: np.zeros(5))
     covariance: FloatArray | None = None
     calibrated_on: date | None = None
+
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """Width and height of the images that the intrinsics are for, px."""
+        return self.width, self.height
+
+    def fits(self, image: Image) -> bool:
+        """Return whether an image (H, W) has the size that the intrinsics are for."""
+        return image.shape == (self.height, self.width)
 
     @property
     def matrix(self) -> FloatArray:

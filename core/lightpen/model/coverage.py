@@ -12,6 +12,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
+from lightpen.model.posture import directions_of, tilts_of
 from lightpen.model.rigid import nearest_rotation
 from lightpen.sentences import Sentence, sentence
 
@@ -72,10 +73,7 @@ class Coverage:
 
 def measure_coverage(rotations: FloatArray) -> Coverage:
     """Measure which postures rotations (N, 3, 3) of cam_from_pen hold."""
-    axis = rotations[:, :, 1]
-    right, up, away = axis[:, 0], -axis[:, 1], axis[:, 2]
-    tilts = np.arccos(np.clip(up, -1, 1))
-    directions = np.arctan2(away, right) % (2 * np.pi)
+    tilts, directions = tilts_of(rotations), directions_of(rotations)
     ring = np.digitize(tilts, TILT_RINGS)
     sector = np.rint(directions / (2 * np.pi / N_DIRECTIONS)).astype(int) % N_DIRECTIONS
     counts = np.zeros((2, N_DIRECTIONS), dtype=int)

@@ -17,6 +17,7 @@ from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 
+FACING = np.diag([1.0, -1.0, -1.0])  # cam_from_pen upright, z to the camera
 MIN_SIDEWAYS = 0.1  # of the mean normal; LEDs along the axis have no side to face with
 
 
@@ -45,21 +46,48 @@ def rotations_of(
     pen: Pen, tilts: FloatArray, directions: FloatArray, turns: FloatArray
 ) -> FloatArray:
     """Return the rotations of cam_from_pen, (N, 3, 3), of N postures, each (N,)."""
+    return moved_from(_upright(pen), tilts, directions, turns)
+
+
+def moved_from(
+    upright: FloatArray, tilts: FloatArray, directions: FloatArray, turns: FloatArray
+) -> FloatArray:
+    """Return the rotations of cam_from_pen, (N, 3, 3), from that (3, 3) of upright."""
     zero = np.zeros_like(tilts)
     axes = np.stack([-np.sin(directions), zero, np.cos(directions)], axis=-1)
     leant = rotation_from_vector(axes * tilts[:, None])
     turned = rotation_from_vector(np.stack([zero, turns, zero], axis=-1))
-    return np.asarray(leant @ _upright(pen) @ turned)
+    return np.asarray(leant @ upright @ turned)
 
 
 def posture_of(pen: Pen, rotation: FloatArray) -> Posture:
     """Return the posture of a pen with the rotation (3, 3) of cam_from_pen."""
-    right, down, away = rotation[:, 1]
-    tilt = float(np.arctan2(np.hypot(right, away), -down))
-    direction = float(np.arctan2(away, right) % (2 * np.pi))
-    still = rotations_of(pen, np.array([tilt]), np.array([direction]), np.zeros(1))[0]
-    about_y = still.T @ rotation
-    return Posture(tilt, direction, float(np.arctan2(about_y[0, 2], about_y[0, 0])))
+    one = rotation[None]
+    return Posture(
+        float(tilts_of(one)[0]),
+        float(directions_of(one)[0]),
+        float(turns_of(pen, one)[0]),
+    )
+
+
+def tilts_of(rotations: FloatArray) -> FloatArray:
+    """Return the tilts (N,) of rotations (N, 3, 3), as `Posture` has them."""
+    right, down, away = rotations[:, :, 1].T
+    return np.asarray(np.arctan2(np.hypot(right, away), -down))
+
+
+def directions_of(rotations: FloatArray) -> FloatArray:
+    """Return where pens of rotations (N, 3, 3) lean to, (N,), 0 to 2 pi, likewise."""
+    right, _, away = rotations[:, :, 1].T
+    return np.asarray(np.arctan2(away, right) % (2 * np.pi))
+
+
+def turns_of(pen: Pen, rotations: FloatArray) -> FloatArray:
+    """Return the turns (N,) of a pen of rotations (N, 3, 3), likewise."""
+    tilts, directions = tilts_of(rotations), directions_of(rotations)
+    still = rotations_of(pen, tilts, directions, np.zeros_like(tilts))
+    about_y = np.swapaxes(still, 1, 2) @ rotations
+    return np.asarray(np.arctan2(about_y[:, 0, 2], about_y[:, 0, 0]))
 
 
 def angles_between(rotations: FloatArray, others: FloatArray) -> FloatArray:
@@ -75,4 +103,4 @@ def _upright(pen: Pen) -> FloatArray:
     z = facing / length if length > MIN_SIDEWAYS else np.array([0.0, 0.0, 1.0])
     y = np.array([0.0, 1.0, 0.0])
     x = np.cross(y, z)
-    return np.asarray(np.diag([1.0, -1.0, -1.0]) @ np.stack([x, y, z]))
+    return np.asarray(FACING @ np.stack([x, y, z]))

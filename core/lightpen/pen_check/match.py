@@ -23,13 +23,13 @@ from lightpen.detection.labelling.labels import (
     label_images,
 )
 from lightpen.detection.pose import (
-    MIN_LEDS,
+    MIN_POSE_LEDS,
     Poses,
     disc_residuals,
     fit_poses,
     robust_sigma,
 )
-from lightpen.detection.spots import Flaw, Spots
+from lightpen.detection.spots import Spots
 from lightpen.estimation.calibrate import USUAL_SIGMA
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -126,8 +126,7 @@ def add_view(views: tuple[Spots, ...], spots: Spots) -> tuple[Spots, ...]:
     It takes the place of a view that is alike, and of the oldest if there are too many;
     smeared images and those with too few spots are passed over.
     """
-    is_smeared = 2 * np.count_nonzero(spots.flaws & Flaw.BLURRED) > len(spots)
-    if len(spots) < MIN_LEDS or is_smeared:
+    if len(spots) < MIN_POSE_LEDS or spots.are_blurred:
         return views
     others = [view for view in views if _differ(view, spots)]
     return (*others, spots)[-MAX_VIEWS:]
@@ -147,7 +146,7 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
     found = [
         i
         for i, each in enumerate(labels)
-        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_LEDS
+        if each.reason is LabelStatus.LABELLED and each.whole.sum() >= MIN_POSE_LEDS
     ]
     if not found or 2 * len(found) < len(views):
         advice = diagnose(views, camera, pen) if views else None

@@ -18,7 +18,6 @@ from lightpen.detection.observations import (
     leave_out,
     observe_images,
 )
-from lightpen.detection.pose import MIN_LEDS
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -181,8 +180,7 @@ def _all_residuals(
     residuals = np.full_like(observations.pixels, np.nan)
     residuals[calibration.used] = joint.residuals[joint.used.any(axis=1)]
     shows_pen = np.isfinite(observations.translations[:, 0])
-    enough = np.isfinite(observations.pixels[..., 0]).sum(axis=1) >= MIN_LEDS
-    others = np.flatnonzero(~calibration.used & shows_pen & enough)
+    others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):
         leds = source.pen.leds + calibration.geometry.corrections
         model = ContactModel(

@@ -116,7 +116,7 @@ def _clear_place(
 
 
 def _place_anywhere(camera: Camera, rng: np.random.Generator) -> FloatArray:
-    return np.asarray(rng.random(2) * np.array([camera.width, camera.height]))
+    return np.asarray(rng.random(2) * np.array(camera.image_size))
 
 
 def _place_between(discs: Ellipses, rng: np.random.Generator) -> FloatArray:

@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.posture import FACING, moved_from
 
 SwingKind: TypeAlias = Literal["field", "cone", "operator", "one-axis", "upright"]
 SWING_KINDS: tuple[SwingKind, ...] = get_args(SwingKind)
@@ -54,15 +54,7 @@ class Postures:
     @property
     def rotations(self) -> FloatArray:
         """Rotations of cam_from_pen, (F, 3, 3)."""
-        zero = np.zeros_like(self.tilts)
-        axes = np.stack(
-            [-np.sin(self.directions), zero, np.cos(self.directions)], axis=-1
-        )
-        upright = np.diag([1.0, -1.0, -1.0])
-        rolled = rotation_from_vector(np.stack([zero, self.rolls, zero], axis=-1))
-        tilted = rotation_from_vector(axes * self.tilts[:, None])
-        rotations: FloatArray = tilted @ upright @ rolled
-        return rotations
+        return moved_from(FACING, self.tilts, self.directions, self.rolls)
 
 
 def random_postures(n: int, rng: np.random.Generator) -> Postures:

@@ -379,7 +379,7 @@ def _shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
 
 
 def _inside(camera: Camera, pixels: FloatArray, margin: float = 0.0) -> BoolArray:
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.image_size)
     inside: BoolArray = np.all(
         (pixels >= margin - 0.5) & (pixels <= size - 0.5 - margin), axis=-1
     )

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.estimation.joint import ContactModel, reduce
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import N_DIRECTIONS
@@ -27,7 +28,6 @@ TURNS = (np.radians(-25.0), 0.0, np.radians(25.0))
 N_ON_THE_WAY = 3  # postures that stand for all from here to there
 MAX_INCIDENCE = np.radians(70.0)  # an LED seen flatter is a line, and dim
 MIN_GAP = 4.0  # px between the rims of two LEDs; blur joins closer ones
-MIN_LEDS = 6  # fewer are not labelled with certainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,7 @@ def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
     cosines /= np.linalg.norm(leds, axis=2)
     pixels = camera.project(leds)
     radii = max(camera.fx, camera.fy) * pen.diameter / 2 / leds[..., 2]
-    size = np.array([camera.width, camera.height])
+    size = np.array(camera.image_size)
     room = np.minimum(pixels + 0.5, size - 0.5 - pixels).min(axis=2)
     apart = np.linalg.norm(pixels[:, :, None] - pixels[:, None], axis=3)
     apart -= radii[:, :, None] + radii[:, None]
@@ -153,7 +153,7 @@ def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
 def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
     """Return in which postures enough LEDs show."""
     n_seen = usable_leds(outlook, rotations).sum(axis=1)
-    return np.asarray(n_seen >= min(MIN_LEDS, outlook.pen.n_leds))
+    return np.asarray(n_seen >= certain_leds(outlook.pen))
 
 
 def _worth(outlook: Outlook, present: FloatArray, rotations: FloatArray) -> FloatArray:

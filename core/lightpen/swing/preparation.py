@@ -132,7 +132,7 @@ class Preparation:
         camera = self.camera
         if camera is None:
             lacks.append(Lack.CAMERA_FILE)
-        elif self.image_size not in (None, (camera.width, camera.height)):
+        elif self.image_size not in (None, camera.image_size):
             lacks.append(Lack.IMAGE_SIZE)
         return tuple(lacks)
 

@@ -32,8 +32,7 @@ class Resumable:
 
     def fits(self, image_size: tuple[int, int]) -> bool:
         """Return whether images of this width and height, px, can go on with it."""
-        camera = self.setup.camera
-        return image_size == (camera.width, camera.height)
+        return image_size == self.setup.camera.image_size
 
 
 def read_resumable(folder: Path) -> Resumable:

@@ -16,6 +16,7 @@ from math import ceil
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.messages import (
@@ -38,7 +39,6 @@ from lightpen.messages import (
 )
 from lightpen.model.posture import angles_between, posture_of
 from lightpen.sentences import Sentence
-from lightpen.swing.guidance import MIN_LEDS
 from lightpen.swing.kept_images import KeptImages, keep, none_kept, without_slipped
 from lightpen.swing.rest import (
     BATCH,
@@ -441,7 +441,7 @@ def _flawed(
 ) -> SwingState:
     """Say what is wrong with an image, and count it once a posture."""
     flawed = _with_new(setup, state.flawed_rotations, sighting)
-    needed = min(MIN_LEDS, setup.pen.n_leds)
+    needed = certain_leds(setup.pen)
     messages = {
         Reason.TOO_FEW_LEDS: few_leds(sighting.n_leds, needed),
         Reason.BLURRED: TOO_FAST,
@@ -457,7 +457,7 @@ def _flawed(
 
 def _flaw(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Reason:
     """Return why an image with a new posture is of no use."""
-    if sighting.n_leds < min(MIN_LEDS, setup.pen.n_leds):
+    if sighting.n_leds < certain_leds(setup.pen):
         return Reason.TOO_FEW_LEDS
     if sighting.is_blurred:
         return Reason.BLURRED

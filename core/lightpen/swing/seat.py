@@ -10,7 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.pivot import tip_covariances
+from lightpen.estimation.pivot import (
+    contact_matrix,
+    contact_residuals,
+    in_deviations,
+    tip_covariances,
+)
 from lightpen.model.pen import Pen
 
 NOMINAL_SIGMA = 3.0  # mm, of a tip about its design
@@ -64,7 +69,7 @@ def fit_seat(
     """
     expected, sigma = prior_of(pen)
     spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
-    A = _equations(rotations)
+    A = contact_matrix(rotations)
     AtW = np.swapaxes(A, 1, 2) @ np.linalg.inv(spread)
     center = (rotations @ expected + translations).mean(axis=0)
     missing = center - (rotations @ expected + translations)
@@ -78,7 +83,7 @@ def tip_offsets(
     seat: Seat, rotations: FloatArray, translations: FloatArray
 ) -> FloatArray:
     """Return where poses put the tip, minus the cone, camera frame, (N, 3), mm."""
-    return rotations @ seat.tip_pen + translations - seat.cone_cam
+    return contact_residuals(rotations, translations, seat.tip_pen, seat.cone_cam)
 
 
 def tip_distances(
@@ -103,15 +108,7 @@ def tip_distances(
         1.73 on average where the tip rests in the cone.
     """
     offsets = tip_offsets(seat, rotations, translations)
-    A = _equations(rotations)
+    A = contact_matrix(rotations)
     spread = tip_covariances(rotations, covariances, seat.tip_pen)
     spread = spread + A @ seat.covariance @ np.swapaxes(A, 1, 2)
-    spread = spread + SEATING**2 * np.eye(3)
-    whitened = np.linalg.solve(spread, offsets[..., None])[..., 0]
-    squares: FloatArray = np.einsum("ni,ni->n", offsets, whitened)
-    return np.sqrt(squares)
-
-
-def _equations(rotations: FloatArray) -> FloatArray:
-    minus = np.broadcast_to(-np.eye(3), rotations.shape)
-    return np.asarray(np.concatenate([rotations, minus], axis=2))
+    return in_deviations(offsets, spread + SEATING**2 * np.eye(3))

@@ -17,7 +17,13 @@ from lightpen.messages import (
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
-from lightpen.model.posture import Posture, angles_between, posture_of, rotations_of
+from lightpen.model.posture import (
+    Posture,
+    angles_between,
+    posture_of,
+    rotations_of,
+    turns_of,
+)
 from lightpen.sentences import Sentence
 from lightpen.swing.guidance import Outlook, next_posture, visible_fields
 from lightpen.swing.seat import Seat
@@ -111,14 +117,7 @@ def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
     """
     if not len(rotations):
         return None
-    right, down, away = rotations[:, :, 1].T
-    tilts, directions = (
-        np.arctan2(np.hypot(right, away), -down),
-        np.arctan2(away, right),
-    )
-    still = rotations_of(pen, tilts, directions, np.zeros_like(tilts))
-    about_y = np.swapaxes(still, 1, 2) @ rotations
-    turns = np.arctan2(about_y[:, 0, 2], about_y[:, 0, 0])
+    turns = turns_of(pen, rotations)
     return float(turns.min()), float(turns.max())
 
 

@@ -14,6 +14,7 @@ from lightpen.detection.observations import (
     observe_images,
 )
 from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import sight_centers
 from lightpen.errors import FileError
 from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
@@ -133,6 +134,29 @@ def test_given_centres_pass_through_and_few_leds_are_said_so(plan: ScenePlan) ->
     np.testing.assert_allclose(
         found.translations[0], plan.swing.translations[0], atol=1.0
     )
+
+
+def test_given_centres_show_the_same_alone_as_among_others(plan: ScenePlan) -> None:
+    swing = plan.swing
+    pixels = true_centers(plan)
+    pixels[1] = np.nan
+    pixels[2, 3:] = np.nan
+    pixels[3] = CAMERA.pixels(np.zeros((PEN.n_leds, 2)))  # all at one place
+    found = observe_centers(
+        Centers(np.arange(6) + 1, pixels, Path("centers.csv")), CAMERA, PEN
+    )
+    alone = [
+        sight_centers(CAMERA, PEN, *image)
+        for image in zip(pixels, found.rotations, found.translations, strict=True)
+    ]
+
+    assert found.reasons == tuple(sighting.reason for sighting in alone)
+    assert found.reasons[:4] == (
+        *(Reason.NONE, Reason.EMPTY),
+        *(Reason.TOO_FEW_LEDS, Reason.MISFIT),
+    )
+    for sighting, translation in zip(alone[4:], swing.translations[4:], strict=True):
+        np.testing.assert_allclose(sighting.translation, translation, atol=0.01)
 
 
 def test_centres_of_a_larger_image_are_refused(plan: ScenePlan) -> None:

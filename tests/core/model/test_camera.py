@@ -45,6 +45,15 @@ def points_in_view(n: int, seed: int = 1) -> FloatArray:
     )
 
 
+def test_only_images_of_the_calibrated_size_fit() -> None:
+    calibrated = camera(BROWN)
+
+    assert calibrated.image_size == (2448, 2048)
+    assert calibrated.fits(np.zeros((2048, 2448), np.uint8))
+    assert not calibrated.fits(np.zeros((2448, 2048), np.uint8))
+    assert not calibrated.fits(np.zeros((1024, 1224), np.uint8))
+
+
 def pixels_in_image(seed: int = 2) -> FloatArray:
     rng = np.random.default_rng(seed)
     return rng.uniform([0, 0], [2447, 2047], (200, 2))

@@ -271,7 +271,10 @@ def test_old_views_make_room() -> None:
 def test_smeared_and_nearly_empty_images_are_passed_over() -> None:
     spots = SWUNG[0]
     smeared = replace(spots, flaws=np.full(len(spots), int(Flaw.BLURRED)))
-    empty = Spots(*(getattr(spots, name)[:2] for name in spots.__dataclass_fields__))
+    empty = Spots(
+        *(spots.centers[:2], spots.shapes[:2], spots.areas[:2]),
+        *(spots.contrasts[:2], spots.edge_widths[:2], spots.flaws[:2]),
+    )
 
     assert add_view((), smeared) == ()
     assert add_view((), empty) == ()

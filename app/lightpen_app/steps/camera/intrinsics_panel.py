@@ -146,11 +146,11 @@ class IntrinsicsPanel(Translated, QGroupBox):
                 Sign.WARNING,
                 Tone.WARN,
             )
-        made_for = self._size_text(camera.width, camera.height)
+        made_for = self._size_text(*camera.image_size)
         if self._image_size is None:
             words = self.tr("Made for images of {0}")
             return Remark(words.format(made_for), Sign.WAIT, Tone.QUIET)
-        if self._image_size == (camera.width, camera.height):
+        if self._image_size == camera.image_size:
             words = self.tr("Fits the live images: {0}")
             return Remark(words.format(made_for), Sign.CHECK, Tone.GOOD)
         words = self.tr(

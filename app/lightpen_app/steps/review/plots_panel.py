@@ -112,8 +112,7 @@ class ResidualsPanel(PlotsPanel):
         used = calibration.leds_used & calibration.used[:, None]
         points = calibration.observations.seen_pixels[used]
         residuals = solution.residuals[used]
-        size = camera.width, camera.height
-        self._arrows.set_data(size, points, residuals)
+        self._arrows.set_data(camera.image_size, points, residuals)
         self._dots.set_data(residuals[:, 0], residuals[:, 1])
         self._histogram.set_data(residuals.ravel())
         leds = calibration.leds

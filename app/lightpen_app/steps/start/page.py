@@ -334,7 +334,7 @@ class StartPage(Rearranged, Page):
                     "The camera sends {0} x {1}, the swing was captured with {2} x "
                     "{3}. Choose its camera at the step Camera, then resume the swing "
                     "here."
-                ).format(*size, camera.width, camera.height)
+                ).format(*size, *camera.image_size)
             )
         else:
             self._go_on(swing)

@@ -5,7 +5,6 @@ from collections import deque
 from PySide6.QtCore import QObject
 
 from lightpen.live.looking import LiveImage
-from lightpen.swing.state import SwingSetup
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.swing_run import SwingRun
 
@@ -42,7 +41,7 @@ class SwingSight(QObject):
         seen, setup = self._seen, self._run.status.setup
         if seen is None or setup is None:
             return ""
-        if not _is_of_size(seen, setup):
+        if not setup.camera.fits(seen.frame.image):
             return self.tr("The images are not of the size that this swing needs.")
         n_leds = 0 if seen.sighting is None else seen.sighting.n_leds
         text = self.tr("{0} of {1} LEDs, {2} images/s")
@@ -54,7 +53,3 @@ class SwingSight(QObject):
             return 0.0
         (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
         return (last - first) / (end - start)
-
-
-def _is_of_size(seen: LiveImage, setup: SwingSetup) -> bool:
-    return seen.frame.image.shape == (setup.camera.height, setup.camera.width)

@@ -7,10 +7,10 @@ from itertools import combinations, permutations
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.model.pen import Pen
+from lightpen.model.pen import MIN_LEDS, Pen
 from lightpen.model.rigid import fit_rigid
 
-MIN_LEDS = 6  # 6 spots leave 6 equations over to check the 6 unknowns of a pose
+MIN_CERTAIN_LEDS = 6  # leave 6 equations over to check the 6 unknowns of a pose
 MIN_HEIGHT = 0.05  # of a triangle over its longest side; flatter ones fix no pose
 LOOKALIKE = 0.025  # of the pen's size, within which an LED stands in for another
 MAX_TRIANGLES = 120  # whose copies are sought in the pen
@@ -53,6 +53,11 @@ class Constellation:
         return float(self.sides.max())
 
 
+def certain_leds(pen: Pen) -> int:
+    """Return how many LEDs of a pen must be seen to be labelled with certainty."""
+    return min(MIN_CERTAIN_LEDS, pen.n_leds)
+
+
 @lru_cache(maxsize=16)
 def constellation_of(pen: Pen) -> Constellation:
     """Return the constellation of a pen.
@@ -66,15 +71,15 @@ def constellation_of(pen: Pen) -> Constellation:
     -------
     Constellation
     """
-    if pen.n_leds < 4:
-        raise ValueError(f"`pen` must have at least 4 LEDs, got {pen.n_leds}.")
+    if pen.n_leds < MIN_LEDS:
+        raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")
     triples = np.array(list(permutations(range(pen.n_leds), 3)))
     sides = _sides(pen.leds[triples])
     triangles = _heights(pen.leds[triples]) > MIN_HEIGHT * sides.max(axis=1)
     if not triangles.any():
         raise ValueError("`pen` must not have all its LEDs on one line.")
     triples, sides = triples[triangles], sides[triangles]
-    min_leds = min(MIN_LEDS, pen.n_leds)
+    min_leds = certain_leds(pen)
     rotations, translations = _self_motions(pen, triples, sides, min_leds)
     return Constellation(
         leds=pen.leds,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.detection.labelling.constellation import constellation_of
+from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.detection.labelling.labels import MODERATE, label_images
 from lightpen.detection.spots import Spots
 from lightpen.model.camera import Camera
@@ -37,7 +37,7 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Sentence | Non
     Sentence or None
         What was found and what to do; None if most spots are LEDs of the pen.
     """
-    needed = constellation_of(pen).min_leds
+    needed = certain_leds(pen)
     counts = np.array([len(s) for s in spots])
     if 2 * np.sum(counts >= needed) < len(spots):
         return sentence(
@@ -103,7 +103,7 @@ class _Sample:
 
     @classmethod
     def of(cls, spots: Sequence[Spots], camera: Camera, pen: Pen) -> "_Sample":
-        needed = constellation_of(pen).min_leds
+        needed = certain_leds(pen)
         # The images with the fewest spots have the least clutter.
         some = sorted((s for s in spots if len(s) >= needed), key=len)[:N_DIAGNOSED]
         return cls(
