@@ -147,14 +147,14 @@ def detect_spots(
     if len(discs) < MIN_SPOTS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
-    if len(discs) < MIN_SPOTS or next(budget, None) is None:
-        flat = _survey(_flattened(image), mask, stride)
-        flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
-        if len(flat_discs) > len(discs):
-            scene, discs = flat, flat_discs
     if full_scale is None:
         full_scale = 255 if image.dtype == np.uint8 else 4095
         full_scale = full_scale if scene.peak <= full_scale else 65535
+    if len(discs) < MIN_SPOTS or next(budget, None) is None:
+        flat = _survey(_flattened(image, full_scale), mask, stride)
+        flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
+        if len(flat_discs) > len(discs):
+            scene, discs = flat, flat_discs
     return _as_spots(discs, full_scale, scene.noise)
 
 
@@ -216,7 +216,7 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
     return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
 
 
-def _flattened(image: Image) -> Image:
+def _flattened(image: Image, full_scale: int) -> Image:
     """Return the image without its uneven background.
 
     That is the median of the neighbourhood in a coarse grid, in which a disc is a few
@@ -228,7 +228,7 @@ def _flattened(image: Image) -> Image:
     background = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
     uneven = np.asarray(background) - coarse.min()
     flat: Image = np.asarray(cv2.subtract(image, uneven)).view(image.dtype)
-    np.copyto(flat, image, where=image == np.iinfo(image.dtype).max)
+    np.copyto(flat, image, where=image >= full_scale)
     return flat
 
 
