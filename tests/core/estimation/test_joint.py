@@ -1,6 +1,7 @@
 """The joint fit: exact, at the Cramer-Rao bound, honest, robust."""
 
 import numpy as np
+import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import ContactModel, JointFit, fit_joint
@@ -11,6 +12,7 @@ from lightpen.simulator.swings import (
     drop_centers,
     paper_camera,
     paper_pen,
+    select_frames,
     simulate_centers,
     swing_poses,
 )
@@ -129,6 +131,21 @@ def test_an_image_without_a_usable_led_does_no_harm() -> None:
     assert not result.used[7].any()
     assert np.isfinite(result.covariance).all()
     assert np.abs(result.tip_pen - truth.tip_pen).max() < 0.01
+
+
+@pytest.mark.parametrize("n_seen", [1, 2])
+def test_an_image_of_one_or_two_leds_takes_no_part(n_seen: int) -> None:
+    truth = swing(40)
+    pixels = centers(truth, 0.05)
+    others = np.delete(np.arange(40), 7)
+    without = fit(select_frames(truth, others), pixels[others])
+    pixels[7, n_seen:] = np.nan
+
+    result = fit(truth, pixels)
+
+    assert not result.used[7].any()
+    assert result.sigma == pytest.approx(without.sigma, rel=1e-9)
+    np.testing.assert_allclose(result.covariance, without.covariance, rtol=1e-6)
 
 
 def test_what_each_image_says_adds_up_to_the_covariance() -> None:
