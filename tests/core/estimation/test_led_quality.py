@@ -53,6 +53,23 @@ def test_a_good_pen_has_no_displaced_led() -> None:
     assert quality(perturbed_pen(PEN, 0.01, np.random.default_rng(3))).displaced == ()
 
 
+@pytest.mark.parametrize("n_seen", [1, 5, 40])
+def test_a_displacement_is_told_only_where_the_led_was_often_seen(n_seen: int) -> None:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels[n_seen:, 3] = np.nan
+    pixels[:, 3] += 2.0  # half a millimetre
+    start = SWING.rotations, SWING.tip_pen, SWING.cone_cam
+    geometry = fit_geometry(CAMERA, PEN, pixels, fit_joint(CAMERA, PEN, pixels, *start))
+
+    found = measure_leds(CAMERA, PEN, pixels, geometry)
+
+    assert found.displaced == ((4,) if n_seen == 40 else ())
+    assert np.isfinite(found.displacement[3]).all() == (n_seen == 40)
+
+
 def test_residuals_and_counts_are_those_of_the_led() -> None:
     found = quality(PEN, n_missing=3)
 

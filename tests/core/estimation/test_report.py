@@ -69,6 +69,10 @@ def test_the_record_holds_the_tip_and_its_uncertainty() -> None:
         2 * np.sqrt(np.diag(found["covariance"]))[:3],
     )
     np.testing.assert_allclose(
+        found["cone_expanded_uncertainty_mm"],
+        2 * np.sqrt(np.diag(found["covariance"]))[3:],
+    )
+    np.testing.assert_allclose(
         found["change_from_nominal_mm"], joint.tip_pen - [0, -90, -25]
     )
 
