@@ -410,6 +410,24 @@ def test_discs_that_leave_the_image_are_flagged_as_cut() -> None:
     assert (spots.flaws & Flaw.CUT).all()
 
 
+@pytest.mark.parametrize(
+    ("radius", "sliver", "sigmas"),
+    [(6.0, 1.0, 60.0), (21.0, 1.5, 20.0), (40.0, 2.0, 20.0)],
+)
+def test_cut_discs_are_told_in_noise_whatever_their_size(
+    radius: float, sliver: float, sigmas: float
+) -> None:
+    lamp = Lamp(100.3, 100.4, radius, radius, level=3.0 * sigmas)
+
+    def edge(x: FloatArray, y: FloatArray) -> npt.NDArray[np.bool_]:
+        return np.asarray(x > lamp.x + radius - sliver)
+
+    light = render([lamp], hidden=edge, shape=(220, 220))
+    noise = np.random.default_rng(0).normal(20.0, 3.0, light.shape)
+    spots = detect_spots(np.rint(light + noise).astype(np.uint8))
+    assert all(flaw & WHOLE_FLAWS for flaw in flaws_of(spots, [lamp]))
+
+
 @pytest.mark.parametrize("sliver", [0.3, 1.0])
 def test_a_sliver_beyond_any_border_is_noticed(sliver: float) -> None:
     """It moves the centre by 0.05 px and 0.14 px, and hardly changes the shape."""
