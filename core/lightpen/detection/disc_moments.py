@@ -24,6 +24,7 @@ MAX_LOW = 0.3
 MAX_FLOOR = 0.85  # higher, the noise of the plateau makes the outline
 MIN_RAMP = 0.2  # least high - low, fraction of the contrast
 MIN_AREA = 12.0  # px^2; hot pixels are smaller
+MIN_VARIANCE = 0.1  # px^2, along each axis; a streak one pixel wide has none
 MIN_SIZE = 3  # px, of the box of a region
 MIN_SIGMAS = 6.0  # least contrast in terms of the noise
 MARGIN = 5  # px around a box: the foot of the rim and some background
@@ -309,12 +310,17 @@ def _window_levels(window: Image, level: float) -> Levels:
 
 
 def _moments(soft: MatLike, frame: Box, ramp: float) -> Moments | None:
-    """Return the moments of a soft-thresholded region, None if it is too small."""
+    """Return the moments of a soft-thresholded region, None if it is too small.
+
+    So it is, too, if it is too narrow.
+    """
     m = cv2.moments(soft)
     area = m["m00"] / 255.0
     if area < MIN_AREA:
         return None
     var_x, cov_xy, var_y = (m[k] / m["m00"] for k in ("mu20", "mu11", "mu02"))
+    if min(var_x, var_y) < MIN_VARIANCE:
+        return None
 
     grey = area - cv2.norm(soft, cv2.NORM_L2SQR) / 255.0**2
     perimeter = 2.0 * pi * sqrt(2.0 * (var_x + var_y))

@@ -159,16 +159,16 @@ def detect_spots(
     if len(discs) < MIN_POSE_LEDS and stride > 1:
         scene = _survey(image, mask, stride // 2)
         discs = _find_discs(scene, budget)
+    if full_scale is None:
+        full_scale = 255 if image.dtype == np.uint8 else 4095
+        full_scale = full_scale if scene.peak <= full_scale else 65535
     has_smears = False
     if len(discs) < MIN_POSE_LEDS or next(budget, None) is None:
-        flat = _survey(_flattened(image), mask, stride)
+        flat = _survey(_flattened(image, full_scale), mask, stride)
         flat_discs = _find_discs(flat, iter(range(MAX_REGIONS)))
         if len(flat_discs) > len(discs):
             scene, discs = flat, flat_discs
         has_smears = not discs and _has_smears(flat)
-    if full_scale is None:
-        full_scale = 255 if image.dtype == np.uint8 else 4095
-        full_scale = full_scale if scene.peak <= full_scale else 65535
     spots = _as_spots(discs, full_scale, scene.noise)
     return replace(spots, has_smears=has_smears)
 
@@ -219,7 +219,7 @@ def _has_smears(scene: _Scene) -> bool:
     return low < lit / scene.thinned.size < high
 
 
-def _flattened(image: Image) -> Image:
+def _flattened(image: Image, full_scale: int) -> Image:
     """Return the image without its uneven background.
 
     That is the median of the neighbourhood in a coarse grid, in which a disc is a few
@@ -231,7 +231,7 @@ def _flattened(image: Image) -> Image:
     background = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
     uneven = np.asarray(background) - coarse.min()
     flat: Image = np.asarray(cv2.subtract(image, uneven)).view(image.dtype)
-    np.copyto(flat, image, where=image == np.iinfo(image.dtype).max)
+    np.copyto(flat, image, where=image >= full_scale)
     return flat
 
 

@@ -32,7 +32,7 @@ from typing import Literal
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.errors import FileError, UsageError
+from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
@@ -44,6 +44,7 @@ CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated fr
 LARGEST_IMAGE = 100_000  # px, along a side
 SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
 LARGEST_ASPECT = 1.5  # of a pixel
+FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 SYMMETRY_TOLERANCE = 1e-6  # of the covariance, relative: files with few digits
 
@@ -297,7 +298,7 @@ def _camera(
     _check_pinhole(pinhole, width, height, entries.name)
     distortion = _checked_distortion(coefficients, entries)
     fx, fy, cx, cy = map(float, pinhole)
-    return Camera(
+    camera = Camera(
         width=width,
         height=height,
         fx=fx,
@@ -308,6 +309,8 @@ def _camera(
         covariance=_covariance(entries, len(coefficients), len(distortion)),
         calibrated_on=_day(entries),
     )
+    _check_fold(camera, entries)
+    return camera
 
 
 def _checked_size(size: tuple[float, float], name: str | Sentence) -> tuple[int, int]:
@@ -420,6 +423,29 @@ def _checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArra
             )
         )
     return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]
+
+
+def _check_fold(camera: Camera, entries: Entries) -> None:
+    """Refuse a distortion that turns the image over before its corners."""
+    grid = np.meshgrid(
+        np.linspace(0, camera.width - 1, FOLD_SAMPLES),
+        np.linspace(0, camera.height - 1, FOLD_SAMPLES),
+    )
+    try:
+        camera.unproject(np.stack(grid, axis=-1))
+    except CalibrationError as error:
+        raise FileError(
+            sentence(
+                "camera-file.fold",
+                "The distortion coefficients of {name} fold the image of {width} x "
+                "{height} px: some pixels have no direction of view, or two. Check "
+                "them, or calibrate the camera again with views that reach into the "
+                "corners.",
+                name=entries.name,
+                width=camera.width,
+                height=camera.height,
+            )
+        ) from error
 
 
 def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:

@@ -80,7 +80,7 @@ class RecordWriter:
 
     @classmethod
     def resume(cls, record: Record) -> Self:
-        """Go on with a record; what a crash left behind is cut off.
+        """Go on with a record; what a crash left behind is written over.
 
         Raises
         ------
@@ -205,7 +205,8 @@ class RecordWriter:
         line = json.dumps(entries, allow_nan=False).encode() + b"\n"
         length = len(line)
         try:
-            self._journal.truncate(self._length)  # a part of a line that failed
+            # What a crash or a write that failed left of a line.
+            self._journal.truncate(self._length)
             while line:
                 line = line[self._journal.write(line) :]
             os.fsync(self._journal.fileno())
@@ -255,7 +256,7 @@ def encode_png(image: Image) -> bytes:
 
 
 def _own_journal(folder: Path, length: int) -> FileIO:
-    """Open a journal of so many bytes for this writer alone, and cut off the rest."""
+    """Open a journal of so many whole bytes for this writer alone."""
     path = folder / JOURNAL
     with ExitStack() as stack:
         try:
@@ -271,7 +272,6 @@ def _own_journal(folder: Path, length: int) -> FileIO:
                         folder=printable(str(folder)),
                     )
                 )
-            journal.truncate(length)
         except OSError as error:
             raise _unwritable(path, error) from error
         stack.pop_all()

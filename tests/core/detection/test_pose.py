@@ -131,6 +131,24 @@ def test_the_covariance_agrees_with_the_scatter_of_many_fits() -> None:
     np.testing.assert_allclose(ratio, 1.0, atol=0.08)
 
 
+@pytest.mark.parametrize("times", [2.0, 3.0, 5.0])
+def test_an_image_noisier_than_the_others_promises_less(times: float) -> None:
+    truth = swing(200)
+    noisy = np.arange(200) % 10 == 3
+    sigmas = np.where(noisy, 0.03 * times, 0.03)[:, None, None]
+    errors = np.random.default_rng(1).standard_normal((200, PEN.n_leds, 2))
+    pixels = centers(truth, 0.0) + sigmas * errors
+
+    fit = fit_poses(CAMERA, PEN, pixels, truth.rotations, truth.translations)
+
+    turns = vector_from_rotation(fit.rotations @ np.swapaxes(truth.rotations, 1, 2))
+    off = np.hstack([turns, fit.translations - truth.translations])
+    squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(fit.covariances), off)
+    # Chi-square of 6: 20 draws fix the mean to 13 %. It may promise too little.
+    assert np.mean(squares[noisy]) < 9
+    assert np.mean(squares[~noisy]) == pytest.approx(6, abs=1.5)
+
+
 def test_the_noise_is_found() -> None:
     truth = swing(200)
     fit = fit_poses(

@@ -83,6 +83,43 @@ def test_images_whose_leds_do_not_fit_are_left_out_with_their_reason() -> None:
     assert result.used.sum() == 59
 
 
+def test_an_image_of_which_half_the_leds_do_not_fit_is_left_out() -> None:
+    pixels = centers(swing(), 0.02)
+    pixels[4, :5] += np.random.default_rng(4).uniform(20, 40, (5, 2))
+    result = calibration(pixels)
+
+    assert result.reasons[4] is Reason.MISFIT
+    assert result.used.sum() == 59
+
+
+def test_a_tip_slightly_off_in_a_smeared_image_is_no_slip() -> None:
+    off = np.zeros((60, 3))
+    off[[5, 15, 25], 0] = [0.1, 0.1, 0.4]
+    truth = swing()
+    moved = replace(truth, translations=truth.translations + off)
+    frames = np.arange(60) + 1
+    given = Centers(frames, centers(moved, 0.02), Path("centers.csv"))
+    smeared = np.isin(np.arange(60), [5, 25, 35])
+    observations = replace(
+        observe_centers(given, CAMERA, PEN), edge_widths=np.where(smeared, 4.0, 2.0)
+    )
+
+    result = calibrate(CAMERA, PEN, observations)
+
+    told = {i: reason for i, reason in enumerate(result.reasons) if reason}
+    assert told == {5: Reason.BLURRED, 15: Reason.SLIPPED, 25: Reason.SLIPPED}
+
+
+def test_the_rms_is_that_in_the_fit_and_of_a_dropped_image_about_its_own_pose() -> None:
+    truth = slip_tip(swing(), np.arange(60) == 7, 2.0, np.random.default_rng(5))
+    result = calibration(centers(truth, 0.02))
+
+    used = np.arange(60) != 7
+    np.testing.assert_array_equal(result.rms[used], result.joint.image_rms)
+    assert result.reasons[7] is Reason.SLIPPED
+    assert result.rms[7] < 0.05  # in the fit it would be 8 px
+
+
 def test_an_led_left_out_in_one_image_is_told() -> None:
     pixels = centers(swing(), 0.02)
     pixels[7, 3] += 2.0

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.geometry import GeometryFit, fit_geometry
@@ -10,6 +11,7 @@ from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid
 from lightpen.simulator.swings import (
+    Swing,
     paper_camera,
     paper_pen,
     perturbed_pen,
@@ -23,14 +25,14 @@ SWING = swing_poses(100, np.random.default_rng(0))
 
 
 def fits(
-    measured: Pen, sigma: float, seed: int
+    measured: Pen, sigma: float, seed: int, swing: Swing = SWING
 ) -> tuple[FloatArray, JointFit, GeometryFit]:
     rng = np.random.default_rng(seed)
     pixels = simulate_centers(
-        CAMERA, PEN, SWING.rotations, SWING.translations, sigma, rng
+        CAMERA, PEN, swing.rotations, swing.translations, sigma, rng
     )
     plain = fit_joint(
-        CAMERA, measured, pixels, SWING.rotations, SWING.tip_pen, SWING.cone_cam
+        CAMERA, measured, pixels, swing.rotations, swing.tip_pen, swing.cone_cam
     )
     return pixels, plain, fit_geometry(CAMERA, measured, pixels, plain)
 
@@ -54,6 +56,31 @@ def test_led_errors_are_found() -> None:
     assert 0.006 < geometry.led_sigma < 0.016
     assert geometry.joint.rms < 0.5 * plain.rms
     assert abs(geometry.joint.sigma - 0.01) < 0.001
+
+
+def test_large_led_errors_do_not_pass_for_image_noise() -> None:
+    measured = perturbed_pen(PEN, 0.1, np.random.default_rng(1))
+    _, plain, geometry = fits(measured, 0.01, 2)
+
+    assert plain.sigma > 0.1
+    # 1400 residuals fix it to 1.9 %.
+    assert geometry.joint.sigma == pytest.approx(0.01, rel=0.08)
+
+
+def test_led_errors_that_hide_in_the_noise_count_all_the_same() -> None:
+    swing = swing_poses(30, np.random.default_rng(0))
+    center = PEN.leds.mean(axis=0)
+    variances = []
+    for seed in range(6):
+        measured = perturbed_pen(PEN, 0.004, np.random.default_rng(100 + seed))
+        geometry = fits(measured, 0.1, seed, swing)[2]
+        if geometry.led_sigma == 0:
+            variances.append(geometry.led_covariance[1, 1])
+
+    assert len(variances) >= 4
+    # They scale the pen, which moves the tip along y.
+    by_scale = 0.004 / np.linalg.norm(PEN.leds - center) * (center - SWING.tip_pen)[1]
+    assert 0.5 * by_scale < np.sqrt(np.mean(variances)) < 2 * by_scale
 
 
 def test_the_tip_no_longer_takes_on_led_errors_and_its_covariance_is_honest() -> None:

@@ -1,6 +1,7 @@
 """The joint fit: exact, at the Cramer-Rao bound, honest, robust."""
 
 import numpy as np
+import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import ContactModel, JointFit, fit_joint
@@ -11,6 +12,7 @@ from lightpen.simulator.swings import (
     drop_centers,
     paper_camera,
     paper_pen,
+    select_frames,
     simulate_centers,
     swing_poses,
 )
@@ -97,6 +99,31 @@ def test_the_scatter_is_at_the_cramer_rao_bound_and_covered_by_the_intervals() -
     assert ((covered > 0.917) & (covered < 0.983)).all()
 
 
+def test_the_noise_is_found_however_few_the_images() -> None:
+    truth = swing(6)
+    variances = []
+    for seed in range(30):
+        rng = np.random.default_rng([seed, 1])
+        pixels = drop_centers(centers(truth, 0.05, seed), 5, rng)
+        variances.append(fit(truth, pixels).sigma ** 2)
+
+    # 30 draws of 36 degrees of freedom fix a variance to 4 %.
+    assert np.mean(variances) == pytest.approx(0.05**2, rel=0.1)
+
+
+def test_the_residuals_of_each_image_add_up_to_those_of_all() -> None:
+    pixels = centers(swing(20), 0.05)
+    pixels[4, 2] += 3.0
+    pixels[11, 2:] = np.nan
+    result = fit(swing(20), pixels)
+
+    assert np.isnan(result.image_rms[11])
+    others = np.delete(np.arange(20), 11)
+    n_used, image_rms = result.used.sum(axis=1)[others], result.image_rms[others]
+    assert np.average(image_rms**2, weights=n_used) == pytest.approx(result.rms**2)
+    assert result.rms == pytest.approx(result.sigma * np.sqrt(2), rel=0.3)
+
+
 def test_missing_leds_are_allowed() -> None:
     truth = swing(40)
     pixels = drop_centers(centers(truth, 0.0), 5, np.random.default_rng(2))
@@ -129,6 +156,21 @@ def test_an_image_without_a_usable_led_does_no_harm() -> None:
     assert not result.used[7].any()
     assert np.isfinite(result.covariance).all()
     assert np.abs(result.tip_pen - truth.tip_pen).max() < 0.01
+
+
+@pytest.mark.parametrize("n_seen", [1, 2])
+def test_an_image_of_one_or_two_leds_takes_no_part(n_seen: int) -> None:
+    truth = swing(40)
+    pixels = centers(truth, 0.05)
+    others = np.delete(np.arange(40), 7)
+    without = fit(select_frames(truth, others), pixels[others])
+    pixels[7, n_seen:] = np.nan
+
+    result = fit(truth, pixels)
+
+    assert not result.used[7].any()
+    assert result.sigma == pytest.approx(without.sigma, rel=1e-9)
+    np.testing.assert_allclose(result.covariance, without.covariance, rtol=1e-6)
 
 
 def test_what_each_image_says_adds_up_to_the_covariance() -> None:

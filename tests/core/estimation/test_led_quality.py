@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lightpen.arrays import FloatArray
 from lightpen.estimation.geometry import fit_geometry
 from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.led_quality import LedQuality, measure_leds
@@ -28,7 +29,10 @@ def quality(measured: Pen, n_missing: int = 0) -> LedQuality:
     pixels = simulate_centers(
         CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
     )
-    pixels = drop_centers(pixels, n_missing, rng)
+    return quality_of(measured, drop_centers(pixels, n_missing, rng))
+
+
+def quality_of(measured: Pen, pixels: FloatArray) -> LedQuality:
     joint = fit_joint(
         CAMERA, measured, pixels, SWING.rotations, SWING.tip_pen, SWING.cone_cam
     )
@@ -51,6 +55,32 @@ def test_a_displaced_led_is_named_with_its_displacement(led: int) -> None:
 
 def test_a_good_pen_has_no_displaced_led() -> None:
     assert quality(perturbed_pen(PEN, 0.01, np.random.default_rng(3))).displaced == ()
+
+
+@pytest.mark.parametrize("n_seen", [1, 5, 40])
+def test_a_displacement_is_told_only_where_the_led_was_often_seen(n_seen: int) -> None:
+    rng = np.random.default_rng(1)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels[n_seen:, 3] = np.nan
+    pixels[:, 3] += 2.0  # half a millimetre
+
+    found = quality_of(PEN, pixels)
+
+    assert found.displaced == ((4,) if n_seen == 40 else ())
+    assert np.isfinite(found.displacement[3]).all() == (n_seen == 40)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_led_that_is_badly_seen_is_not_called_displaced(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    pixels = simulate_centers(
+        CAMERA, PEN, SWING.rotations, SWING.translations, 0.02, rng
+    )
+    pixels[:, 3] += 3.0 * rng.standard_normal((80, 2))
+
+    assert quality_of(PEN, pixels).displaced == ()
 
 
 def test_residuals_and_counts_are_those_of_the_led() -> None:

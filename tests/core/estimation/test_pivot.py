@@ -7,7 +7,7 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.estimation.pivot import fit_pivot, tip_covariances
+from lightpen.estimation.pivot import contact_matrix, fit_pivot, tip_covariances
 from lightpen.formats.observation_files import PoseTable, read_poses
 from lightpen.model.coverage import require_spread
 from lightpen.model.rigid import rotation_from_vector
@@ -88,6 +88,22 @@ def test_the_covariance_agrees_with_the_scatter_of_many_fits() -> None:
     np.testing.assert_allclose(errors.var(axis=0), predicted, rtol=0.25)
 
 
+@pytest.mark.parametrize(("stated", "factor"), [(0.05, 4.0), (0.1, 1.0), (0.2, 1.0)])
+def test_covariances_that_promise_too_much_are_raised_to_the_scatter(
+    stated: float, factor: float
+) -> None:
+    R, t = pivoting_poses(300, noise=0.1)
+    covariances = np.zeros((300, 6, 6))
+    covariances[:, 3:, 3:] = stated**2 * np.eye(3)
+
+    fit = fit_pivot(R, t, covariances)
+
+    A = contact_matrix(R).reshape(-1, 6)
+    promised = stated**2 * np.linalg.inv(A.T @ A)
+    # 900 equations fix a variance to 5 %.
+    np.testing.assert_allclose(fit.covariance, factor * promised, rtol=0.15)
+
+
 def test_the_covariance_of_a_tip_follows_that_of_its_pose() -> None:
     rng = np.random.default_rng(4)
     R, t = pivoting_poses(1)
@@ -136,13 +152,23 @@ def test_a_swing_about_one_axis_is_refused_with_what_is_missing(
     assert advice in str(caught.value)
 
 
-def test_slipped_poses_are_found_by_their_covariances() -> None:
+@pytest.mark.parametrize("slip", [0.09, 0.3])
+def test_slipped_poses_are_found_by_their_covariances(slip: float) -> None:
+    """Chance moves one pose in 100,000 by more than 0.07 mm."""
     swing = swing_poses(100, np.random.default_rng(0))
     slipped = np.arange(100) % 25 == 3
-    t = swing.translations + slipped[:, None] * [0.3, 0.0, 0.0]
+    t = swing.translations + slipped[:, None] * [slip, 0.0, 0.0]
     covariances = np.tile(1e-8 * np.eye(6), (100, 1, 1))
     covariances[:, 3:, 3:] = 1e-4 * np.eye(3)
 
     fit = fit_pivot(swing.rotations, t, covariances)
 
     np.testing.assert_array_equal(~fit.used, slipped)
+
+
+def test_without_covariances_outliers_are_told_by_the_scatter_of_the_rest() -> None:
+    R, t = pivoting_poses(200, noise=0.1)
+    slipped = np.arange(200) % 50 == 7
+    t[slipped] += [1.2, 0.0, 0.0]
+
+    np.testing.assert_array_equal(~fit_pivot(R, t).used, slipped)

@@ -69,6 +69,10 @@ def test_the_record_holds_the_tip_and_its_uncertainty() -> None:
         2 * np.sqrt(np.diag(found["covariance"]))[:3],
     )
     np.testing.assert_allclose(
+        found["cone_expanded_uncertainty_mm"],
+        2 * np.sqrt(np.diag(found["covariance"]))[3:],
+    )
+    np.testing.assert_allclose(
         found["change_from_nominal_mm"], joint.tip_pen - [0, -90, -25]
     )
 
@@ -127,6 +131,20 @@ def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> No
     assert "U =" in rows["Weakest"]
 
 
+@pytest.mark.parametrize("method", ["joint", "two-stage"])
+def test_the_text_shows_the_uncertainty_of_the_cone_under_it(method: str) -> None:
+    found = record(method)
+    lines = iter(calibration_text(calibration(), method, None).splitlines())
+
+    assert any(line.startswith("Cone") for line in lines)
+    shown = [next(lines).split()[-3:], next(lines).split()[-3:]]
+    np.testing.assert_allclose(
+        np.array(shown, dtype=np.float64),
+        [found["cone_cam_mm"], found["cone_expanded_uncertainty_mm"]],
+        atol=5.1e-5,
+    )
+
+
 def test_an_led_that_was_never_found_is_warned_of() -> None:
     (warning,) = record()["warnings"]
 
@@ -153,11 +171,15 @@ def test_large_residuals_are_warned_of() -> None:
 
 def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     swing = swing_poses(30, np.random.default_rng(1))
-    fit = fit_pivot(swing.rotations, swing.translations)
+    noise = 0.1 * np.random.default_rng(2).standard_normal((30, 3))
+    fit = fit_pivot(swing.rotations, swing.translations + noise)
 
     found = json.loads(pivot_json(fit, FILE, least_squares=False))
 
-    np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=1e-6)
+    np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=0.5)
+    uncertainty = 2 * np.sqrt(np.diag(found["covariance"]))
+    np.testing.assert_allclose(found["expanded_uncertainty_mm"], uncertainty[:3])
+    np.testing.assert_allclose(found["pivot_expanded_uncertainty_mm"], uncertainty[3:])
     assert found["poses"] == {"total": 30, "used": 30}
     assert len(found["frames"]) == 30
     assert "30 of 30 used" in pivot_text(fit)

@@ -47,6 +47,7 @@ def test_the_record_starts_from_six_images_and_falls_with_every_step() -> None:
     assert np.all(np.diff(fit.objectives) <= 1e-12 * fit.objectives[0])
     assert len(fit.iterates) == len(fit.objectives) == len(fit.increments) + 1
     assert fit.increments[-1] < 1e-9
+    assert fit.rms == pytest.approx(np.sqrt(3) * 0.05, rel=0.1)
     np.testing.assert_allclose(fit.iterates[-1, :3], fit.tip_pen)
 
 

@@ -48,6 +48,33 @@ def fit(errors: FloatArray, swing: Swing = SWING) -> tuple[FloatArray, GeometryF
     return pixels, GeometryFit(joint, np.zeros_like(PEN.leds), 0.0, np.zeros((6, 6)))
 
 
+def of_images(geometry: GeometryFit, some: slice) -> GeometryFit:
+    """Return what some of the images say about the same solution."""
+    joint = geometry.joint
+    part = replace(
+        joint,
+        rotations=joint.rotations[some],
+        residuals=joint.residuals[some],
+        used=joint.used[some],
+        information=joint.information[some],
+        gradients=joint.gradients[some],
+    )
+    return replace(geometry, joint=part)
+
+
+def test_blocks_of_independent_noise_scatter_as_that_noise_does() -> None:
+    ratios = []
+    for seed in range(10):
+        pixels, geometry = fit(0.05 * noise(seed))
+        for first in range(0, 99, 9):  # three blocks each
+            some = slice(first, first + 9)
+            budget = combine(CAMERA, PEN, pixels[some], of_images(geometry, some))
+            ratios.append(budget.block_ratio)
+
+    # 110 draws of 12 degrees of freedom fix the mean to 4 %.
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+
+
 def test_independent_noise_is_hardly_ever_raised() -> None:
     factors = [
         combine(CAMERA, PEN, *fit(0.05 * noise(seed))).correlation_factor
@@ -153,17 +180,8 @@ def test_a_camera_without_covariance_adds_nothing() -> None:
 
 def test_too_few_images_for_blocks_are_said_so() -> None:
     pixels, geometry = fit(0.01 * noise(4))
-    joint = geometry.joint
-    few = replace(
-        joint,
-        rotations=joint.rotations[:8],
-        residuals=joint.residuals[:8],
-        used=joint.used[:8],
-        information=joint.information[:8],
-        gradients=joint.gradients[:8],
-    )
 
-    budget = combine(CAMERA, PEN, pixels[:8], replace(geometry, joint=few))
+    budget = combine(CAMERA, PEN, pixels[:8], of_images(geometry, slice(8)))
 
     assert budget.blocks is None
     assert budget.correlation_factor == 1

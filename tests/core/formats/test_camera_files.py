@@ -193,7 +193,7 @@ def test_files_of_opencv_give_what_opencv_reads(tmp_path: Path, suffix: str) -> 
 
 @pytest.mark.parametrize("suffix", ["yaml", "xml", "json"])
 def test_single_precision_of_opencv_is_kept(tmp_path: Path, suffix: str) -> None:
-    distortion = np.array([[0.1, 0.2, 1 / 3, 0.4, 0.5]], dtype=np.float32)
+    distortion = np.array([[0.1, 0.2, 1e-3 / 3, 4e-4, 0.5]], dtype=np.float32)
     path = opencv_file(
         tmp_path / f"cam.{suffix}",
         {
@@ -442,6 +442,23 @@ def test_distortion_of_another_model_is_refused(
     assert sentence in refusal(tmp_path, json.dumps(entries))
 
 
+@pytest.mark.parametrize(("k1", "folds"), [(-1.2, False), (-1.3, True), (9.0, False)])
+def test_distortion_that_folds_within_the_image_is_refused(
+    tmp_path: Path, k1: float, folds: bool
+) -> None:
+    """The corner is at 0.346, the image of the fold at 2 / 3 sqrt(-1 / (3 k1))."""
+    entries = {
+        "image_size": [2448, 2048],
+        "K": camera().matrix.tolist(),
+        "D": [k1, 0, 0, 0],
+    }
+    if folds:
+        sentence = "of cam.yaml fold the image of 2448 x 2048 px"
+        assert sentence in refusal(tmp_path, json.dumps(entries))
+    else:
+        assert read_camera(saved(tmp_path, json.dumps(entries))).distortion[0] == k1
+
+
 @pytest.mark.parametrize(
     "text", [OPENCV, ROS, KALIBR, json.dumps(MATLAB)], ids=["1", "2", "3", "4"]
 )
@@ -518,7 +535,7 @@ def test_a_huge_camera_file_is_refused(tmp_path: Path) -> None:
     assert "more than the 4 MB" in refusal(tmp_path, OPENCV + "#" * 5_000_000)
 
 
-finite = st.floats(-1e6, 1e6)
+mild = st.floats(-1e-14, 1e-14)  # at the corner of the widest image r^6 is 5e10
 
 
 @st.composite
@@ -538,7 +555,7 @@ def cameras(draw: st.DrawFn) -> Camera:
         fy=fx * draw(st.floats(0.7, 1.4)),
         cx=draw(st.floats(0, 1)),
         cy=draw(st.floats(0, 1)),
-        distortion=np.array(draw(st.lists(finite, min_size=n, max_size=n))),
+        distortion=np.array(draw(st.lists(mild, min_size=n, max_size=n))),
         covariance=covariance,
         calibrated_on=draw(st.none() | st.dates()),
     )

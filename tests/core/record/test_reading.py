@@ -1,6 +1,7 @@
 """The record of a swing: whole after any crash, refused when damaged otherwise."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -403,6 +404,56 @@ def test_a_write_that_fails_once_leaves_a_journal_to_go_on_with(
     record = open_record(tmp_path / "swing")
     assert record.verdict is None
     assert len(record.images) == 2
+
+
+def test_what_could_not_be_written_is_not_in_the_record(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with RecordWriter.create(tmp_path / "swing", header) as writer:
+        append(writer)
+        monkeypatch.setattr("lightpen.record.writing.os.fsync", fail)
+        with pytest.raises(FileError, match="No space left"):
+            writer.take_out([1], "tip slipped")
+
+    assert open_record(tmp_path / "swing").taken_out == {}
+
+
+def test_a_part_of_a_line_that_a_failing_disk_left_is_written_over(
+    tmp_path: Path, header: Header
+) -> None:
+    with RecordWriter.create(tmp_path / "swing", header) as writer:
+        append(writer)
+        with (tmp_path / "swing" / "journal.jsonl").open("ab") as journal:
+            journal.write(b'{"kind": "ima')
+        append(writer)
+
+    assert len(open_record(tmp_path / "swing").images) == 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs the names of open files")
+def test_names_are_on_the_disk_before_anything_is_acknowledged(
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A synced file is lost all the same where its folder was not synced."""
+    synced: list[Path] = []
+    fsync = os.fsync
+
+    def watched(descriptor: int) -> None:
+        synced.append(Path(f"/proc/self/fd/{descriptor}").readlink())
+        fsync(descriptor)
+
+    monkeypatch.setattr("lightpen.record.writing.os.fsync", watched)
+    folder = tmp_path / "swing"
+    with RecordWriter.create(folder, header) as writer:
+        assert synced[-2:] == [folder, tmp_path]
+        append(writer)
+
+    part, *rest = synced[-3:]
+    assert (part.parent, part.suffix) == (folder / "images", ".part")
+    assert rest == [folder / "images", folder / "journal.jsonl"]
 
 
 def test_the_journal_is_plain_json(tmp_path: Path, header: Header) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import fit_joint
@@ -145,6 +146,38 @@ def test_postures_the_camera_cannot_see_are_left_out() -> None:
     behind = replace(known, pen=replace(PEN, normals=-PEN.normals))
     turned = rotations_of(PEN, np.zeros(1), np.zeros(1), np.zeros(1))
     assert not usable_leds(behind, turned).any()
+
+
+@pytest.mark.parametrize(("axis", "sign"), [(0, 1), (0, -1), (1, 1), (1, -1)])
+def test_leds_cut_by_the_border_are_not_counted_on(axis: int, sign: int) -> None:
+    known = swung((0.0, 0.0, 0.0))
+    leds = PEN.leds @ known.rotations[0].T - known.rotations[0] @ PAPER_TIP + PAPER_CONE
+    pixels, size = CAMERA.project(leds), (CAMERA.width, CAMERA.height)[axis]
+    outermost = int(np.argmax(sign * pixels[:, axis]))
+    radius = CAMERA.fx * PEN.diameter / 2 / leds[outermost, 2]
+    border = size - 0.5 if sign > 0 else -0.5
+    usable = []
+    for room in (0.5 * radius, 1.5 * radius):
+        shift = np.zeros(2)
+        shift[axis] = border - sign * room - pixels[outermost, axis]
+        moved = replace(CAMERA, cx=CAMERA.cx + shift[0], cy=CAMERA.cy + shift[1])
+        usable.append(usable_leds(replace(known, camera=moved), known.rotations)[0])
+
+    assert not usable[0][outermost]
+    assert usable[1].all()
+
+
+def test_a_way_of_which_there_are_images_already_is_worth_nothing() -> None:
+    known, present = swung((10.0, 90.0, 20.0)), rotation(0, 0)
+    first = next_posture(known, present)
+    assert first is not None
+    there = rotation(*np.degrees([first.tilt, first.direction, first.turn]))
+    vector = vector_from_rotation(there @ present.T)
+    steps = rotation_from_vector(np.linspace(0, 1, 13)[1:, None] * vector) @ present
+
+    taken = replace(known, rotations=np.concatenate([known.rotations, steps]))
+
+    assert next_posture(taken, present) != first
 
 
 def test_leds_that_touch_in_the_image_are_not_counted_on() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, sight_centers
@@ -29,10 +30,13 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    Swing,
     paper_camera,
     paper_pen,
     simulate_centers,
+    swing_poses,
 )
+from lightpen.swing.kept_images import kept_before
 from lightpen.swing.rules import (
     Transition,
     advance,
@@ -40,8 +44,10 @@ from lightpen.swing.rules import (
     finish,
     pause,
     resume,
+    start_again,
     stillness,
 )
+from lightpen.swing.seat import Seat
 from lightpen.swing.shortfall import missing
 from lightpen.swing.state import (
     Happening,
@@ -49,6 +55,7 @@ from lightpen.swing.state import (
     Phase,
     SwingEvent,
     SwingSetup,
+    SwingState,
     start_swing,
 )
 
@@ -150,6 +157,50 @@ def capturing(seconds: float = 8.0, sigma: float = 0.05) -> Station:
     station.operator.seat()
     station.run(60.0, until=Phase.CAPTURING)
     return station.run(seconds)
+
+
+POSTURES = swing_poses(60, np.random.default_rng(0))
+
+
+def capturing_from(n_kept: int, sigma: float = 0.05) -> SwingState:
+    """Return a swing that captures and has kept the first so many postures."""
+    setup, some = SwingSetup(paper_camera(), paper_pen()), slice(n_kept)
+    kept = kept_before(
+        *(setup.camera, setup.pen, np.arange(n_kept) + 1),
+        *(centers_of(POSTURES, sigma)[some], POSTURES.rotations[some]),
+        POSTURES.translations[some],
+    )
+    return replace(
+        start_again(setup, kept, n_kept + 1),
+        phase=Phase.CAPTURING,
+        seat=Seat(PAPER_TIP, PAPER_CONE, 1e-4 * np.eye(6)),
+    )
+
+
+def centers_of(swing: Swing, sigma: float) -> FloatArray:
+    rng = np.random.default_rng(1)
+    return simulate_centers(
+        *(paper_camera(), paper_pen(), swing.rotations, swing.translations, sigma, rng)
+    )
+
+
+def shown(
+    state: SwingState, frames: range, *, sigma: float = 0.05, offset: float = 0.0
+) -> Transition:
+    """Return the swing after further postures, 0.1 s apart, the tip off the cone."""
+    moved = replace(
+        POSTURES, translations=POSTURES.translations + np.array([offset, 0.0, 0.0])
+    )
+    setup, pixels = SwingSetup(paper_camera(), paper_pen()), centers_of(moved, sigma)
+    events: tuple[SwingEvent, ...] = ()
+    for i in frames:
+        sighting = sight_centers(
+            *(setup.camera, setup.pen, pixels[i]),
+            *(moved.rotations[i], moved.translations[i]),
+        )
+        transition = advance(setup, state, sighting, state.time + 0.1)
+        state, events = transition.state, (*events, *transition.events)
+    return Transition(state, events)
 
 
 @pytest.fixture(scope="module")
@@ -280,6 +331,17 @@ def test_a_slip_drops_its_own_images_only() -> None:
     assert station.tip_error < 1.5 * station.state.kept.uncertainty
 
 
+def test_a_slip_drops_the_images_before_it_that_were_half_out() -> None:
+    state = shown(capturing_from(40), range(40, 46), offset=0.075).state
+    creeping = set(state.kept.numbers.tolist()) - set(range(1, 41))
+    after = shown(state, range(46, 52), offset=0.5)
+
+    (slip,) = (e for e in after.events if e.what is Happening.SLIPPED)
+    assert set(slip.numbers) <= creeping
+    assert len(slip.numbers) >= 2
+    assert set(range(1, 41)) <= set(after.state.kept.numbers.tolist())
+
+
 def test_a_slip_says_so_once_with_the_number_of_images() -> None:
     station = capturing()
     station.operator.slip(0.3, 2.0)
@@ -387,6 +449,15 @@ def test_too_few_leds_are_said_and_not_kept() -> None:
     station.operator.uncover()
     station.run(1.0)
     assert station.state.message == FOLLOW_ARROW
+
+
+def test_a_noisy_image_is_judged_by_the_others_as_soon_as_there_are_enough() -> None:
+    first = shown(capturing_from(0, 0.3), range(6), sigma=0.3).state
+    assert first.n_kept == 6
+
+    later = shown(capturing_from(20), range(20, 26), sigma=0.3).state
+    assert later.n_kept == 20
+    assert later.n_dropped[Reason.MISFIT] > 0
 
 
 def test_the_users_pause_keeps_nothing_until_the_user_goes_on() -> None:

@@ -181,6 +181,30 @@ def outcomes(
     return Counter(map(outcome, labels, views))
 
 
+def without_led(view: View, led: int) -> View:
+    """Return the view with an LED hidden."""
+    gone = view.spot[led]
+    spots = spots_at(
+        np.delete(view.spots.centers, gone, axis=0),
+        np.delete(view.spots.shapes, gone, axis=0),
+    )
+    spot = view.spot - (view.spot > gone)
+    spot[led] = -1
+    return replace(view, spots=spots, spot=spot)
+
+
+def with_lamp(view: View, beside: tuple[float, float]) -> View:
+    """Return the view with a lamp some px beside the place of the first hidden LED."""
+    led = int(np.flatnonzero(view.spot < 0)[0])
+    leds, normals = PEN.leds @ view.R.T + view.t, PEN.normals @ view.R.T
+    disc = disc_images(CAMERA, leds, normals, PEN.diameter / 2)
+    spots = spots_at(
+        np.vstack([view.spots.centers, disc.centers[led] + beside]),
+        np.concatenate([view.spots.shapes, disc.shapes[led][None]]),
+    )
+    return replace(view, spots=spots)
+
+
 def flawed(spots: Spots, which: int, flaw: Flaw, shift: float = 0.0) -> Spots:
     """Return the spots with one of them flawed, its centre shifted by some px."""
     centers, flaws = spots.centers.copy(), spots.flaws.copy()
@@ -298,17 +322,8 @@ def test_broadened_spots_are_labelled() -> None:
 def test_a_lamp_beside_the_place_of_a_hidden_led_is_not_labelled() -> None:
     rng = np.random.default_rng(33)
     for _ in range(20):
-        view = random_view(rng, n_missing=3)
-        hidden = int(np.flatnonzero(view.spot < 0)[0])
-        discs = disc_images(
-            CAMERA, PEN.leds @ view.R.T + view.t, PEN.normals @ view.R.T, 5.0
-        )
-        lamp = discs.centers[hidden] + np.array([1.5, -1.0])
-        spots = spots_at(
-            np.concatenate([view.spots.centers, lamp[None]]),
-            np.concatenate([view.spots.shapes, discs.shapes[hidden][None]]),
-        )
-        label = label_spots(spots, CAMERA, PEN)
+        view = with_lamp(random_view(rng, n_missing=3), (1.5, -1.0))
+        label = label_spots(view.spots, CAMERA, PEN)
         assert label.reason is LabelStatus.LABELLED
         np.testing.assert_array_equal(label.spot, view.spot)
 
@@ -346,6 +361,22 @@ def test_too_many_hidden_leds_are_not_made_up_for_by_lamps() -> None:
 
     found = outcomes(make, PEN, 30, seed=42)
     assert set(found) <= {str(LabelStatus.NO_FIT), str(LabelStatus.TOO_FEW)}
+
+
+def test_a_lamp_near_the_place_of_a_hidden_led_does_not_make_up_for_it() -> None:
+    """With five LEDs and one lamp in their pattern, further lamps are a warning."""
+
+    def make(rng: np.random.Generator) -> View:
+        return with_lamp(random_view(rng, PEN, 5, 3), (0.8, -0.6))
+
+    assert outcomes(make, PEN, 8, seed=44) == {str(LabelStatus.NO_FIT): 8}
+
+
+def test_four_leds_that_chance_would_find_among_lamps_are_refused() -> None:
+    found = outcomes(
+        lambda rng: random_view(rng, FOUR_LED_PEN, 0, 16), FOUR_LED_PEN, 4, seed=45
+    )
+    assert found == {str(LabelStatus.NO_FIT): 4}
 
 
 def test_the_spots_of_another_pen_are_refused() -> None:
@@ -463,6 +494,15 @@ def test_an_led_that_is_always_beside_its_place_keeps_its_label() -> None:
     for label, view in zip(labels, views, strict=True):
         np.testing.assert_array_equal(label.spot, view.spot)
         assert label.rms_px < 0.2
+
+
+def test_an_led_that_is_beside_its_place_in_some_images_is_not_displaced() -> None:
+    rng = np.random.default_rng(71)
+    views = [random_view(rng) for _ in range(12)]
+    views[:5] = [with_lamp(without_led(view, 6), (3.0, -2.0)) for view in views[:5]]
+    labels = label_images([view.spots for view in views], CAMERA, PEN)
+    for label, view in zip(labels, views, strict=True):
+        np.testing.assert_array_equal(label.spot, view.spot)
 
 
 # Tracking
