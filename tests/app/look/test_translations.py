@@ -111,6 +111,17 @@ def formatted_texts(source: str) -> list[str]:
     ]
 
 
+def plain_errors(source: str) -> list[str]:
+    """Errors that are turned into words without a language."""
+    return [
+        ast.unparse(node)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) == "str"
+        and any(ast.unparse(argument) == "error" for argument in node.args)
+    ]
+
+
 def test_every_text_is_translated(tmp_path: Path) -> None:
     """The texts are collected anew, so that one added since is found as well."""
     fresh = tmp_path / CHINESE.name
@@ -141,11 +152,13 @@ def test_no_text_reaches_the_screen_untranslatable() -> None:
         source = path.read_text("utf-8")
         assert bare_texts(source) == [], path.name
         assert formatted_texts(source) == [], path.name
+        assert plain_errors(source) == [], path.name
 
 
 def test_an_untranslatable_text_is_noticed() -> None:
     assert bare_texts("label.setText('Hello')") == ["setText('Hello')"]
     assert formatted_texts("self.tr(f'{n} images')") == ["self.tr(f'{n} images')"]
+    assert plain_errors("show_notice(str(error))") == ["str(error)"]
 
 
 @pytest.mark.parametrize("ts_file", sorted(TRANSLATIONS.glob("*.ts")), ids=str)
