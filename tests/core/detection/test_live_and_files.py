@@ -239,10 +239,10 @@ def test_hard_images_show_the_same_live_and_on_files() -> None:
     disturbances = replace(HARD, blurred_away=0.1, empty=0.1)
     scene = Scene(n_images=20, seed=3, disturbances=disturbances)
     plan = plan_scene(scene)
-    images = [render_plan(scene, shot) for shot in plan.shots]
+    images = [render_plan(scene, shot) for shot in plan.image_plans]
     files = on_files(images)
     assert len(set(files.reasons)) > 2
-    for i, (image, shot) in enumerate(zip(images, plan.shots, strict=True)):
+    for i, (image, shot) in enumerate(zip(images, plan.image_plans, strict=True)):
         live = look(image, CAMERA, PEN)
         assert_alike(live, files, i)
         tracked = look(image, CAMERA, PEN, before=turned(shot, PEN))
