@@ -254,16 +254,24 @@ def _triple_misfit(
     R_t = np.swapaxes(R, 1, 2)
     centers = pen.leds[leds] @ R_t + t[:, None]
     normals = pen.normals[leds] @ R_t
-    predicted = disc_images(sight.pinhole, centers, normals, pen.radius).shapes
-    measured = sight.shapes[image[:, None], triple]
+    towards = -np.einsum("hki,hki->hk", normals, centers)
+    facing = (towards > MIN_FACING * np.linalg.norm(centers, axis=-1)).all(axis=1)
+    misfit = np.full(len(image), np.inf)
+    misfit[facing] = _shape_misfit(
+        disc_images(sight.pinhole, centers[facing], normals[facing], pen.radius).shapes,
+        sight.shapes[image[facing, None], triple[facing]],
+    )
+    return misfit
+
+
+def _shape_misfit(predicted: FloatArray, measured: FloatArray) -> FloatArray:
+    """Return how unlike shapes (H, 3, 2, 2) are, each three alike to scale, (H,)."""
     size = np.maximum(np.einsum("hkii->hk", predicted), TINY)
     scale = (np.einsum("hkii->hk", measured) / size).mean(axis=1)
     difference = measured / scale[:, None, None, None] - predicted
     squares = np.einsum("hkij,hkij->hk", difference, difference) / size**2
-    towards = -np.einsum("hki,hki->hk", normals, centers)
-    facing = (towards > MIN_FACING * np.linalg.norm(centers, axis=-1)).all(axis=1)
     low, high = AREA_RANGE
-    right = facing & (scale > 0.8 * low) & (scale < 1.2 * high)
+    right = (scale > 0.8 * low) & (scale < 1.2 * high)
     return np.where(right, np.sqrt(squares.mean(axis=1)), np.inf)
 
 
