@@ -18,6 +18,7 @@ from lightpen.simulator.swings import (
     drop_centers,
     paper_camera,
     paper_pen,
+    select_frames,
     simulate_centers,
     swap_centers,
     swing_poses,
@@ -158,9 +159,16 @@ def test_the_noise_is_found() -> None:
     assert fit.sigma == pytest.approx(0.05, rel=0.06)
 
 
-def test_one_wrong_led_does_not_move_the_pose() -> None:
-    truth = swing(60)
-    pixels = displace_centers(centers(truth, 0.02), 1.0, 40.0, np.random.default_rng(5))
+@pytest.mark.parametrize("distance", [40.0, 600.0])
+def test_one_wrong_led_does_not_move_the_pose(distance: float) -> None:
+    every = swing(60)
+    spoilt = displace_centers(
+        centers(every, 0.02), 1.0, distance, np.random.default_rng(5)
+    )
+    # A start that one LED has put behind the camera is none.
+    started = np.isfinite(start_poses(CAMERA, PEN, spoilt)[1][:, 0])
+    assert started.sum() > 50
+    truth, pixels = select_frames(every, np.flatnonzero(started)), spoilt[started]
 
     fit = fit_poses(CAMERA, PEN, pixels, *start_poses(CAMERA, PEN, pixels))
 
@@ -177,6 +185,17 @@ def test_a_pose_spoilt_by_exchanged_leds_distrusts_most_of_them() -> None:
     wrong = np.abs(fit.translations - truth.translations).max(axis=1) > 0.5
     assert wrong.mean() < 0.06
     assert ((fit.weights[wrong] > 0.2).sum(axis=1) <= 5).all()
+
+
+def test_no_pose_starts_behind_the_camera() -> None:
+    anything = np.random.default_rng(0).uniform(0, 2000, (40, PEN.n_leds, 2))
+
+    rotations, translations = start_poses(CAMERA, PEN, anything)
+
+    none = np.isnan(translations[:, 0])
+    assert 0 < none.sum() < 40
+    assert np.isnan(rotations[none]).all()
+    assert (translations[~none, 2] > 0).all()
 
 
 def test_an_image_with_three_leds_is_a_mistake_of_the_caller() -> None:

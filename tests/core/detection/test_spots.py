@@ -202,6 +202,11 @@ def test_a_disc_that_is_brighter_on_one_side_keeps_its_center(
     assert center_rms(spots, shaded) < limit
 
 
+def test_a_disc_that_is_brighter_on_one_side_keeps_its_center_before_grey() -> None:
+    shaded = grid_of_lamps(level=80.0, shading=0.12)
+    assert center_rms(detect_spots(expose(render(shaded) + 80.0)), shaded) < 0.02
+
+
 @pytest.mark.parametrize(
     ("full_scale", "level"), [(4095, 3000.0), (4095, 400.0), (65535, 50_000.0)]
 )

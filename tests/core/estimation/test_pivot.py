@@ -166,6 +166,16 @@ def test_slipped_poses_are_found_by_their_covariances(slip: float) -> None:
     np.testing.assert_array_equal(~fit.used, slipped)
 
 
+def test_a_slipped_pose_is_found_among_seven() -> None:
+    covariances = np.tile(1e-8 * np.eye(6), (7, 1, 1))
+    covariances[:, 3:, 3:] = 0.05**2 * np.eye(3)
+    for seed in range(60):
+        R, t = pivoting_poses(7, noise=0.05, seed=seed)
+        t[3] += [1.0, 0.0, 0.0]
+        used = fit_pivot(R, t, covariances).used
+        np.testing.assert_array_equal(np.flatnonzero(~used), [3])
+
+
 def test_without_covariances_outliers_are_told_by_the_scatter_of_the_rest() -> None:
     R, t = pivoting_poses(200, noise=0.1)
     slipped = np.arange(200) % 50 == 7

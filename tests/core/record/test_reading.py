@@ -115,6 +115,7 @@ def test_the_record_brings_its_own_camera_and_pen(
     assert found.camera.fx == paper_camera().fx
     np.testing.assert_array_equal(found.pen.leds, paper_pen().leds)
     np.testing.assert_array_equal(found.pen.nominal_tip, header.nominal_tip)
+    np.testing.assert_array_equal(found.mask, header.mask)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
@@ -289,6 +290,19 @@ def test_an_image_changed_later_is_not_used(tmp_path: Path, header: Header) -> N
     first()
     with pytest.raises(FileError, match=r"000002\.png is not as it was recorded"):
         second()
+
+
+def test_an_image_whose_line_was_removed_lends_its_number_to_no_other(
+    tmp_path: Path, header: Header
+) -> None:
+    folder = recorded(tmp_path / "swing", header, 3)
+    journal = folder / "journal.jsonl"
+    first, _, third = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(first + third)
+
+    with RecordWriter.resume(open_record(folder)) as writer:
+        assert append(writer) == 4
+    assert open_record(folder).numbers.tolist() == [1, 3, 4]
 
 
 def test_a_changed_camera_copy_is_refused(tmp_path: Path, header: Header) -> None:

@@ -167,6 +167,13 @@ def test_leds_cut_by_the_border_are_not_counted_on(axis: int, sign: int) -> None
     assert usable[1].all()
 
 
+@pytest.mark.parametrize(("turn", "counted_on"), [(60.0, True), (80.0, False)])
+def test_leds_seen_too_flat_are_not_counted_on(turn: float, counted_on: bool) -> None:
+    alone = replace(PEN, leds=PEN.leds[:1], normals=PEN.normals[:1])
+    known = replace(swung((0.0, 0.0, turn)), pen=alone)
+    assert usable_leds(known, known.rotations)[0, 0] == counted_on
+
+
 def test_a_way_of_which_there_are_images_already_is_worth_nothing() -> None:
     known, present = swung((10.0, 90.0, 20.0)), rotation(0, 0)
     first = next_posture(known, present)

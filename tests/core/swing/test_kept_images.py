@@ -90,6 +90,24 @@ def test_images_from_before_a_slip_need_not_be_far_out() -> None:
     assert suspected <= {39, 40}
 
 
+def test_the_uncertainty_is_that_of_the_direction_known_least() -> None:
+    kept = grown(swing_poses(20, np.random.default_rng(0)))
+    assert kept.joint is not None
+
+    along_axes = 2 * np.sqrt(np.diag(kept.joint.covariance)[:3])
+    assert along_axes.max() <= kept.uncertainty < np.linalg.norm(along_axes)
+
+
+def test_images_from_before_an_interruption_are_from_before_any_slip() -> None:
+    swing = slipping([38, 39], 0.06)
+    kept = kept_before(
+        *(CAMERA, PEN, np.arange(40), centers(swing)),
+        *(swing.rotations, swing.translations),
+    )
+    sure = without_slipped(CAMERA, PEN, kept)[1]
+    assert without_slipped(CAMERA, PEN, kept, since=-1e9)[1] == sure
+
+
 def test_an_image_that_the_fit_leaves_out_has_the_misfit_of_all_its_leds() -> None:
     kept = grown(slipping([], 0.0))
     assert kept.joint is not None

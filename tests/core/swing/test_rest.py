@@ -88,6 +88,15 @@ def test_images_out_of_the_seat_are_told_from_those_in_it() -> None:
     assert offset(moved) == pytest.approx(3.0, abs=0.3)
 
 
+def test_one_bad_image_does_not_tell_where_the_tip_is() -> None:
+    state = state_after(STILL, seat=True)
+    moves = STILL.copy()
+    moves[12] = [0.0, 3.0, 0.0]
+    jumping = replace(state_after(moves), seat=state.seat)
+
+    assert offset(jumping, 1.0) < 0.3
+
+
 def test_without_a_seat_nothing_is_in_place() -> None:
     state = state_after(STILL)
     assert not in_place(state, state.recent).any()

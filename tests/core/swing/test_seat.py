@@ -64,6 +64,35 @@ def test_a_tip_in_the_cone_is_near_and_a_slipped_one_far() -> None:
     assert np.delete(distances, slice(None, None, 10)).max() < 5.1
 
 
+def test_a_tip_in_a_cone_that_is_hardly_known_yet_is_not_called_far() -> None:
+    still = second(np.random.default_rng(1), 0.2)
+    seat = fit_seat(PEN, still.rotations, still.translations, still.covariances)
+    leaning = second(np.random.default_rng(2), 40.0)
+
+    distances = tip_distances(
+        seat, leaning.rotations, leaning.translations, leaning.covariances
+    )
+
+    offsets = tip_offsets(seat, leaning.rotations, leaning.translations)
+    assert np.linalg.norm(offsets, axis=1).max() > 0.3  # mm
+    assert distances.max() < 5.1
+
+
+def test_micrometres_of_play_are_no_slip_however_good_the_images() -> None:
+    poses = second(np.random.default_rng(1), 40.0, 60)
+    seat = replace(
+        fit_seat(PEN, poses.rotations, poses.translations, poses.covariances),
+        tip_pen=PAPER_TIP,
+        cone_cam=PAPER_CONE + np.array([0.02, 0.0, 0.0]),
+        covariance=1e-12 * np.eye(6),
+    )
+    exact = PAPER_CONE - poses.rotations @ PAPER_TIP
+
+    distances = tip_distances(seat, poses.rotations, exact, 1e-6 * poses.covariances)
+
+    np.testing.assert_allclose(distances, 2.0, rtol=0.01)
+
+
 def test_offsets_are_where_the_tip_is_from_the_cone() -> None:
     poses = second(np.random.default_rng(2), 40.0, 60)
     seat = fit_seat(PEN, poses.rotations, poses.translations, poses.covariances)

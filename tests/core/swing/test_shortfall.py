@@ -7,7 +7,7 @@ import numpy as np
 from lightpen.detection.sighting import sight_centers
 from lightpen.messages import SIDES, Code
 from lightpen.model.limits import SwingLimits
-from lightpen.model.posture import rotations_of
+from lightpen.model.posture import Posture, rotations_of
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     Swing,
@@ -20,6 +20,7 @@ from lightpen.simulator.swings import (
 from lightpen.swing.kept_images import kept_before
 from lightpen.swing.shortfall import (
     N_MORE,
+    guided,
     limits_for_more,
     measure_shortfall,
     missing,
@@ -102,6 +103,35 @@ def test_a_swing_that_is_done_can_go_on() -> None:
 
     assert measure_shortfall(setup, state).is_none
     assert measure_shortfall(more, state).n_more == N_MORE
+
+
+def test_images_that_fields_lack_are_missing_though_the_number_suffices() -> None:
+    limits = SwingLimits(max_uncertainty=1.0, min_images=60)
+    setup = SwingSetup(CAMERA, PEN, limits)
+    short = measure_shortfall(setup, state_of(setup, to_the_right(120)))
+
+    assert short.n_images == short.fields.sum() > 0
+    assert not short.is_none
+
+
+def test_a_target_out_of_reach_is_chosen_anew_after_a_while() -> None:
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=1.0))
+    target = Posture(0.4, 1.0, 1.5)
+    state = replace(
+        state_of(setup, to_the_right(120)),
+        heading=0.0,
+        target=target,
+        target_since=10.0,
+    )
+    pose = state.kept.rotations[-1], state.kept.translations[-1]
+    sighting = sight_centers(CAMERA, PEN, state.kept.pixels[-1], *pose)
+
+    soon = guided(setup, replace(state, time=13.9), sighting)
+    late = guided(setup, replace(state, time=14.0), sighting)
+
+    assert soon.target is target
+    assert late.target != target
+    assert late.target_since == 14.0
 
 
 def test_the_range_of_turns_holds_each_posture_that_was_kept() -> None:
