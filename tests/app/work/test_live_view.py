@@ -1,8 +1,9 @@
-"""The GUI sees the newest image, every event, and nothing of a closed camera."""
+"""The GUI sees the newest image and nothing of a closed camera."""
 
+import shutil
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,38 +14,23 @@ from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
-from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import Connection
-from lightpen.detection.sighting import look
-from lightpen.live.looking import Swinging
-from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import open_record
-from lightpen.record.writing import RecordWriter, encode_png
+from lightpen.record.writing import encode_png
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
-from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import Preparation
-from lightpen.swing.rules import advance
-from lightpen.swing.state import (
-    Happening,
-    Pause,
-    Phase,
-    SwingEvent,
-    SwingSetup,
-    SwingState,
-    start_swing,
-)
+from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_view import LiveView, Shown
+from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
 TIMEOUT = 20.0  # s until a test gives up
 SIGNALS = (
-    *("image_shown", "swing_changed", "happened", "swing_left"),
-    *("connection_changed", "settings_applied", "troubled", "failed"),
+    *("image_shown", "connection_changed", "settings_applied", "troubled", "failed"),
 )
-ENDLESS = SwingLimits(max_uncertainty=1e-9)
+N_IMAGES = 20  # of the record that is resumed
 
 
 class Diary:
@@ -63,10 +49,18 @@ class Diary:
 
 
 @pytest.fixture
-def view() -> Iterator[LiveView]:
-    view = LiveView()
+def run(tmp_path: Path, qapp: QApplication) -> Iterator[SwingRun]:
+    run = SwingRun(tmp_path / "run", lambda: datetime.now().astimezone())
+    yield run
+    run.runner.shut_down()
+    assert run.runner.await_end(TIMEOUT)
+    QApplication.processEvents()
+
+
+@pytest.fixture
+def view(run: SwingRun) -> Iterator[LiveView]:
+    view = LiveView(run)
     yield view
-    view.abandon()
     view.close()
     view.await_closed()
 
@@ -76,49 +70,22 @@ def diary(view: LiveView) -> Diary:
     return Diary(view)
 
 
-@pytest.fixture(scope="session")
-def seated(small_scene: Scene) -> SwingState:
-    """A swing whose tip was found at rest, before the first image is kept."""
-    setup = SwingSetup(small_scene.camera, small_scene.pen, ENDLESS)
-    clock = SkippingClock()
-    camera = SimulatedCamera(small_scene, clock, Operator(clock, seated=True))
-    camera.open()
-    camera.start()
-    state = before = start_swing(setup)
-    while state.phase is not Phase.CAPTURING:
-        before = state
-        sighting = look(camera.read(1.0).image, setup.camera, setup.pen)
-        state = advance(setup, state, sighting, clock.now_ns() * 1e-9).state
-    camera.close()
-    return replace(before, phase=Phase.CAPTURING, recent=(), still_since=None)
-
-
 @pytest.fixture
 def stage(
-    view: LiveView,
-    workbench: Workbench,
-    tmp_path: Path,
-    seated: SwingState,
-    qtbot: QtBot,
+    view: LiveView, workbench: Workbench, tmp_path: Path, qtbot: QtBot
 ) -> "Stage":
-    return Stage(view, workbench, tmp_path, seated, qtbot)
+    return Stage(view, workbench, tmp_path, qtbot)
 
 
 class Stage:
     """The simulated pen before a live view."""
 
     def __init__(
-        self,
-        view: LiveView,
-        workbench: Workbench,
-        folder: Path,
-        seated: SwingState,
-        qtbot: QtBot,
+        self, view: LiveView, workbench: Workbench, folder: Path, qtbot: QtBot
     ) -> None:
-        self.view, self.folder, self.seated = view, folder, seated
-        self.preparation: Preparation = replace(workbench.preparation, limits=ENDLESS)
+        self.view, self.folder, self.qtbot = view, folder, qtbot
+        self.preparation = workbench.preparation
         self.around = workbench.around
-        self.qtbot = qtbot
 
     def open(self, camera: SimulatedCamera | ReplayCamera | None = None) -> None:
         """Show a camera; a simulated operator follows the swing."""
@@ -129,22 +96,6 @@ class Stage:
         clock = self.around.clock
         operator = Operator(clock, seated=True)
         return SimulatedCamera(self.around.scene, clock, operator)
-
-    def swinging(self, name: str = "swing") -> Swinging:
-        """Return a swing with a record of its own; the tip is in the cone by now."""
-        setup = self.preparation.swing_setup()
-        writer = RecordWriter.create(self.folder / name, self.preparation.header())
-        now = self.around.clock.now_ns() * 1e-9
-        state = replace(self.seated, since=now, time=now, last_seen=now)
-        return Swinging(setup, writer, state)
-
-    def n_recorded(self, name: str = "swing") -> int:
-        return len(open_record(self.folder / name).images)
-
-    def wait_until_recorded(self, n_images: int, name: str = "swing") -> None:
-        self.qtbot.waitUntil(
-            lambda: self.n_recorded(name) >= n_images, timeout=int(TIMEOUT * 1000)
-        )
 
     def hold_up(self, n_images: int) -> None:
         """Let the GUI do nothing while so many images come."""
@@ -185,18 +136,32 @@ def test_an_image_is_shown_at_half_its_size_with_what_is_seen_in_it(
 
 
 def test_a_gui_that_was_busy_is_shown_the_newest_image_only(
-    view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
+    *,
+    run: SwingRun,
+    view: LiveView,
+    stage: Stage,
+    diary: Diary,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    looked_at: list[int] = []
+    take = run.runner.take
+
+    def note_and_take(frame: Frame, *seen: Any) -> None:
+        looked_at.append(frame.seq)
+        take(frame, *seen)
+
+    monkeypatch.setattr(run.runner, "take", note_and_take)
     with qtbot.waitSignal(view.image_shown):
         stage.open()
-    before = view.stats.delivered
-    n_shown = len(diary.of("image_shown"))
-    stage.hold_up(12)
+    n_shown, n_before = len(diary.of("image_shown")), len(looked_at)
+    stage.hold_up_until(lambda: len(looked_at) >= n_before + 6)
+    newest = looked_at[-2]  # the last may not be there yet
     QApplication.processEvents()
     new = diary.of("image_shown")[n_shown:]
 
     assert len(new) <= 2
-    assert new[0].seen.frame.seq >= before + 8
+    assert new[0].seen.frame.seq >= newest
 
 
 def test_the_connection_is_told_as_it_changes(
@@ -337,9 +302,9 @@ def test_cameras_that_were_closed_leave_nothing_behind(
 def test_closing_what_is_not_open_does_no_harm(view: LiveView, diary: Diary) -> None:
     view.close()
     view.await_closed()
-    for wish in (view.pause, view.resume, view.finish, view.abandon):
-        wish()
     view.set_exposure(1.0)
+    view.set_gain(1.0)
+    view.set_following(True)
 
     assert diary.entries == []
 
@@ -347,155 +312,79 @@ def test_closing_what_is_not_open_does_no_harm(view: LiveView, diary: Diary) -> 
 # A swing
 
 
-def test_every_event_comes_in_order_and_before_its_state(
-    view: LiveView, stage: Stage, diary: Diary
+@pytest.fixture
+def interrupted(run: SwingRun, swung: Callable[..., Path]) -> Path:
+    """An interrupted swing among the records of the run."""
+    folder = run.records_folder / "interrupted"
+    shutil.copytree(swung(), folder)
+    return folder
+
+
+def n_kept(run: SwingRun) -> int:
+    state = run.runner.status.state
+    return 0 if state is None else state.n_kept
+
+
+def test_a_swing_is_captured_though_the_gui_is_busy(
+    run: SwingRun, stage: Stage, interrupted: Path
+) -> None:
+    run.runner.go_on(read_resumable(interrupted))
+    stage.open()
+    stage.hold_up_until(lambda: n_kept(run) > N_IMAGES + 2)
+
+    assert len(open_record(interrupted).images) >= N_IMAGES + 2
+
+
+def test_a_swing_goes_on_when_its_camera_is_closed_and_another_is_opened(
+    run: SwingRun, view: LiveView, stage: Stage, interrupted: Path
 ) -> None:
     stage.open()
-    view.swing(stage.swinging())
-    stage.wait_until_recorded(2)
-    n_before = stage.n_recorded()
-    stage.hold_up_until(lambda: stage.n_recorded() >= n_before + 3)
-    stage.wait_until_recorded(n_before + 4)
-    view.finish()
-    stage.qtbot.waitUntil(lambda: last_state(diary).phase is Phase.SOLVING)
-    kept = [e.numbers[0] for e in diary.of("happened") if e.what is Happening.KEPT]
-    n_recorded = stage.n_recorded()
-
-    assert kept == list(range(1, n_recorded + 1))
-    n_told = 0
-    for name, what in diary.entries:
-        if name == "happened" and what.what is Happening.KEPT:
-            n_told += 1
-        if name == "swing_changed":
-            assert what.n_kept == n_told
-
-
-def last_state(diary: Diary) -> SwingState:
-    state: SwingState = diary.of("swing_changed")[-1]
-    return state
-
-
-def test_nothing_is_told_of_a_swing_once_another_began(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    stage.open()
-    view.swing(stage.swinging())
-    stage.wait_until_recorded(2)
-    view.finish()
-    stage.hold_up(10)  # its end is on its way
-    view.swing(stage.swinging("other"))
-    n_told = len(diary.entries)
-    stage.wait_until_recorded(1, "other")
-    states = [what for name, what in diary.entries[n_told:] if name == "swing_changed"]
-
-    assert states[0].n_kept == 0
-    assert Phase.SOLVING not in {state.phase for state in states}
-
-
-def test_nothing_is_told_of_an_abandoned_swing(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    stage.open()
-    view.swing(stage.swinging())
-    stage.wait_until_recorded(2)
-    stage.hold_up_until(lambda: stage.n_recorded() >= 4)
-    view.abandon()
-    n_told = len(diary.of("swing_changed")), len(diary.of("happened"))
-    stage.hold_up(10)
-    QApplication.processEvents()
-
-    assert (len(diary.of("swing_changed")), len(diary.of("happened"))) == n_told
-    assert open_record(stage.folder / "swing").verdict is None
-
-
-def test_a_swing_waits_for_a_camera(
-    view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
-) -> None:
-    view.swing(stage.swinging())
-    view.pause()
-    assert last_state(diary).pause is Pause.BY_USER
-    view.resume()
-    assert last_state(diary).phase is Phase.WAIT
-    stage.open()
-    stage.wait_until_recorded(1)
-
-
-def test_a_swing_that_waits_for_a_camera_can_be_finished(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    swinging = stage.swinging()
-    view.swing(swinging)
-    view.finish()
-
-    assert diary.of("happened") == [SwingEvent(Happening.CAPTURED)]
-    assert last_state(diary).phase is Phase.SOLVING
-    with pytest.raises(ValueError, match="closed file"):
-        swinging.writer.conclude("pass")
-
-
-def test_a_swing_that_waits_for_a_camera_can_be_abandoned(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    swinging = stage.swinging()
-    view.swing(swinging)
-    view.abandon()
-    stage.open()
-    stage.hold_up(5)
-    QApplication.processEvents()
-
-    assert diary.of("swing_changed") == []
-    with pytest.raises(ValueError, match="closed file"):
-        swinging.writer.conclude("pass")
-
-
-def test_what_is_to_be_done_afterwards_is_done_without_a_camera_too(
-    view: LiveView, stage: Stage
-) -> None:
-    done = threading.Event()
-    view.abandon(done.set)
-
-    assert done.is_set()
-
-
-def test_a_swing_is_left_when_its_camera_is_closed(
-    view: LiveView, stage: Stage, diary: Diary, qtbot: QtBot
-) -> None:
-    stage.open()
-    swinging = stage.swinging()
-    view.swing(swinging)
-    stage.wait_until_recorded(3)
-    with qtbot.waitSignal(view.swing_left) as left:
-        view.close()
-    assert left.args is not None
-    (found,) = left.args
-
-    assert found.setup is swinging.setup
-    assert found.state.n_kept == stage.n_recorded()
-    with pytest.raises(ValueError, match="closed file"):
-        swinging.writer.conclude("pass")
-
-
-def test_a_wish_between_two_cameras_is_not_for_a_swing_that_begins_then(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    stage.open()
-    view.swing(stage.swinging())
-    stage.wait_until_recorded(1)
-    stage.open()
-    view.finish()
-    view.swing(stage.swinging("other"))
-    stage.wait_until_recorded(2, "other")
-
-    assert Phase.SOLVING not in {s.phase for s in diary.of("swing_changed")}
-
-
-def test_a_swing_that_is_finished_is_not_left(
-    view: LiveView, stage: Stage, diary: Diary
-) -> None:
-    stage.open()
-    view.swing(stage.swinging())
-    view.finish()
-    stage.qtbot.waitUntil(lambda: len(diary.of("happened")) > 0)
+    run.runner.go_on(read_resumable(interrupted))
+    stage.hold_up_until(lambda: n_kept(run) > N_IMAGES)
     stage.close()
+    before = n_kept(run)
+    assert run.runner.status.is_capturing
+    stage.open()
+    stage.hold_up_until(lambda: n_kept(run) > before)
+    numbers = [image.number for image in open_record(interrupted).images]
 
-    assert diary.of("swing_left") == []
+    assert numbers == list(range(1, len(numbers) + 1))
+
+
+@pytest.mark.parametrize("wish", ["pause", "finish"])
+def test_what_is_wished_for_between_two_cameras_is_done(
+    run: SwingRun, stage: Stage, interrupted: Path, wish: str
+) -> None:
+    stage.open()
+    run.runner.go_on(read_resumable(interrupted))
+    stage.close()
+    getattr(run.runner, wish)()
+    stage.open()
+    stage.hold_up_until(
+        lambda: (
+            run.runner.status.is_paused_by_user or not run.runner.status.is_capturing
+        )
+    )
+
+
+def test_the_operator_follows_the_swing_until_his_camera_is_closed(
+    run: SwingRun, view: LiveView, stage: Stage
+) -> None:
+    assert run.follower is None
+    stage.open()
+    assert run.follower is not None
+    view.set_following(False)
+    assert run.follower is None
+
+    view.set_following(True)
+    stage.close()
+    assert run.follower is None
+
+
+def test_nobody_follows_before_a_recording(
+    run: SwingRun, stage: Stage, tmp_path: Path
+) -> None:
+    stage.open()
+    stage.open(ReplayCamera(str(tmp_path), loops=True, clock=stage.around.clock))
+
+    assert run.follower is None
