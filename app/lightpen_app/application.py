@@ -19,7 +19,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen.errors import LightpenError, UsageError
-from lightpen.estimation.report import calibration_text
+from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
 from lightpen_app.crash import CrashHook
@@ -216,6 +216,7 @@ def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> 
 
 
 def _print_tip(run: SwingRun) -> None:
-    if run.solution is not None:
+    if run.solution is not None and run.verdict is not None:
         nominal = run.solution.source.pen.nominal_tip
-        print("\n" + calibration_text(run.solution.calibration, "joint", nominal))
+        calibration = run.solution.calibration
+        print("\n" + calibration_text(calibration, "joint", nominal, run.verdict))
