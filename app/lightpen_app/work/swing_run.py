@@ -14,9 +14,11 @@ from lightpen.estimation.verdict import Grade, Verdict, judge
 from lightpen.live.looking import Swinging
 from lightpen.messages import no_tip
 from lightpen.model.limits import SwingLimits
+from lightpen.record.acceptance import accept
+from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.names import Names, new_folder
 from lightpen.record.reading import open_record, recorded_limits, recorded_names
-from lightpen.record.results import Result, store_result
+from lightpen.record.results import Result
 from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.unfinished import (
     discard_swing,
@@ -36,8 +38,6 @@ from lightpen.swing.state import (
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import LiveView
-
-RECORDS, RESULTS = "records", "results"
 
 
 class SwingRun(QObject):
@@ -75,6 +75,7 @@ class SwingRun(QObject):
         super().__init__(parent)
         self._live = live
         self._folder = folder
+        self._archive = FolderArchive(folder)
         self._setup: SwingSetup | None = None
         self._state: SwingState | None = None
         self._record_folder: Path | None = None
@@ -148,9 +149,9 @@ class SwingRun(QObject):
         return state is not None and state.phase not in (Phase.SOLVING, Phase.VERDICT)
 
     @property
-    def results_folder(self) -> Path:
+    def archive(self) -> FolderArchive:
         """Where accepted results are kept."""
-        return self._folder / RESULTS
+        return self._archive
 
     @property
     def records_folder(self) -> Path:
@@ -269,27 +270,9 @@ class SwingRun(QObject):
         FileError
             It cannot be stored; the tip before stays in force.
         """
-        solution, verdict = self._require_solution(), self._verdict
-        assert verdict is not None
-        assert self._record_folder is not None
-        if not verdict.can_be_accepted:
-            raise ValueError(f"The verdict must not be {verdict.grade}.")
-        calibration = solution.calibration
-        result = Result(
-            names=self._names,
-            accepted=datetime.now(UTC).astimezone(),
-            grade=verdict.grade,
-            tip_pen=calibration.joint.tip_pen,
-            uncertainty=calibration.budget.expanded_uncertainty[:3],
-            record=str(self._record_folder),
-        )
-        with RecordWriter.resume(open_record(self._record_folder)) as writer:
-            store_result(self.results_folder, result)
-            self._result = result
-            try:
-                writer.conclude(verdict.grade)
-            except FileError as error:  # the swing is offered again, which is no harm
-                self._trouble_with(worded(error.sentence))
+        solution = self._require_solution()
+        now = datetime.now(UTC).astimezone()
+        self._result = result = accept(self.archive, solution, now)
         self.changed.emit()
         return result
 

@@ -15,14 +15,20 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import FileError
-from lightpen.estimation.report import calibration_json
+from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.pen_files import write_pen
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
-from lightpen.record.reading import HEADER, IMAGES, JOURNAL, open_record
-from lightpen.record.results import Result, last_result
+from lightpen.record.reading import (
+    HEADER,
+    IMAGES,
+    JOURNAL,
+    open_record,
+    recorded_limits,
+)
+from lightpen.record.results import Result
 from lightpen.record.solving import Solution, record_inputs, solve_record
 from lightpen.record.unfinished import (
     find_unfinished,
@@ -116,7 +122,7 @@ class Stage:
 
     def in_force(self) -> Result | None:
         names = self.run.names
-        return last_result(self.run.results_folder, names.pen, names.tip)
+        return self.run.archive.in_force(names.pen, names.tip)
 
     def _note(self, sentence: str) -> None:
         if "computer is too slow" not in sentence:  # others may use it, too
@@ -494,7 +500,8 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
 ) -> None:
     solution = solved.solution()
     inputs = record_inputs(solution.source)
-    fields = json.loads(calibration_json(solution.calibration, inputs, "joint"))
+    limits = recorded_limits(open_record(solved.folder()))
+    fields = calibration_record(solution.calibration, inputs, "joint", limits)
     fields.pop("created")
 
     assert fields == command(solved.folder())
@@ -637,7 +644,7 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     assert in_force is not None
     assert in_force.accepted == second.accepted
     assert in_force.tip_pen.tolist() == solved.tip()
-    assert len(list(solved.run.results_folder.iterdir())) == 2
+    assert len(list(solved.run.archive.folder.iterdir())) == 2
 
 
 def test_an_accepted_swing_is_concluded_and_no_longer_offered(solved: Stage) -> None:
@@ -646,7 +653,7 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(solved: Stage) -> 
 
     assert solved.run.result is result
     assert open_record(solved.folder()).verdict == result.grade
-    assert result.record == str(solved.folder())
+    assert result.record == solved.folder()
     assert find_unfinished(solved.run.records_folder).interrupted == ()
 
 
@@ -673,7 +680,7 @@ def test_no_more_is_captured_for_a_tip_in_force(solved: Stage) -> None:
 
 
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: Stage) -> None:
-    solved.run.results_folder.write_text("not a folder")
+    solved.run.archive.folder.write_text("not a folder")
     with pytest.raises(FileError, match="cannot be made"):
         solved.run.accept()
 
