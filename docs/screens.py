@@ -32,8 +32,9 @@ from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, seale
 from lightpen.detection.sighting import look, sight_centers
 from lightpen.live.looking import LiveImage
 from lightpen.live.sources import Surroundings
+from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.names import Names
-from lightpen.record.results import Result, store_result
+from lightpen.record.results import Result
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera
@@ -117,7 +118,7 @@ class Stage:
         self._image_plans = plan_scene(self._scene).image_plans
         settings = Settings(DATA / "lightpen.ini")
         settings.set_preferences(Preferences())
-        store_result(DATA / "results", _earlier_result())
+        FolderArchive(DATA).store(_earlier_result())
         around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
         workbench = self._workbench = self.wizard.workbench
@@ -242,9 +243,14 @@ def _earlier_result() -> Result:
         names=NAMES,
         accepted=NOW - timedelta(days=12),
         grade="pass",
-        tip_pen=np.array([-1.3179, -90.4102, -23.8551]),
-        uncertainty=np.array([0.0011, 0.0024, 0.0017]),
-        record="20260918-095512_LP-04_T-10-80",
+        record=DATA / RECORDS / "20260918-095512_LP-04_T-10-80",
+        images=(),
+        calibration={
+            "tip_pen_mm": [-1.3179, -90.4102, -23.8551],
+            "expanded_uncertainty_mm": [0.0011, 0.0024, 0.0017],
+            "cone_cam_mm": [0.0, 0.0, 1000.0],
+            "covariance": np.diag(6 * [0.001**2]).tolist(),
+        },
     )
 
 

@@ -40,6 +40,12 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
+def version_0_1() -> Path:
+    """Return the data folder as version 0.1 left it; copy it before you change it."""
+    return Path(__file__).parent / "data" / "version-0.1"
+
+
+@pytest.fixture(scope="session")
 def lightpen() -> Callable[..., CompletedProcess[str]]:
     """Return a function that runs the command line in this process."""
     # Imported here: a broken command line must not keep the other tests from running.

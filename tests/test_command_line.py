@@ -272,6 +272,28 @@ def test_the_text_counts_dropped_images_by_reason(record: Record, scene: Scene) 
         assert re.search(rf"{reasons.count(reason)}\b.*{reason}", fields["text"])
 
 
+def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
+    clean: Path, record: Record
+) -> None:
+    fields = record(clean)
+    verdict = fields["verdict"]
+
+    assert (verdict["grade"], verdict["next_step"]) == ("pass", "accept")
+    assert verdict["code"] == "verdict.good"
+    assert list(verdict["values"].values()) == [
+        fields["weakest_direction"]["expanded_uncertainty_mm"]
+    ]
+    assert verdict["limits"] == {
+        "max_uncertainty_mm": 0.005,
+        "min_images": 60,
+        "min_per_field": 2,
+    }
+    assert fields["text"].splitlines()[-2:] == [
+        f"Verdict      PASS: {verdict['text']}",
+        "             Next: accept the tip.",
+    ]
+
+
 def test_two_stage_can_be_the_method(clean: Path, record: Record, truth: Truth) -> None:
     fields = record(clean, "--method", "two-stage")
     assert fields["tip_pen_mm"] == fields["methods"]["two-stage"]["tip_pen_mm"]

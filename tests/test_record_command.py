@@ -108,6 +108,19 @@ def test_the_files_of_the_record_are_named_with_their_hashes(
     ]
 
 
+def test_the_verdict_goes_by_the_limits_of_the_record(
+    calibrated: Calibrated, folder: Path
+) -> None:
+    fields, text = calibrated(folder)
+    verdict = fields["verdict"]
+
+    assert verdict["grade"] == "repeat"
+    assert verdict["limits"]["max_uncertainty_mm"] == 1e-6
+    assert verdict["limits"]["min_images"] == N_IMAGES
+    assert verdict["text"].startswith("U (k = 2) of the tip is 0.0")
+    assert f"Verdict      REPEAT: {verdict['text']}\n" in text
+
+
 def test_both_methods_can_be_asked_for(calibrated: Calibrated, folder: Path) -> None:
     two_stage, _ = calibrated(folder, "--method", "two-stage")
     joint, _ = calibrated(folder)

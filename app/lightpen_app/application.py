@@ -19,7 +19,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen.errors import LightpenError, UsageError
-from lightpen.estimation.report import calibration_text
+from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
 from lightpen_app.crash import CrashHook
@@ -215,7 +215,8 @@ def _tell_but_hints(kind: QtMsgType, context: QMessageLogContext, text: str) -> 
 
 
 def _print_tip(run: SwingRun) -> None:
-    solution = run.status.solution
-    if solution is not None:
-        nominal = solution.source.pen.nominal_tip
-        print("\n" + calibration_text(solution.calibration, "joint", nominal))
+    status = run.status
+    if status.solution is not None and status.verdict is not None:
+        nominal = status.solution.source.pen.nominal_tip
+        calibration = status.solution.calibration
+        print("\n" + calibration_text(calibration, "joint", nominal, status.verdict))

@@ -27,23 +27,25 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.report import (
     METHODS,
-    calibration_json,
-    calibration_text,
-    encoded,
-    pivot_json,
-    pivot_text,
+    calibration_record,
+    json_bytes,
+    pivot_record,
 )
+from lightpen.estimation.summary import calibration_text, pivot_text
+from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import write_whole
 from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import (
     is_record,
     missing_parts,
     open_record,
     record_files,
+    recorded_limits,
     unacknowledged_images,
 )
 from lightpen.record.solving import record_inputs, solve_record
@@ -271,6 +273,7 @@ class _Calibrated:
 
     calibration: Calibration
     nominal_tip: FloatArray | None
+    limits: SwingLimits
     inputs: Callable[[], Inputs]
 
 
@@ -289,10 +292,15 @@ def _calibrate(options: argparse.Namespace) -> None:
     else:
         calibrated = _from_observations(options)
     calibration = calibrated.calibration
-    print(calibration_text(calibration, options.method, calibrated.nominal_tip))
+    verdict = judge(calibration, calibrated.limits)
+    print(
+        calibration_text(calibration, options.method, calibrated.nominal_tip, verdict)
+    )
     if options.json is not None:
-        record = calibration_json(calibration, calibrated.inputs(), options.method)
-        write_whole(options.json, encoded(record))
+        record = calibration_record(
+            calibration, calibrated.inputs(), options.method, calibrated.limits
+        )
+        write_whole(options.json, json_bytes(record))
 
 
 def _from_record(options: argparse.Namespace) -> _Calibrated:
@@ -323,6 +331,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     return _Calibrated(
         solution.calibration,
         solution.source.pen.nominal_tip,
+        recorded_limits(record),
         lambda: record_inputs(solution.source),
     )
 
@@ -399,6 +408,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
     return _Calibrated(
         calibrate(camera, pen, observations),
         pen.nominal_tip,
+        SwingLimits(),
         lambda: Inputs(
             camera=hashed(options.camera),
             pen=hashed(options.pen),
@@ -445,8 +455,8 @@ def _pivot(options: argparse.Namespace) -> None:
     )
     print(pivot_text(fit))
     if options.json is not None:
-        record = pivot_json(fit, hashed(options.poses), options.least_squares)
-        write_whole(options.json, encoded(record))
+        record = pivot_record(fit, hashed(options.poses), options.least_squares)
+        write_whole(options.json, json_bytes(record))
 
 
 @_printing

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from lightpen.arrays import FloatArray
 from lightpen.live.sources import Surroundings
 from lightpen.record.reading import open_record
-from lightpen.record.results import Result, last_result
+from lightpen.record.results import Result
 from lightpen.record.unfinished import find_unfinished
 from lightpen.simulator.scenes import Scene
 from lightpen_app.look.languages import Language
@@ -322,9 +322,9 @@ def _read_out(walker: "Walker") -> ReadOut:
 
 
 def _result_on_disk(walker: "Walker") -> Result:
-    folder = walker.workbench.run.results_folder
-    assert len(list(folder.glob("*.json"))) == 1
-    result = last_result(folder, NAMES["Pen, serial number"], NAMES["Probe tip"])
+    archive = walker.workbench.run.archive
+    assert len(list(archive.folder.glob("*.json"))) == 1
+    result = archive.in_force(NAMES["Pen, serial number"], NAMES["Probe tip"])
     assert result is not None
     return result
 

@@ -338,7 +338,7 @@ def test_a_swing_with_too_little_tilt_is_refused_until_there_is_more(
     for key in (Key.Key_Return, Key.Key_PageDown):
         capturing.press(key)
     assert not capturing.says("IN FORCE")
-    assert not list(capturing.workbench.run.results_folder.glob("*"))
+    assert not list(capturing.workbench.run.archive.folder.glob("*"))
 
     n_before = n_kept(capturing)
     capturing.click("Capture more")
@@ -624,7 +624,7 @@ def test_pressing_enter_again_and_again_accepts_once(
         place,
     )
 
-    assert len(list(walker.workbench.run.results_folder.glob("*.json"))) == 1
+    assert len(list(walker.workbench.run.archive.folder.glob("*.json"))) == 1
 
 
 @pytest.mark.parametrize("step", ["Start", "Camera", "LEDs", "Swing"])

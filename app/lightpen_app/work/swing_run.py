@@ -7,14 +7,13 @@ from threading import Lock
 
 from PySide6.QtCore import QObject, Qt, Signal
 
+from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import Follower
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import SwingEvent
 from lightpen.swing.status import SwingStatus
 from lightpen_app.look.sentences import worded
-
-RECORDS, RESULTS = "records", "results"
 
 
 class SwingRun(QObject):
@@ -65,6 +64,7 @@ class SwingRun(QObject):
     ) -> None:
         super().__init__(parent)
         self._folder = folder
+        self._archive = FolderArchive(folder)
         self._status = SwingStatus()
         self._lock = Lock()
         self._newest: SwingStatus | None = None  # what the GUI has not seen yet
@@ -78,7 +78,7 @@ class SwingRun(QObject):
         self._trouble_told.connect(self._on_trouble_told, queued)
         self._relief_told.connect(self._on_relief_told, queued)
 
-        self.runner = SwingRunner(self.records_folder, self.results_folder, self, now)
+        self.runner = SwingRunner(self.records_folder, self.archive, self, now)
 
     @property
     def status(self) -> SwingStatus:
@@ -86,9 +86,9 @@ class SwingRun(QObject):
         return self._status
 
     @property
-    def results_folder(self) -> Path:
+    def archive(self) -> FolderArchive:
         """Where accepted results are kept."""
-        return self._folder / RESULTS
+        return self._archive
 
     @property
     def records_folder(self) -> Path:

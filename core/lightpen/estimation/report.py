@@ -1,8 +1,8 @@
-"""A calibration as a JSON record, and as text for the screen."""
+"""A calibration as a JSON record."""
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -14,8 +14,10 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
 from lightpen.estimation.pivot import PivotFit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.model.coverage import DIRECTION_NAMES
+from lightpen.model.limits import SwingLimits
 from lightpen.sentences import Sentence, sentence
 
 METHODS = ("joint", "two-stage")
@@ -63,12 +65,29 @@ def result_of(calibration: Calibration, method: str) -> MethodResult:
     )
 
 
-def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> str:
-    """Return the record of a calibration as JSON; README.md documents its fields."""
+def calibration_record(
+    calibration: Calibration, inputs: Inputs, method: str, limits: SwingLimits
+) -> dict[str, Any]:
+    """Return the record of a calibration, as it is read from its JSON.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    inputs : Inputs
+    method : str
+        ``"joint"`` or ``"two-stage"``, of the tip.
+    limits : SwingLimits
+        By which the calibration is judged.
+
+    Returns
+    -------
+    dict
+        README.md documents its entries.
+    """
     result = result_of(calibration, method)
     tip = result.tip_pen
     nominal = inputs.nominal_tip
-    head = {
+    record = {
         "program": _program(),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "method": method,
@@ -86,9 +105,10 @@ def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> s
         "images": {
             "total": len(calibration.used),
             "used": int(calibration.used.sum()),
-            "dropped": dict(_dropped(calibration)),
+            "dropped": dict(count_dropped(calibration)),
         },
         "methods": _methods(calibration),
+        "verdict": _verdict(calibration, limits),
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "weakest_direction": {
@@ -102,14 +122,17 @@ def calibration_json(calibration: Calibration, inputs: Inputs, method: str) -> s
             "pen": _input(inputs.pen),
             "observations": [_input(file) for file in inputs.observations],
         },
+        "frames": _frames(calibration),
     }
-    return _with_rows(head, "frames", _frames(calibration))
+    return {name: _plain(entry) for name, entry in record.items()}
 
 
-def pivot_json(fit: PivotFit, poses: InputFile, least_squares: bool) -> str:
-    """Return a pivot calibration as JSON; README.md documents its fields."""
+def pivot_record(
+    fit: PivotFit, poses: InputFile, least_squares: bool
+) -> dict[str, Any]:
+    """Return the record of a pivot calibration; README.md documents its entries."""
     uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(fit.covariance))
-    head = {
+    record = {
         "program": _program(),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "method": "least squares" if least_squares else "robust",
@@ -122,49 +145,31 @@ def pivot_json(fit: PivotFit, poses: InputFile, least_squares: bool) -> str:
         "rms_mm": fit.rms,
         "poses": {"total": len(fit.used), "used": int(fit.used.sum())},
         "inputs": {"poses": _input(poses)},
+        "frames": [
+            {"pose": i + 1, "used": used, "residual_mm": residual}
+            for i, (used, residual) in enumerate(
+                zip(fit.used.tolist(), fit.residuals.tolist(), strict=True)
+            )
+        ],
     }
-    rows = [
-        {"pose": i + 1, "used": used, "residual_mm": residual}
-        for i, (used, residual) in enumerate(
-            zip(fit.used.tolist(), fit.residuals.tolist(), strict=True)
-        )
-    ]
-    return _with_rows(head, "frames", rows)
+    return {name: _plain(entry) for name, entry in record.items()}
 
 
-def encoded(record: str) -> bytes:
-    """Return a record as UTF-8.
+def json_bytes(record: Mapping[str, Any]) -> bytes:
+    """Return a record as JSON, readable: one line an entry, and one an image.
 
     The bytes of a file name that is no text in this system's encoding become JSON
     escapes.
     """
-    return record.encode("utf-8", "backslashreplace")
-
-
-def calibration_text(
-    calibration: Calibration, method: str, nominal_tip: FloatArray | None
-) -> str:
-    """Return a calibration as text for the screen."""
-    results = {name: result_of(calibration, name) for name in METHODS}
-    chosen = results[method]
-    lines = [_heading("Tip in the pen frame, mm", "xyz")]
-    for name in (method, *(other for other in METHODS if other != method)):
-        lines.append(_numbers(name, results[name].tip_pen))
-        part = ", of image noise" if name == "two-stage" else ""
-        lines.append(
-            _numbers(f"  U (k = 2){part}", results[name].expanded_uncertainty[:3])
-        )
-    if nominal_tip is not None:
-        lines.append(_numbers("nominal", nominal_tip))
-        lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
-    lines += ["", _heading("Cone in the camera frame, mm", "uvw")]
-    lines.append(_numbers(method, chosen.cone_cam))
-    lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
-    lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
-    warnings = warnings_of(calibration)
-    if warnings:
-        lines += ["", *map(str, warnings)]
-    return "\n".join(lines)
+    lines = []
+    for name, entry in record.items():
+        if name == "frames":
+            rows = ",\n    ".join(map(_dumps, entry))
+            lines.append(f'  "frames": [\n    {rows}\n  ]')
+        else:
+            lines.append(f"  {_dumps(name)}: {_dumps(entry)}")
+    text = "{\n" + ",\n".join(lines) + "\n}\n"
+    return text.encode("utf-8", "backslashreplace")
 
 
 def warnings_of(calibration: Calibration) -> list[Sentence]:
@@ -203,98 +208,8 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
     return warnings
 
 
-def pivot_text(fit: PivotFit) -> str:
-    """Return a pivot calibration as text for the screen."""
-    uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(fit.covariance))
-    return "\n".join(
-        [
-            _heading("Tip in the frame of the poses, mm", "xyz"),
-            _numbers("tip", fit.tip_pen),
-            _numbers("  U (k = 2)", uncertainty[:3]),
-            "",
-            _heading("Pivot in the camera frame, mm", "uvw"),
-            _numbers("pivot", fit.pivot_cam),
-            _numbers("  U (k = 2)", uncertainty[3:]),
-            "",
-            f"Poses        {fit.used.sum()} of {len(fit.used)} used",
-            f"Residuals    {fit.rms:.3f} mm rms an axis",
-        ]
-    )
-
-
-def _image_lines(calibration: Calibration) -> list[str]:
-    n_used = int(calibration.used.sum())
-    lines = [f"Images       {n_used} of {len(calibration.used)} used"]
-    for reason, count in _dropped(calibration).items():
-        names = [
-            name
-            for name, why in zip(
-                calibration.observations.names, calibration.reasons, strict=True
-            )
-            if why == reason
-        ]
-        shown = ", ".join(names[:5]) + (", ..." if count > 5 else "")
-        lines.append(f"  dropped    {count} {reason}: {shown}")
-    return lines
-
-
-def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
-    budget, halves = calibration.budget, calibration.halves
-    joint = calibration.joint
-    parts = {
-        "noise": budget.correlation_factor * budget.noise,
-        "LED geometry": budget.leds,
-        "camera": budget.camera,
-    }
-    tilt = np.degrees(calibration.coverage.tilts)
-    lines = [
-        f"Residuals    {joint.rms:.4f} px rms, tip of single images "
-        f"{chosen.rms_mm:.4f} mm rms",
-        f"Weakest      {_direction(budget.weakest_direction)}, "
-        f"U = {budget.weakest_uncertainty:.4f} mm",
-        _numbers("Odd - even images", halves.difference),
-        _numbers("  U (k = 2)", halves.expanded_uncertainty),
-    ]
-    lines += [
-        _numbers(f"U from {name}", COVERAGE_FACTOR * np.sqrt(np.diag(part)[:3]))
-        for name, part in parts.items()
-        if np.any(part)
-    ]
-    lines.append(
-        f"Repeatability between blocks of images: {np.sqrt(budget.block_ratio):.2f} "
-        f"times that of independent noise, lag-1 autocorrelation "
-        f"{budget.autocorrelation:.2f}"
-    )
-    lines.append(
-        f"Postures     tilt {tilt.min():.0f} to {tilt.max():.0f} degrees, turn "
-        f"{np.degrees(np.ptp(calibration.coverage.turns)):.0f} degrees"
-    )
-    if calibration.coverage.missing:
-        lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
-    if calibration.geometry.led_sigma > 0:
-        lines.append(
-            f"LED file     off by {calibration.geometry.led_sigma:.4f} mm (standard "
-            "deviation of a coordinate), corrected as far as the images tell"
-        )
-    return lines
-
-
-def _heading(title: str, axes: str) -> str:
-    return f"{title:<30}" + "".join(f"{axis:>13}" for axis in axes)
-
-
-def _numbers(title: str, values: FloatArray) -> str:
-    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
-
-
-def _direction(vector: FloatArray) -> str:
-    axis = int(np.argmax(np.abs(vector)))
-    if abs(vector[axis]) > 0.95:
-        return f"along the pen's {'xyz'[axis]} axis"
-    return "along ({:.2f}, {:.2f}, {:.2f}) of the pen".format(*vector)
-
-
-def _dropped(calibration: Calibration) -> Counter[str]:
+def count_dropped(calibration: Calibration) -> Counter[str]:
+    """Return how many images do not take part, by reason."""
     return Counter(str(reason) for reason in calibration.reasons if reason)
 
 
@@ -304,6 +219,20 @@ def _program() -> dict[str, str]:
 
 def _input(file: InputFile) -> dict[str, str]:
     return {"file": file.path.name, "sha256": file.sha256}
+
+
+def _verdict(calibration: Calibration, limits: SwingLimits) -> dict[str, Any]:
+    verdict = judge(calibration, limits)
+    return {
+        "grade": verdict.grade.value,
+        **_plain(verdict.reason),
+        "next_step": verdict.next_step.value,
+        "limits": {
+            "max_uncertainty_mm": limits.max_uncertainty,
+            "min_images": limits.min_images,
+            "min_per_field": limits.min_per_field,
+        },
+    }
 
 
 def _methods(calibration: Calibration) -> dict[str, Any]:
@@ -410,16 +339,8 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
     ]
 
 
-def _with_rows(head: dict[str, Any], key: str, rows: Sequence[dict[str, Any]]) -> str:
-    """Return JSON, readable: one line an entry, and one a row of the long list."""
-    lines = [f"  {json.dumps(name)}: {_dumps(value)}" for name, value in head.items()]
-    listed = ",\n    ".join(_dumps(row) for row in rows)
-    lines.append(f"  {json.dumps(key)}: [\n    {listed}\n  ]")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
 def _dumps(value: Any) -> str:
-    return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:

@@ -6,12 +6,14 @@ import os
 import re
 import stat
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Iterator
 from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
+FOLDER = sentence("file.folder", "folder")
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a sentence
 
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
@@ -46,7 +48,12 @@ _REASONS = {
     errno.ENAMETOOLONG: sentence(
         "write.name-too-long", "the name is too long. Choose a shorter one."
     ),
+    errno.EEXIST: sentence(
+        "write.name-taken", "there is a file of that name already. Try again."
+    ),
 }
+# What a disk answers that gives a file one name only: FAT, and some of the network.
+_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 
 
 def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
@@ -178,20 +185,51 @@ def write_whole(path: Path, data: bytes) -> None:
             )
         ) from error
     except OSError as error:
-        other = sentence(
-            "write.other-reason",
-            "{reason}. Choose another folder or name.",
-            reason=strerror(error),
-        )
-        raise FileError(
-            sentence(
-                "write.failed",
-                "{path} cannot be written: {reason} What was there before is "
-                "unchanged.",
-                path=printable(str(path)),
-                reason=_REASONS.get(error.errno or 0, other),
-            )
-        ) from error
+        raise _unwritten(path, error) from error
+
+
+def create_whole(path: Path, data: bytes) -> None:
+    """Write a new file whole, or none; a file that has the name stays as it is.
+
+    When this returns, the file is on the disk with its name, whatever happens next.
+
+    Parameters
+    ----------
+    path : Path
+    data : bytes
+
+    Raises
+    ------
+    FileError
+        The file cannot be written, or exists; the text says why and what to do.
+    """
+    try:
+        with _part_of(path, data) as part:
+            _name_anew(part, path)
+        try:
+            sync_folder(path.parent)
+        except OSError:
+            path.unlink()
+            raise
+    except OSError as error:
+        raise _unwritten(path, error) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Put the names in a folder on the disk, where the system can (not Windows).
+
+    Raises
+    ------
+    OSError
+        The disk fails.
+    """
+    if os.name != "posix":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def unreadable(path: Path, what: Sentence, error: OSError) -> FileError:
@@ -319,15 +357,53 @@ def _replace(target: Path, data: bytes) -> None:
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    with _part_of(target, data) as part:
+        if mode is not None:
+            part.chmod(mode)
+        part.replace(target)
+
+
+@contextlib.contextmanager
+def _part_of(target: Path, data: bytes) -> Iterator[Path]:
+    """Put data on the disk beside its target, until it has a name of its own."""
     part = target.with_name(f".{os.urandom(8).hex()}.part")
     try:
         with part.open("xb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
-        if mode is not None:
-            part.chmod(mode)
-        part.replace(target)
+        yield part
     finally:
         with contextlib.suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def _name_anew(part: Path, target: Path) -> None:
+    """Give a file its name, unless another has it."""
+    if os.name != "posix":
+        part.rename(target)  # Windows refuses to replace a file
+        return
+    try:
+        target.hardlink_to(part)
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        if target.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from error
+        part.rename(target)
+
+
+def _unwritten(path: Path, error: OSError) -> FileError:
+    other = sentence(
+        "write.other-reason",
+        "{reason}. Choose another folder or name.",
+        reason=strerror(error),
+    )
+    return FileError(
+        sentence(
+            "write.failed",
+            "{path} cannot be written: {reason} What was there before is unchanged.",
+            path=printable(str(path)),
+            reason=_REASONS.get(error.errno or 0, other),
+        )
+    )

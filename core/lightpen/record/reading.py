@@ -34,7 +34,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, read_camera
-from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
+from lightpen.formats.files import FOLDER, MEGABYTE, printable, read_bytes, unreadable
 from lightpen.formats.images import (
     IMAGE_FILE,
     MAX_FILE_SIZE,
@@ -193,6 +193,8 @@ class RecordSource:
 
     Attributes
     ----------
+    folder : Path
+        Of the record.
     images : ImageSource
         All images, in the order of capture; a damaged one raises `FileError` when
         loaded.
@@ -203,6 +205,7 @@ class RecordSource:
     camera_file, pen_file : Path
     """
 
+    folder: Path
     images: ImageSource
     camera: Camera
     pen: Pen
@@ -280,7 +283,7 @@ def is_record(folder: Path) -> bool:
     try:
         return (folder / HEADER).is_file() and (folder / JOURNAL).is_file()
     except OSError as error:
-        raise unreadable(folder, sentence("file.folder", "folder"), error) from error
+        raise unreadable(folder, FOLDER, error) from error
 
 
 def missing_parts(folder: Path) -> tuple[str, ...]:
@@ -348,6 +351,7 @@ def source(record: Record) -> RecordSource:
 
     files = tuple(image.file for image in record.images)
     return RecordSource(
+        folder=record.folder,
         images=ImageSource(tuple(file.name for file in files), files, loaders),
         camera=read_camera(camera_file),
         pen=read_pen(pen_file, header.units, header.led_diameter, header.nominal_tip),

@@ -1,32 +1,37 @@
-"""Accepted calibrations, one file each; the newest of a pen and tip is in force.
+"""An accepted calibration, and how it is written.
 
-A file is written once and never changed, so an older result is never lost. Its name
-begins with a number, one higher than that of any before: the order of acceptance, which
-no clock that was set back can turn round.
+A result is one JSON object. Its first entries say who accepted what and when, and which
+swing it comes from; the last, ``calibration``, is the whole record of the calibration,
+as `lightpen.estimation.report` makes it. Results of format 1 had of it no more than tip
+and uncertainty.
 """
 
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.files import (
-    MEGABYTE,
-    printable,
-    read_bytes,
-    strerror,
-    write_whole,
-)
+from lightpen.estimation.report import json_bytes
+from lightpen.formats.files import printable
 from lightpen.record.names import Names
 from lightpen.sentences import sentence
 
-FORMAT = 1
-LIMIT = MEGABYTE
+FORMAT = 2
 OLD = timedelta(days=30)  # after which a tip is better calibrated again
+CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
+SHAPES = {
+    "tip_pen_mm": (3,),
+    "expanded_uncertainty_mm": (3,),
+    "cone_cam_mm": (3,),
+    "covariance": (6, 6),
+}
+N_SHAPES_1 = 2  # of these, format 1 had the first
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,52 +45,63 @@ class Result:
         With its time zone.
     grade : str
         Verdict on it when it was accepted, see `lightpen.estimation.verdict.Grade`.
-    tip_pen : (3,) array
-        Tip, pen frame, mm.
-    uncertainty : (3,) array
-        U (k = 2) along x, y and z, mm.
-    record : str
+    record : Path
         Folder of the swing that it comes from.
+    images : tuple of int or None
+        Numbers of the images of the swing that were not taken out; None if it was
+        accepted by a version that did not keep them.
+    calibration : mapping
+        The whole record of the calibration, as README.md documents it; of a result of
+        format 1 only ``tip_pen_mm`` and ``expanded_uncertainty_mm``.
     """
 
     names: Names
     accepted: datetime
     grade: str
-    tip_pen: FloatArray
-    uncertainty: FloatArray
-    record: str
+    record: Path
+    images: tuple[int, ...] | None
+    calibration: Mapping[str, Any]
+
+    @property
+    def tip_pen(self) -> FloatArray:
+        """Tip, pen frame, (3,), mm."""
+        return np.array(self.calibration["tip_pen_mm"], dtype=np.float64)
+
+    @property
+    def uncertainty(self) -> FloatArray:
+        """U (k = 2) of the tip along x, y and z, (3,), mm."""
+        return np.array(self.calibration["expanded_uncertainty_mm"], dtype=np.float64)
+
+    @property
+    def cone_cam(self) -> FloatArray | None:
+        """The tip's place in the camera frame, (3,), mm; None of format 1."""
+        return self._numbers("cone_cam_mm")
+
+    @property
+    def covariance(self) -> FloatArray | None:
+        """Of tip and cone, (6, 6), mm^2; None of format 1."""
+        return self._numbers("covariance")
 
     def is_old(self, now: datetime) -> bool:
         """Return whether the tip is better calibrated again by its age alone."""
         return now - self.accepted > OLD
 
+    def _numbers(self, key: str) -> FloatArray | None:
+        numbers = self.calibration.get(key)
+        return None if numbers is None else np.array(numbers, dtype=np.float64)
 
-def store_result(root: Path, result: Result) -> Path:
-    """Put an accepted calibration beside the earlier ones and return its file.
 
-    Raises
-    ------
-    FileError
-        It cannot be written; the earlier result stays in force.
+def result_bytes(result: Result, record: str) -> bytes:
+    """Return a result as JSON.
+
+    Parameters
+    ----------
+    result : Result
+    record : str
+        Where the folder of its swing is, as it is to be written.
     """
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            sentence(
-                "results.no-folder",
-                "The folder {folder} cannot be made: {reason}. Make sure that it is "
-                "yours to write.",
-                folder=printable(str(root)),
-                reason=strerror(error),
-            )
-        ) from error
-    newest = _files(root)[:1]
-    number = 1 + (_number(newest[0]) if newest else 0)
-    stamp = f"{result.accepted.astimezone(UTC):%Y%m%dT%H%M%S.%fZ}"
-    path = root / f"{number:06d}_{stamp}.json"
     names = result.names
-    entries = {
+    head = {
         "format": FORMAT,
         "accepted": result.accepted.isoformat(),
         "station": names.station,
@@ -95,46 +111,73 @@ def store_result(root: Path, result: Result) -> Path:
         "cone": names.cone,
         "ball_diameter_mm": names.ball_diameter,
         "grade": result.grade,
-        "tip_pen_mm": result.tip_pen.tolist(),
-        "expanded_uncertainty_mm": result.uncertainty.tolist(),
-        "record": result.record,
+        "record": record,
+        "images": result.images,
     }
-    write_whole(path, json.dumps(entries, indent=1, ensure_ascii=False).encode())
-    return path
+    start = json_bytes(head).removesuffix(b"\n}\n")
+    calibration = json_bytes(result.calibration).rstrip(b"\n")
+    return start + CALIBRATION + calibration + b"\n}\n"
 
 
-def last_result(root: Path, pen: str, tip: str) -> Result | None:
-    """Return the result in force for a pen and a tip, or None if there is none.
+def head_of(start: bytes) -> bytes | None:
+    """Return what comes before the calibration, as JSON of its own.
+
+    Parameters
+    ----------
+    start : bytes
+        Of a result, as much as was read; None is returned if that is too little, or
+        there is no calibration.
+    """
+    head, found, _ = start.partition(CALIBRATION)
+    return head + b"}" if found else None
+
+
+def parse_entries(data: bytes, file: Path) -> Mapping[str, Any]:
+    """Return the entries of a result or of its head; `file` is named if damaged.
 
     Raises
     ------
     FileError
-        A result newer than the one that was found is damaged.
+        It is no JSON object.
     """
-    for file in _files(root):
-        result = _read(file)
-        if (result.names.pen, result.names.tip) == (pen, tip):
-            return result
-    return None
-
-
-def _files(root: Path) -> list[Path]:
-    """Return the files of results, the newest first; others in the folder are none."""
-    files = [file for file in root.glob("*.json") if _number(file)]
-    return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
-
-
-def _number(file: Path) -> int:
-    """Return the place of a file in the order of acceptance; 0 for a foreign file."""
-    digits = file.name.partition("_")[0]
-    return int(digits) if digits.isdecimal() else 0
-
-
-def _read(file: Path) -> Result:
-    data = read_bytes(file, sentence("file.result", "result"), LIMIT)
     try:
         entries = json.loads(data)
-        ball = entries["ball_diameter_mm"]
+    except (ValueError, RecursionError) as error:
+        raise _damaged(file) from error
+    if not isinstance(entries, dict):
+        raise _damaged(file)
+    return entries
+
+
+def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Result:
+    """Return the result that a file holds.
+
+    Parameters
+    ----------
+    data : bytes
+    file : Path
+        For the sentence.
+    locate : callable
+        Returns the folder of a swing by what is written.
+
+    Raises
+    ------
+    FileError
+        It is damaged, or written by a later version of the program.
+    """
+    entries = parse_entries(data, file)
+    try:
+        number = int(entries["format"])
+        if number > FORMAT:
+            raise _of_later_version(file, number)
+        keys = tuple(SHAPES)[: N_SHAPES_1 if number == 1 else None]
+        calibration = (
+            {key: entries[key] for key in keys}
+            if number == 1
+            else dict(entries["calibration"])
+        )
+        _require_numbers(calibration, keys)
+        ball, images = entries["ball_diameter_mm"], entries.get("images")
         result = Result(
             names=Names(
                 station=entries["station"],
@@ -146,26 +189,44 @@ def _read(file: Path) -> Result:
             ),
             accepted=datetime.fromisoformat(entries["accepted"]),
             grade=str(entries["grade"]),
-            tip_pen=np.array(entries["tip_pen_mm"], dtype=np.float64).reshape(3),
-            uncertainty=np.array(
-                entries["expanded_uncertainty_mm"], dtype=np.float64
-            ).reshape(3),
-            record=str(entries["record"]),
+            record=locate(str(entries["record"])),
+            images=None if images is None else tuple(map(int, images)),
+            calibration=calibration,
         )
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        if result.accepted.tzinfo is None:
+            raise ValueError(entries["accepted"])
+    except (ValueError, KeyError, TypeError) as error:
         raise _damaged(file) from error
-    whole = np.isfinite([result.tip_pen, result.uncertainty]).all()
-    if not whole or result.accepted.tzinfo is None:
-        raise _damaged(file)
     return result
+
+
+def _require_numbers(calibration: Mapping[str, Any], keys: tuple[str, ...]) -> None:
+    for key in keys:
+        numbers = np.array(calibration[key], dtype=np.float64)
+        if numbers.shape != SHAPES[key] or not np.isfinite(numbers).all():
+            raise ValueError(key)
 
 
 def _damaged(file: Path) -> FileError:
     return FileError(
         sentence(
             "results.damaged",
-            "The result {file} is damaged. Restore it from a copy, or move it away "
-            "to go on without it.",
+            "The result {file} is damaged. Restore it from a copy, or move it away to "
+            "go on without it.",
             file=printable(str(file)),
+        )
+    )
+
+
+def _of_later_version(file: Path, number: int) -> FileError:
+    return FileError(
+        sentence(
+            "results.later-version",
+            "The result {file} was written by a later version of the program (format "
+            "{number}; this version reads up to {known}). Use that version, or move "
+            "the file away to go on without it.",
+            file=printable(str(file)),
+            number=number,
+            known=FORMAT,
         )
     )

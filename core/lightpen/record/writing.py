@@ -15,7 +15,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
-from lightpen.formats.files import printable, strerror, write_whole
+from lightpen.formats.files import printable, strerror, sync_folder, write_whole
 from lightpen.record.lock import lock_journal, unlock_journal
 from lightpen.record.reading import (
     FORMAT,
@@ -320,14 +320,8 @@ def _unwritable(path: Path, error: OSError) -> FileError:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Put the names in a folder on the disk, where the system can (not Windows)."""
-    if os.name != "posix":
-        return
+    """Put the names in a folder on the disk."""
     try:
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        sync_folder(folder)
     except OSError as error:
         raise _unwritable(folder, error) from error

@@ -532,7 +532,7 @@ class SwingCourse:
             return
         self._publish(replace(status, activity=Activity.ACCEPTING))
         try:
-            result = accept(self._archive, solution, verdict, status.names, self._now())
+            result = accept(self._archive, solution, self._now())
             status = replace(status, result=result)
             self._relieve()
         finally:

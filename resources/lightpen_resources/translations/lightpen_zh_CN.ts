@@ -2690,6 +2690,10 @@
         <translation>结果 {file} 已损坏。请用备份恢复，或移走后不用它继续。</translation>
     </message>
     <message>
+        <source>The result {file} was written by a later version of the program (format {number}; this version reads up to {known}). Use that version, or move the file away to go on without it.</source>
+        <translation>结果 {file} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请使用该版本，或移走该文件后不用它继续。</translation>
+    </message>
+    <message>
         <source>The settings cannot be saved: {file} cannot be written. Make sure that its folder is yours to write and that the disk is not full.</source>
         <translation>设置无法保存：无法写入 {file}。请确认您有该文件夹的写入权限，且磁盘未满。</translation>
     </message>
@@ -2716,6 +2720,10 @@
     <message>
         <source>The swing in {folder} has changed since it was read: another program wrote to it. Read it again to go on with all of its images.</source>
         <translation>{folder} 中的摆动在读取后有变化：另一个程序写入过。请重新读取，以便用全部图像继续。</translation>
+    </message>
+    <message>
+        <source>The swing in {folder} has changed since its tip was computed. Compute it again to accept it.</source>
+        <translation>{folder} 中的摆动在计算测头后有变化。请重新计算后再接受。</translation>
     </message>
     <message>
         <source>The swing is paused.</source>
@@ -3000,6 +3008,10 @@
     <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
         <translation>平移超过 {most:g} m。请检查单位：需要毫米。</translation>
+    </message>
+    <message>
+        <source>there is a file of that name already. Try again.</source>
+        <translation>已有同名文件。请重试。</translation>
     </message>
     <message>
         <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the pen file is of this pen, and that LEDs are numbered from 1.</source>

@@ -12,18 +12,22 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.report import (
-    calibration_json,
-    calibration_text,
-    pivot_json,
-    pivot_text,
+    calibration_record,
+    json_bytes,
+    pivot_record,
     warnings_of,
 )
+from lightpen.estimation.summary import calibration_text, pivot_text
+from lightpen.estimation.verdict import Verdict, judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.observation_files import Centers
+from lightpen.model.limits import SwingLimits
+from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     simulate_centers,
+    swing_from_postures,
     swing_poses,
 )
 
@@ -31,6 +35,7 @@ CAMERA = paper_camera()
 PEN = paper_pen()
 FILE = InputFile(Path("folder/file.csv"), 64 * "0")
 INPUTS = Inputs(FILE, FILE, (FILE,), PEN.nominal_tip)
+LIMITS = SwingLimits(max_uncertainty=0.0987, min_images=41)
 
 
 @cache
@@ -47,13 +52,17 @@ def calibration() -> Calibration:
     return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
 
 
+def verdict() -> Verdict:
+    return judge(calibration(), LIMITS)
+
+
 def record(method: str = "joint") -> dict[str, Any]:
-    text = calibration_json(calibration(), INPUTS, method)
+    written = json_bytes(calibration_record(calibration(), INPUTS, method, LIMITS))
 
     def refuse(constant: str) -> None:
         raise AssertionError(f"{constant} is not JSON")
 
-    parsed: dict[str, Any] = json.loads(text, parse_constant=refuse)
+    parsed: dict[str, Any] = json.loads(written, parse_constant=refuse)
     return parsed
 
 
@@ -107,6 +116,55 @@ def test_an_led_that_was_never_seen_has_no_figures() -> None:
     assert not led["displaced"]
 
 
+def test_the_record_holds_the_verdict_and_the_limits_that_it_was_judged_by() -> None:
+    assert record()["verdict"] == {
+        "grade": "check",
+        "code": "verdict.too-few-images",
+        "text": "Images kept: 40 of at least 41.",
+        "values": {"n_kept": 40, "needed": 41},
+        "next_step": "capture more",
+        "limits": {"max_uncertainty_mm": 0.0987, "min_images": 41, "min_per_field": 2},
+    }
+
+
+def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:
+    rng = np.random.default_rng(0)
+    postures = Postures(
+        np.radians(rng.uniform(10, 30, 60)),
+        np.radians(rng.uniform(-20, 245, 60)),
+        np.radians(rng.uniform(-30, 30, 60)),
+    )
+    swing = swing_from_postures(postures)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.02, rng
+    )
+    centers = Centers(np.arange(60) + 1, pixels, Path("centers.csv"))
+    one_sided = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    limits = SwingLimits(max_uncertainty=1.0)
+
+    written = json_bytes(calibration_record(one_sided, INPUTS, "joint", limits))
+
+    found = json.loads(written)["verdict"]
+    assert found["code"] == "verdict.too-little-tilt"
+    assert found["values"]["sides"] == [
+        {"code": "side.towards", "text": "towards the camera", "values": {}},
+        {
+            "code": "side.towards-right",
+            "text": "towards the camera to the right",
+            "values": {},
+        },
+    ]
+
+
+def test_the_text_ends_with_the_verdict_its_reason_and_the_next_step() -> None:
+    text = calibration_text(calibration(), "joint", None, verdict())
+
+    assert text.splitlines()[-2:] == [
+        "Verdict      CHECK: Images kept: 40 of at least 41.",
+        "             Next: capture more images; those of this swing are kept.",
+    ]
+
+
 def test_the_record_names_program_and_inputs() -> None:
     found = record()
 
@@ -117,7 +175,7 @@ def test_the_record_names_program_and_inputs() -> None:
 
 @pytest.mark.parametrize("method", ["joint", "two-stage"])
 def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> None:
-    text = calibration_text(calibration(), method, PEN.nominal_tip)
+    text = calibration_text(calibration(), method, PEN.nominal_tip, verdict())
     rows = {line.split()[0]: line for line in text.splitlines() if line.strip()}
 
     assert f"{calibration().joint.tip_pen[1]:.4f}" in text
@@ -151,7 +209,7 @@ def test_an_led_that_was_never_found_is_warned_of() -> None:
     assert warning["code"] == "warning.led-unseen"
     assert warning["values"] == {"led": 10}
     assert warning["text"].startswith("LED 10 was found in no image.")
-    assert warning["text"] in calibration_text(calibration(), "joint", None)
+    assert warning["text"] in calibration_text(calibration(), "joint", None, verdict())
 
 
 def test_large_residuals_are_warned_of() -> None:
@@ -174,7 +232,7 @@ def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     noise = 0.1 * np.random.default_rng(2).standard_normal((30, 3))
     fit = fit_pivot(swing.rotations, swing.translations + noise)
 
-    found = json.loads(pivot_json(fit, FILE, least_squares=False))
+    found = json.loads(json_bytes(pivot_record(fit, FILE, least_squares=False)))
 
     np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=0.5)
     uncertainty = 2 * np.sqrt(np.diag(found["covariance"]))

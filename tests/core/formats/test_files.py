@@ -2,6 +2,7 @@
 
 import errno
 import os
+import stat
 import subprocess
 import sys
 import tempfile
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.files import (
+    create_whole,
     printable,
     quoted,
     read_bytes,
@@ -275,6 +277,66 @@ def test_an_unforeseen_reason_is_told(
     assert names_in(tmp_path) == ["cam.yaml"]
 
 
+def test_a_new_file_is_created_whole(tmp_path: Path) -> None:
+    create_whole(tmp_path / "new.json", b"new")
+
+    assert (tmp_path / "new.json").read_bytes() == b"new"
+    assert names_in(tmp_path) == ["new.json"]
+
+
+def test_a_file_that_exists_is_not_created_again(tmp_path: Path) -> None:
+    path = file(tmp_path, b"old")
+    with pytest.raises(FileError, match="there is a file of that name already"):
+        create_whole(path, b"new")
+
+    assert path.read_bytes() == b"old"
+    assert names_in(tmp_path) == ["cam.yaml"]
+
+
+def test_a_disk_that_knows_no_links_gets_new_files_only_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, target: Path) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(Path, "hardlink_to", refuse)  # FAT answers so
+    create_whole(tmp_path / "cam.yaml", b"old")
+    with pytest.raises(FileError, match="there is a file of that name already"):
+        create_whole(tmp_path / "cam.yaml", b"new")
+
+    assert (tmp_path / "cam.yaml").read_bytes() == b"old"
+    assert names_in(tmp_path) == ["cam.yaml"]
+
+
+@posix_only
+def test_a_new_file_whose_name_is_not_on_the_disk_is_taken_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync = os.fsync
+
+    def fail_for_folders(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fail_for_folders)
+    with pytest.raises(FileError, match=os.strerror(errno.EIO)):
+        create_whole(tmp_path / "new.json", b"new")
+
+    assert names_in(tmp_path) == []
+
+
+@posix_only
+def test_a_new_file_on_a_full_disk_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "new.json"
+    result = in_other_process(
+        "import resource\nresource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))",
+        f"create_whole(Path({str(path)!r}), bytes(10_000))",
+    )
+    assert "the file would be larger than allowed" in result
+    assert names_in(tmp_path) == []
+
+
 def test_the_digest_is_that_of_the_content(tmp_path: Path) -> None:
     digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     assert sha256(file(tmp_path, b"abc")) == digest  # FIPS 180-2, example B.1
@@ -302,7 +364,7 @@ def in_other_process(preparation: str, call: str) -> str:
         "from pathlib import Path\n"
         "from lightpen.errors import FileError\n"
         "from lightpen.formats.camera_files import CAMERA_FILE\n"
-        "from lightpen.formats.files import read_bytes, write_whole\n"
+        "from lightpen.formats.files import create_whole, read_bytes, write_whole\n"
         f"{preparation}\n"
         f"try:\n    {call}\nexcept FileError as error:\n    print(error)\n"
     )

@@ -4,13 +4,15 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, Cancelled, FileError
-from lightpen.estimation.report import calibration_json
+from lightpen.estimation.report import calibration_record
+from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import JOURNAL, image_name, open_record, record_files
 from lightpen.record.solving import (
     Solution,
@@ -30,11 +32,11 @@ def folder(swung: Callable[..., Path], tmp_path: Path) -> Path:
     return Path(shutil.copytree(swung(), tmp_path / "swing"))
 
 
-def without_time(solution: Solution) -> list[str]:
-    text = calibration_json(
-        solution.calibration, record_inputs(solution.source), "joint"
-    )
-    return [line for line in text.split("\n") if '"created"' not in line]
+def without_time(solution: Solution) -> dict[str, Any]:
+    inputs = record_inputs(solution.source)
+    record = calibration_record(solution.calibration, inputs, "joint", SwingLimits())
+    record.pop("created")
+    return record
 
 
 def assert_same(one: Solution, other: Solution) -> None:

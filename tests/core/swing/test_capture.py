@@ -17,11 +17,12 @@ from lightpen.detection.sighting import Sighting, look
 from lightpen.errors import FileError
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.report import (
-    calibration_json,
+    calibration_record,
 )
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
+from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import FileCopy, Header, open_record, source
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
@@ -120,11 +121,13 @@ def test_the_record_gives_the_same_tip_to_the_last_digit(wizard: Wizard) -> None
     inputs = Inputs(
         *(InputFile(Path("a"), ""), InputFile(Path("b"), "")), (), nominal_tip=None
     )
-    texts = [calibration_json(one, inputs, "joint") for one in (first, again)]
-    without_time = [
-        [line for line in text.split("\n") if '"created"' not in line] for text in texts
+    records = [
+        calibration_record(one, inputs, "joint", SwingLimits())
+        for one in (first, again)
     ]
-    assert without_time[0] == without_time[1]
+    for record in records:
+        record.pop("created")
+    assert records[0] == records[1]
     # What was shown during the swing is that tip, but for the LED geometry and the
     # order in which the iterations came to it.
     assert wizard.state.kept.seat is not None

@@ -1,5 +1,7 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
+from dataclasses import replace
+
 from PySide6.QtCore import QTimer, Slot
 from PySide6.QtWidgets import (
     QApplication,
@@ -12,12 +14,11 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.errors import FileError
 from lightpen.estimation.verdict import (
     NextStep,
     Verdict,
 )
-from lightpen.record.results import Result, last_result
+from lightpen.record.results import Result
 from lightpen.record.solving import Solution
 from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
@@ -42,6 +43,7 @@ from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State, StateBanner
+from lightpen_app.work.job import Job
 from lightpen_app.work.workbench import Workbench
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
@@ -66,7 +68,7 @@ class ReviewPage(Rearranged, Page):
         self._doubts = ReviewDoubts(self)
         self._run = workbench.run
         self._solution: Solution | None = None
-        self._last: Result | None = None
+        self._lookup: Job | None = None
         self._told: tuple[object, ...] = ()
         self._result_shown: Result | None = None
         self._wants_more = self._repeats = False
@@ -185,6 +187,7 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
+        self._cancel_lookup()
         self._images.shut_down()
 
     @override
@@ -263,7 +266,7 @@ class ReviewPage(Rearranged, Page):
     def _why_not_accepted(self) -> str:
         if self._run.status.solution is None or self._run.status.verdict is None:
             return self.tr("Swing the pen first.")
-        if self._run.status.is_solving:
+        if self._run.status.is_solving or self._lookup is not None:
             return self.tr("The tip is being computed.")
         if self._run.status.is_reading:
             return self.tr("The swing goes on.")
@@ -309,7 +312,7 @@ class ReviewPage(Rearranged, Page):
         if solution is not self._solution:
             self._solution = solution
             self._question.hide()
-            self._result.set_value(self._outcome(solution))
+            self._look_up_last(solution)
         self._fill_tab()
         self._refresh_words()
 
@@ -320,18 +323,40 @@ class ReviewPage(Rearranged, Page):
             if is_seen and panel.value() is not self._solution:
                 panel.set_value(self._solution)
 
-    def _outcome(self, solution: Solution | None) -> Outcome | None:
+    def _look_up_last(self, solution: Solution | None) -> None:
+        """Show a solution as soon as the result before it is known."""
+        self._cancel_lookup()
+        shown = self._result.value()
         if solution is None:
-            return None
-        return Outcome(solution, self._run.status.names, self._last_accepted())
+            self._result.set_value(None)
+            return
+        if shown is not None and shown.solution.source.folder == solution.source.folder:
+            self._result.set_value(replace(shown, solution=solution))
+            return
+        archive, names = self._run.archive, self._run.status.names
+        self._lookup = job = Job(lambda _: archive.in_force(names.pen, names.tip), self)
 
-    def _last_accepted(self) -> Result | None:
-        names = self._run.status.names
-        try:
-            return last_result(self._run.results_folder, names.pen, names.tip)
-        except FileError as error:
-            self.notice_raised.emit(worded(error.sentence))
-            return None
+        # Connections
+        job.succeeded.connect(self._on_looked_up)
+        job.failed.connect(self._on_lookup_failed)
+        job.crashed.connect(self._on_looked_up)
+        job.start()
+
+    def _on_looked_up(self, last: Result | None = None) -> None:
+        assert self._solution is not None
+        self._lookup = None
+        self._result.set_value(Outcome(self._solution, self._run.status.names, last))
+        self._refresh_words()
+        self.changed.emit()
+
+    def _on_lookup_failed(self, sentence: str) -> None:
+        self.notice_raised.emit(sentence)
+        self._on_looked_up()
+
+    def _cancel_lookup(self) -> None:
+        if self._lookup is not None:
+            self._lookup.cancel()
+            self._lookup = None
 
     def _refresh_words(self) -> None:
         status = self._run.status

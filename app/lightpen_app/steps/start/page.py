@@ -10,8 +10,9 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
+from lightpen.record.acceptance import conclude_accepted
 from lightpen.record.reading import recorded_names
-from lightpen.record.results import Result, last_result
+from lightpen.record.results import Result
 from lightpen.record.unfinished import (
     Unfinished,
     discard_damaged,
@@ -269,9 +270,9 @@ class StartPage(Rearranged, Page):
         if not (pen and tip):
             self._last.set_value(LastResult(is_named=False))
             return
-        folder = self._workbench.run.results_folder
+        archive = self._workbench.run.archive
         self._lookup = self._started(
-            lambda _: last_result(folder, pen, tip), self._on_looked_up
+            lambda _: archive.in_force(pen, tip), self._on_looked_up
         )
         self._lookup.failed.connect(self._on_lookup_failed)
         self._lookup.crashed.connect(self._on_lookup_crashed)
@@ -290,9 +291,11 @@ class StartPage(Rearranged, Page):
     def _search_interrupted(self) -> None:
         if self._search is not None:
             self._search.cancel()
-        folder = self._workbench.run.records_folder
+        run = self._workbench.run
+        archive, folder = run.archive, run.records_folder
         self._search = self._started(
-            lambda _: find_unfinished(folder), self._on_interrupted_found
+            lambda _: conclude_accepted(archive, find_unfinished(folder)),
+            self._on_interrupted_found,
         )
         self._search.failed.connect(self.notice_raised)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from threading import Event
 from typing import TypeVar
 
 import numpy as np
@@ -31,9 +32,10 @@ from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
+from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
-from lightpen.record.results import Result, last_result, store_result
+from lightpen.record.results import Result
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.postures import Postures
@@ -44,7 +46,6 @@ from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.shortfall import N_MORE
-from lightpen_app.steps import review
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
@@ -129,6 +130,7 @@ class Bed:
         page.resize(1000, 600)
         page.show()
         page.entered()
+        self.qtbot.waitUntil(lambda: the(page, ResultPanel).value() is not None)
         return page
 
 
@@ -223,16 +225,21 @@ def await_solution(qtbot: QtBot, workbench: Workbench) -> None:
 
 def in_force(workbench: Workbench) -> Result | None:
     names = workbench.preparation.names
-    return last_result(workbench.run.results_folder, names.pen, names.tip)
+    return workbench.run.archive.in_force(names.pen, names.tip)
 
 
 def put_in_force(workbench: Workbench, tip_pen: FloatArray, pen: str = "LP-04") -> None:
     """Store a result of some time ago."""
     names = replace(workbench.run.status.names, pen=pen)
-    uncertainty = np.full(3, 0.002)
-    store_result(
-        workbench.run.results_folder,
-        Result(names, THEN, Grade.PASS, tip_pen, uncertainty, "elsewhere"),
+    calibration = {
+        "tip_pen_mm": tip_pen.tolist(),
+        "expanded_uncertainty_mm": [0.002, 0.002, 0.002],
+        "cone_cam_mm": [0.0, 0.0, 1000.0],
+        "covariance": np.diag(6 * [0.001**2]).tolist(),
+    }
+    record = workbench.run.records_folder / "elsewhere"
+    workbench.run.archive.store(
+        Result(names, THEN, Grade.PASS, record, (), calibration)
     )
 
 
@@ -376,7 +383,7 @@ def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
 def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
     workbench = bed.solve()
     put_in_force(workbench, tip(workbench))
-    (file,) = workbench.run.results_folder.glob("*.json")
+    (file,) = workbench.run.archive.folder.glob("*.json")
     file.write_text("{")
     page = ReviewPage(bed.workbench)
     bed.pages.append(page)
@@ -387,6 +394,49 @@ def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
     assert "is damaged" in told.args[0]
     assert page.main_action().why_not == ""
     assert "no earlier result" in differences(page)
+
+
+def test_a_tip_is_accepted_only_when_its_change_is_shown(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    workbench = bed.solve()
+    put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
+    answer_it = Event()
+    in_force_at_last = FolderArchive.in_force
+
+    def wait(archive: FolderArchive, pen: str, tip: str) -> Result | None:
+        assert answer_it.wait(PATIENCE_MS / 1000)
+        return in_force_at_last(archive, pen, tip)
+
+    with monkeypatch.context() as slow:
+        slow.setattr(FolderArchive, "in_force", wait)
+        page = ReviewPage(bed.workbench)
+        bed.pages.append(page)
+        bed.qtbot.addWidget(page)
+        page.show()
+        page.entered()
+        assert page.main_action().why_not == "The tip is being computed."
+        page.run_main_action()
+        assert not page.is_complete()
+        with bed.qtbot.waitSignal(page.changed):
+            answer_it.set()
+
+    assert page.main_action().why_not == ""
+    assert "Was the tip exchanged?" in remarks(page)
+
+
+def test_a_bug_in_the_lookup_of_the_last_result_leaves_the_tip(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caught: list[BaseException] = []
+    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
+    monkeypatch.setattr(FolderArchive, "in_force", lambda *_: 1 / 0)
+    bed.solve()
+    page = bed.show()
+
+    assert len(caught) == 1
+    assert "no earlier result" in differences(page)
+    assert page.main_action().why_not == ""
 
 
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
@@ -638,7 +688,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
 def test_a_computation_shows_its_progress_and_can_be_cancelled(
     bed: Bed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(review, "PATIENCE_MS", 0)
+    monkeypatch.setattr("lightpen_app.steps.review.page.PATIENCE_MS", 0)
     workbench = bed.solve()
     page = bed.show()
     before = workbench.run.status.solution
@@ -775,7 +825,7 @@ def test_after_acceptance_the_next_calibration_starts(
 def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    workbench.run.results_folder.write_text("a file where a folder should be")
+    workbench.run.archive.folder.write_text("a file where a folder should be")
 
     with qtbot.waitSignal(page.notice_raised) as told:
         page.run_main_action()

@@ -28,9 +28,10 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.model.limits import SwingLimits
+from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
-from lightpen.record.results import Result, last_result, store_result
+from lightpen.record.results import Result
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.swing.preparation import (
@@ -185,11 +186,16 @@ def accepted(
         names=replace(names, pen=pen or names.pen, tip=tip or names.tip),
         accepted=datetime.now().astimezone() - age,
         grade="pass",
-        tip_pen=np.array([-1.31823, -90.40951, -23.85483]),
-        uncertainty=np.array([0.0031, 0.0121, 0.0998]),
-        record="somewhere",
+        record=workbench.run.records_folder / "elsewhere",
+        images=(),
+        calibration={
+            "tip_pen_mm": [-1.31823, -90.40951, -23.85483],
+            "expanded_uncertainty_mm": [0.0031, 0.0121, 0.0998],
+            "cone_cam_mm": [0.0, 0.0, 1000.0],
+            "covariance": np.diag(6 * [0.001**2]).tolist(),
+        },
     )
-    store_result(workbench.run.results_folder, result)
+    workbench.run.archive.store(result)
 
 
 def interrupted(
@@ -323,8 +329,7 @@ def test_any_name_will_do(
     assert again.run.status.record_folder is not None
     again.shut_down()
     accepted(workbench, timedelta(0))
-    found = last_result(again.run.results_folder, name, name)
-    assert found is not None
+    assert again.run.archive.in_force(name, name) is not None
 
 
 def test_the_subject_is_pen_and_cone_as_they_are_typed(start: Opened) -> None:
@@ -652,7 +657,7 @@ def test_a_damaged_result_is_told_where_the_result_would_be(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
     accepted(workbench, timedelta(days=12))
-    (file,) = workbench.run.results_folder.iterdir()
+    (file,) = workbench.run.archive.folder.iterdir()
     file.write_text("{")
 
     (sentence,) = show(workbench).last()
@@ -664,7 +669,7 @@ def test_a_verdict_of_a_later_version_is_shown_as_it_stands(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
     accepted(workbench, timedelta(days=12))
-    (file,) = workbench.run.results_folder.iterdir()
+    (file,) = workbench.run.archive.folder.iterdir()
     file.write_text(file.read_text().replace('"pass"', '"splendid"'))
 
     assert show(workbench).last()[1] == "splendid"
@@ -691,6 +696,38 @@ def test_interrupted_swings_are_offered_the_newest_first(
     assert told == [
         *("LP-05  \u00b7  T-10  \u00b7  1 image",),
         *("LP-04  \u00b7  T-10  \u00b7  12 images",) * 2,
+    ]
+
+
+def test_a_swing_whose_program_was_killed_as_it_accepted_is_not_offered(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    folder = interrupted(workbench, "a")
+    names = workbench.preparation.names
+    accepted(workbench, timedelta(0))
+    stored = workbench.run.archive.in_force(names.pen, names.tip)
+    assert stored is not None
+    images = tuple(range(1, 13))
+    workbench.run.archive.store(replace(stored, record=folder, images=images))
+
+    assert show(workbench).rows() == ()
+    assert open_record(folder).verdict == "pass"
+
+
+def test_what_version_0_1_left_is_shown_in_force_and_offered(
+    show: Callable[[Workbench], Opened], workbench: Workbench, version_0_1: Path
+) -> None:
+    data = workbench.run.records_folder.parent
+    shutil.copytree(version_0_1, data, dirs_exist_ok=True)
+
+    start = show(workbench)
+
+    assert start.last()[1] == "CHECK"
+    assert start.last()[3:6] == (
+        *("x -1.3166 0.0063", "y -90.403 0.011", "z -23.865 0.011"),
+    )
+    assert [row.words()[1] for row in start.rows()] == [
+        "LP-04  \u00b7  T-10  \u00b7  12 images"
     ]
 
 
@@ -1103,7 +1140,7 @@ def test_a_bug_in_the_lookup_leaves_no_result_of_another_pen(
     start = show(workbench)
     before = start.last()
     with monkeypatch.context() as broken:
-        broken.setattr("lightpen_app.steps.start.page.last_result", lambda *_: 1 / 0)
+        broken.setattr(FolderArchive, "in_force", lambda *_: 1 / 0)
         start.type_into("Pen, serial number", "LP-05")
         start.settle()
     assert len(caught) == 1

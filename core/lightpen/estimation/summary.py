@@ -1,0 +1,141 @@
+"""A calibration as text for the screen."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.pivot import PivotFit
+from lightpen.estimation.report import (
+    METHODS,
+    MethodResult,
+    count_dropped,
+    result_of,
+    warnings_of,
+)
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.verdict import Verdict
+
+
+def calibration_text(
+    calibration: Calibration,
+    method: str,
+    nominal_tip: FloatArray | None,
+    verdict: Verdict,
+) -> str:
+    """Return a calibration as text for the screen, the verdict on it last."""
+    results = {name: result_of(calibration, name) for name in METHODS}
+    chosen = results[method]
+    lines = [_heading("Tip in the pen frame, mm", "xyz")]
+    for name in (method, *(other for other in METHODS if other != method)):
+        lines.append(_numbers(name, results[name].tip_pen))
+        part = ", of image noise" if name == "two-stage" else ""
+        lines.append(
+            _numbers(f"  U (k = 2){part}", results[name].expanded_uncertainty[:3])
+        )
+    if nominal_tip is not None:
+        lines.append(_numbers("nominal", nominal_tip))
+        lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
+    lines += ["", _heading("Cone in the camera frame, mm", "uvw")]
+    lines.append(_numbers(method, chosen.cone_cam))
+    lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
+    lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
+    warnings = warnings_of(calibration)
+    if warnings:
+        lines += ["", *map(str, warnings)]
+    lines += [
+        "",
+        f"Verdict      {verdict.grade.upper()}: {verdict.reason}",
+        f"             {verdict.next_step.sentence}",
+    ]
+    return "\n".join(lines)
+
+
+def pivot_text(fit: PivotFit) -> str:
+    """Return a pivot calibration as text for the screen."""
+    uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(fit.covariance))
+    return "\n".join(
+        [
+            _heading("Tip in the frame of the poses, mm", "xyz"),
+            _numbers("tip", fit.tip_pen),
+            _numbers("  U (k = 2)", uncertainty[:3]),
+            "",
+            _heading("Pivot in the camera frame, mm", "uvw"),
+            _numbers("pivot", fit.pivot_cam),
+            _numbers("  U (k = 2)", uncertainty[3:]),
+            "",
+            f"Poses        {fit.used.sum()} of {len(fit.used)} used",
+            f"Residuals    {fit.rms:.3f} mm rms an axis",
+        ]
+    )
+
+
+def _image_lines(calibration: Calibration) -> list[str]:
+    n_used = int(calibration.used.sum())
+    lines = [f"Images       {n_used} of {len(calibration.used)} used"]
+    for reason, count in count_dropped(calibration).items():
+        names = [
+            name
+            for name, why in zip(
+                calibration.observations.names, calibration.reasons, strict=True
+            )
+            if why == reason
+        ]
+        shown = ", ".join(names[:5]) + (", ..." if count > 5 else "")
+        lines.append(f"  dropped    {count} {reason}: {shown}")
+    return lines
+
+
+def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
+    budget, halves = calibration.budget, calibration.halves
+    joint = calibration.joint
+    parts = {
+        "noise": budget.correlation_factor * budget.noise,
+        "LED geometry": budget.leds,
+        "camera": budget.camera,
+    }
+    tilt = np.degrees(calibration.coverage.tilts)
+    lines = [
+        f"Residuals    {joint.rms:.4f} px rms, tip of single images "
+        f"{chosen.rms_mm:.4f} mm rms",
+        f"Weakest      {_direction(budget.weakest_direction)}, "
+        f"U = {budget.weakest_uncertainty:.4f} mm",
+        _numbers("Odd - even images", halves.difference),
+        _numbers("  U (k = 2)", halves.expanded_uncertainty),
+    ]
+    lines += [
+        _numbers(f"U from {name}", COVERAGE_FACTOR * np.sqrt(np.diag(part)[:3]))
+        for name, part in parts.items()
+        if np.any(part)
+    ]
+    lines.append(
+        f"Repeatability between blocks of images: {np.sqrt(budget.block_ratio):.2f} "
+        f"times that of independent noise, lag-1 autocorrelation "
+        f"{budget.autocorrelation:.2f}"
+    )
+    lines.append(
+        f"Postures     tilt {tilt.min():.0f} to {tilt.max():.0f} degrees, turn "
+        f"{np.degrees(np.ptp(calibration.coverage.turns)):.0f} degrees"
+    )
+    if calibration.coverage.missing:
+        lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
+    if calibration.geometry.led_sigma > 0:
+        lines.append(
+            f"LED file     off by {calibration.geometry.led_sigma:.4f} mm (standard "
+            "deviation of a coordinate), corrected as far as the images tell"
+        )
+    return lines
+
+
+def _heading(title: str, axes: str) -> str:
+    return f"{title:<30}" + "".join(f"{axis:>13}" for axis in axes)
+
+
+def _numbers(title: str, values: FloatArray) -> str:
+    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
+
+
+def _direction(vector: FloatArray) -> str:
+    axis = int(np.argmax(np.abs(vector)))
+    if abs(vector[axis]) > 0.95:
+        return f"along the pen's {'xyz'[axis]} axis"
+    return "along ({:.2f}, {:.2f}, {:.2f}) of the pen".format(*vector)

@@ -1,0 +1,366 @@
+"""Accepting is one step: killed or refused anywhere, one result is in force."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+
+from lightpen.errors import FileError
+from lightpen.estimation.verdict import Grade
+from lightpen.record.acceptance import accept, conclude_accepted
+from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.reading import HEADER, open_record, recorded_names
+from lightpen.record.results import Result
+from lightpen.record.solving import Solution, load_image, solve_again, solve_record
+from lightpen.record.unfinished import find_unfinished
+from lightpen.record.writing import RecordWriter, note_taken_out
+
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+LATER = NOON + timedelta(hours=1)
+
+# Solves the swing in a data folder, then for each line accepts it in another one, which
+# has the same swing, in a process of its own: that is killed before a line of the steps
+# that it takes, or may write files of so many bytes. It forks, as solving takes time.
+PROGRAM = """
+import os, resource, signal, sys
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from lightpen.errors import FileError
+from lightpen.record.acceptance import accept
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.reading import open_record
+from lightpen.record.solving import solve_record
+
+STEPS = {
+    *("accept", "store", "create_whole", "_part_of", "_name_anew", "sync_folder"),
+    *("_conclude", "_own_journal", "_write_line", "close"),
+}
+
+def die_before(n_lines):
+    def trace(frame, event, argument):
+        nonlocal n_lines
+        if frame.f_code.co_name not in STEPS:
+            return None
+        if event == "line":
+            n_lines -= 1
+            if n_lines == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+        return trace
+
+    sys.settrace(trace)
+
+def limit(n_bytes):
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, n_bytes))
+
+def run(order, number, data):
+    folder = Path(data, "records", "swing")
+    swing = replace(solution, source=replace(solution.source, folder=folder))
+    {"die": die_before, "limit": limit}[order](int(number))
+    try:
+        accept(FolderArchive(Path(data)), swing, datetime(2026, 1, 2, 13, tzinfo=UTC))
+    except FileError:
+        os._exit(1)
+    os._exit(0)
+
+solution = solve_record(open_record(Path(sys.argv[1], "records", "swing")))
+print("solved", flush=True)
+for line in sys.stdin:
+    child = os.fork()
+    if child == 0:
+        run(*line.rstrip("\\n").split(" ", 2))
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+"""
+
+forks = pytest.mark.skipif(sys.platform == "win32", reason="needs processes that fork")
+
+
+@pytest.fixture(scope="module")
+def swing(swung: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder with a swing whose tip can be accepted; copy it to change it."""
+    data = tmp_path_factory.mktemp("accepting") / "data"
+    folder = Path(shutil.copytree(swung(), data / RECORDS / "swing"))
+    header = json.loads((folder / HEADER).read_text("utf-8"))
+    header["settings"]["max_uncertainty_mm"] = 1.0
+    (folder / HEADER).write_text(json.dumps(header), "utf-8")
+    return data
+
+
+@pytest.fixture(scope="module")
+def solved(swing: Path) -> Solution:
+    return solve_record(open_record(swing / RECORDS / "swing"))
+
+
+class Case:
+    """A data folder in which a tip of the pen is in force, and its next swing.
+
+    Parameters
+    ----------
+    swing : Path
+        Data folder of the swing.
+    solution : Solution
+        Of the swing.
+    data : Path
+        Folder to be made.
+    """
+
+    def __init__(self, swing: Path, solution: Solution, data: Path) -> None:
+        shutil.copytree(swing, data)
+        self.data, self.records = data, data / RECORDS
+        self.folder = self.records / "swing"
+        self.archive = FolderArchive(data)
+        self.names = recorded_names(open_record(self.folder))
+        source = replace(solution.source, folder=self.folder)
+        self.solution = replace(solution, source=source)
+        self.archive.store(
+            Result(
+                names=self.names,
+                accepted=NOON,
+                grade=Grade.PASS,
+                record=self.records / "earlier",
+                images=(1, 2),
+                calibration={
+                    "tip_pen_mm": [1.0, 2.0, 3.0],
+                    "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
+                    "cone_cam_mm": [1.0, 2.0, 3.0],
+                    "covariance": [[0.25] * 6] * 6,
+                },
+            )
+        )
+
+    def accept(self) -> Result:
+        return accept(self.archive, self.solution, LATER)
+
+    def in_force(self) -> Result:
+        found = self.archive.in_force(self.names.pen, self.names.tip)
+        assert found is not None
+        return found
+
+    def n_results(self) -> int:
+        return len(list(self.archive.folder.glob("*.json")))
+
+    def verdict(self) -> str | None:
+        return open_record(self.folder).verdict
+
+    def offered(self) -> list[str]:
+        """Names of the swings that are offered at the next start."""
+        found = conclude_accepted(self.archive, find_unfinished(self.records))
+        assert found.damaged == ()
+        return [record.folder.name for record in found.interrupted]
+
+
+@pytest.fixture
+def case(swing: Path, solved: Solution, tmp_path: Path) -> Case:
+    return Case(swing, solved, tmp_path / "data")
+
+
+@pytest.fixture
+def elsewhere(swing: Path) -> Iterator[Callable[[str, int, Path], int]]:
+    """Return a function that accepts in another process, and gives its exit status."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(swing)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        orders: IO[str] = process.stdin
+        told: IO[str] = process.stdout
+        assert told.readline() == "solved\n"
+
+        def run(order: str, number: int, data: Path) -> int:
+            orders.write(f"{order} {number} {data}\n")
+            orders.flush()
+            return int(told.readline())
+
+        yield run
+        orders.close()
+
+
+Elsewhere = Callable[[str, int, Path], int]
+
+
+def test_an_accepted_tip_is_in_force_and_its_swing_concluded(case: Case) -> None:
+    result = case.accept()
+
+    found = case.in_force()
+    joint = case.solution.calibration.joint
+    assert found.tip_pen.tolist() == result.tip_pen.tolist() == joint.tip_pen.tolist()
+    assert (found.names, found.accepted, found.grade) == (
+        case.names,
+        LATER,
+        Grade.CHECK,
+    )
+    assert (found.record, found.images) == (case.folder, tuple(range(1, 21)))
+    assert case.verdict() == Grade.CHECK
+    assert case.offered() == []
+
+
+def test_the_result_holds_what_the_command_line_writes_of_the_record(
+    case: Case, lightpen: Callable[..., Any], tmp_path: Path
+) -> None:
+    case.accept()
+    file = tmp_path / "calibration.json"
+    assert lightpen("calibrate", case.folder, "--json", file).returncode == 0
+    written = json.loads(file.read_bytes())
+
+    stored = dict(case.in_force().calibration)
+
+    assert stored.pop("created")
+    assert written.pop("created")
+    assert stored == written
+    assert {"covariance", "cone_cam_mm", "uncertainty", "frames", "verdict"} < {*stored}
+    assert len(stored["inputs"]["observations"]) == 20
+
+
+def test_a_tip_that_must_be_repeated_is_a_mistake_to_accept(case: Case) -> None:
+    text = (case.folder / HEADER).read_text("utf-8")
+    strict = text.replace('"max_uncertainty_mm": 1.0', '"max_uncertainty_mm": 1e-9')
+    (case.folder / HEADER).write_text(strict, "utf-8")
+
+    with pytest.raises(ValueError, match="must not be repeat"):
+        case.accept()
+    assert case.n_results() == 1
+
+
+def test_a_swing_accepted_twice_has_one_result(case: Case) -> None:
+    first = case.accept()
+    length = open_record(case.folder).length
+    again = case.accept()
+
+    assert again.accepted == first.accepted
+    assert case.n_results() == 2
+    assert open_record(case.folder).length == length
+
+
+def test_other_images_of_a_swing_are_another_result(case: Case) -> None:
+    case.accept()
+    note_taken_out(case.folder, {3: "taken out"})
+    case.solution = solve_again(case.solution, {3: "taken out"})
+    case.accept()
+
+    assert case.n_results() == 3
+    assert case.in_force().images == (1, 2, *range(4, 21))
+    frames = case.in_force().calibration["frames"]
+    assert [frame["reason"] for frame in frames[:4]] == ["", "", "taken out", ""]
+
+
+def test_a_swing_that_has_changed_since_it_was_solved_is_refused(case: Case) -> None:
+    note_taken_out(case.folder, {3: "taken out"})
+
+    with pytest.raises(FileError, match="has changed since its tip was computed"):
+        case.accept()
+    assert case.n_results() == 1
+    assert case.offered() == ["swing"]
+
+
+def test_a_swing_that_another_program_writes_to_is_refused(
+    case: Case, holding: Callable[[Path], "subprocess.Popen[str]"]
+) -> None:
+    holding(case.folder)
+
+    with pytest.raises(FileError, match="Another program is writing"):
+        case.accept()
+    assert case.n_results() == 1
+
+
+def test_images_captured_after_the_acceptance_are_offered(case: Case) -> None:
+    case.accept()
+    record = open_record(case.folder)
+    first = record.images[0]
+    with RecordWriter.resume(record) as writer:
+        image = load_image(case.solution, 1)
+        writer.append(image, first.pixels, first.rotation, first.translation, 9.0)
+
+    assert case.offered() == ["swing"]
+
+
+def test_a_damaged_result_of_a_swing_is_accepted_anew(case: Case) -> None:
+    case.accept()
+    newest = max(case.archive.folder.glob("*.json"))
+    newest.write_bytes(newest.read_bytes()[:-100])
+    case.accept()
+
+    assert case.n_results() == 3
+    assert case.in_force().record == case.folder
+
+
+@forks
+def test_killed_before_any_line_it_leaves_the_old_tip_or_the_new_and_no_doubt(
+    swing: Path, solved: Solution, elsewhere: Elsewhere, tmp_path: Path
+) -> None:
+    met = set[tuple[bool, bool]]()
+    status, number = -signal.SIGKILL, 0
+    while status == -signal.SIGKILL:
+        number += 1
+        case = Case(swing, solved, tmp_path / str(number))
+        status = elsewhere("die", number, case.data)
+        is_new = case.in_force().record == case.folder
+        met.add((is_new, case.verdict() is not None))
+
+        assert case.n_results() == 1 + is_new
+        assert case.offered() == ([] if is_new else ["swing"])
+        assert (case.verdict() == Grade.CHECK) is is_new
+        case.accept()
+        assert case.in_force().record == case.folder
+        assert case.n_results() == 2
+        shutil.rmtree(case.data)
+
+    assert status == 0
+    assert number > 50
+    assert met == {(False, False), (True, False), (True, True)}
+
+
+@forks
+def test_a_full_disk_keeps_the_old_tip_and_the_next_attempt_succeeds(
+    case: Case, elsewhere: Elsewhere
+) -> None:
+    assert elsewhere("limit", 1000, case.data) == 1
+    assert case.in_force().accepted == NOON
+    assert case.offered() == ["swing"]
+    assert case.n_results() == 1
+
+    assert elsewhere("limit", 10_000_000, case.data) == 0
+    assert case.in_force().record == case.folder
+    assert case.verdict() == Grade.CHECK
+
+
+@forks
+def test_a_journal_that_cannot_be_written_is_concluded_at_the_next_start(
+    case: Case, elsewhere: Elsewhere
+) -> None:
+    with RecordWriter.resume(open_record(case.folder)) as writer:
+        for _ in range(50):  # until the journal is longer than the result
+            writer.take_out(range(1000, 2000), "taken out")
+            writer.put_back(range(1000, 2000))
+    journal = open_record(case.folder).length
+
+    assert elsewhere("limit", journal, case.data) == 0
+    assert case.in_force().record == case.folder
+    assert case.verdict() is None
+
+    assert case.offered() == []
+    assert case.verdict() == Grade.CHECK
+
+
+def test_an_accepted_swing_is_not_offered_though_it_cannot_be_concluded(
+    case: Case, holding: Callable[[Path], "subprocess.Popen[str]"]
+) -> None:
+    images = tuple(range(1, 21))
+    case.archive.store(replace(case.in_force(), record=case.folder, images=images))
+    found = find_unfinished(case.records)
+    holding(case.folder)
+
+    assert len(found.interrupted) == 1
+    assert conclude_accepted(case.archive, found).interrupted == ()
+    assert case.verdict() is None

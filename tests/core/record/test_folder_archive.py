@@ -1,0 +1,479 @@
+"""Accepted tips: the last one of a pen and tip is in force, and none is ever lost."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.errors import FileError
+from lightpen.record.folder_archive import HEAD, FolderArchive
+from lightpen.record.names import Names
+from lightpen.record.results import Result
+
+NAMES = Names("Halle 3", "Jörg", "LP-04", "T-10", "C-1", 3.0005)
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+
+
+def result(
+    x: float = 1 / 3,
+    names: Names = NAMES,
+    accepted: datetime = NOON,
+    record: Path = Path("records", "1"),
+) -> Result:
+    return Result(
+        names=names,
+        accepted=accepted,
+        grade="pass",
+        record=record,
+        images=(1, 2, 4),
+        calibration={
+            "tip_pen_mm": [x / 3, -30.0, -25 / 3],
+            "expanded_uncertainty_mm": [0.001, 0.004 / 3, 0.005 / 3],
+            "cone_cam_mm": [x, 200.0, 1000.0],
+            "covariance": (np.eye(6) / 3e6).tolist(),
+            "warnings": ["Ölig: 5 µm."],
+            "frames": [{"file": "000001.png", "used": True}],
+        },
+    )
+
+
+def of_format_1(record: str) -> str:
+    """Return a result as version 0.1 wrote it."""
+    entries = {
+        "format": 1,
+        "accepted": "2026-01-02T12:00:00+00:00",
+        "station": "Halle 3",
+        "operator": "Jörg",
+        "pen": "LP-04",
+        "tip": "T-10",
+        "cone": "C-1",
+        "ball_diameter_mm": 3.0005,
+        "grade": "check",
+        "tip_pen_mm": [1.0, -90.0, -25.0],
+        "expanded_uncertainty_mm": [0.003, 0.004, 0.005],
+        "record": record,
+    }
+    return json.dumps(entries, indent=1, ensure_ascii=False)
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> FolderArchive:
+    return FolderArchive(tmp_path / "data")
+
+
+def files_of(archive: FolderArchive) -> list[Path]:
+    return sorted(archive.folder.glob("*.json"))
+
+
+def in_force(archive: FolderArchive, pen: str = "LP-04", tip: str = "T-10") -> Result:
+    found = archive.in_force(pen, tip)
+    assert found is not None
+    return found
+
+
+def x_in_force(archive: FolderArchive, pen: str = "LP-04", tip: str = "T-10") -> float:
+    return float(in_force(archive, pen, tip).tip_pen[0])
+
+
+def test_a_result_is_read_back_to_the_last_digit(archive: FolderArchive) -> None:
+    given = result(accepted=datetime.now(timezone(timedelta(hours=8))))
+    archive.store(given)
+
+    found = in_force(archive)
+
+    assert (found.names, found.accepted, found.grade, found.images) == (
+        *(NAMES, given.accepted, "pass", (1, 2, 4)),
+    )
+    assert found.calibration == given.calibration
+    np.testing.assert_array_equal(found.tip_pen, given.tip_pen)
+    np.testing.assert_array_equal(found.uncertainty, given.uncertainty)
+    np.testing.assert_array_equal(found.covariance, np.eye(6) / 3e6)
+    np.testing.assert_array_equal(found.cone_cam, [1 / 3, 200.0, 1000.0])
+
+
+def test_at_first_none_is_in_force(archive: FolderArchive) -> None:
+    assert archive.in_force("LP-04", "T-10") is None
+    assert archive.of_record(Path("records", "1")) is None
+
+
+def test_each_pen_and_tip_has_its_own_in_force(archive: FolderArchive) -> None:
+    archive.store(result(3.0))
+    archive.store(result(6.0, replace(NAMES, tip="T-11")))
+    archive.store(result(9.0, replace(NAMES, pen="LP-05")))
+
+    assert x_in_force(archive) == 1.0
+    assert x_in_force(archive, tip="T-11") == 2.0
+    assert x_in_force(archive, pen="LP-05") == 3.0
+    assert archive.in_force("LP-05", "T-11") is None
+
+
+def test_the_last_accepted_is_in_force(archive: FolderArchive) -> None:
+    for day in range(12):
+        archive.store(result(3.0 * day, accepted=NOON + timedelta(day)))
+
+    assert x_in_force(archive) == 11.0
+
+
+def test_a_clock_that_was_set_back_does_not_keep_the_old_tip_in_force(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result(3.0, accepted=NOON))
+    archive.store(result(6.0, accepted=NOON - timedelta(days=9000)))
+
+    assert x_in_force(archive) == 2.0
+
+
+def test_nothing_is_overwritten_even_at_the_same_instant(
+    archive: FolderArchive,
+) -> None:
+    for n in range(5):
+        archive.store(result(3.0 * n))
+
+    tips = [
+        json.loads(file.read_bytes())["calibration"]["tip_pen_mm"][0]
+        for file in files_of(archive)
+    ]
+    assert tips == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert x_in_force(archive) == 4.0
+
+
+@pytest.mark.parametrize(
+    "name", ["a/b\\c", "王 Ä", "w" * 200, "..", "T 10 ", "\udce4", "\x00\n", "T" * HEAD]
+)
+def test_any_name_will_do(archive: FolderArchive, name: str) -> None:
+    names = replace(NAMES, pen=name, tip=name)
+    archive.store(result(6.0, names))
+
+    assert x_in_force(archive, name, name) == 2.0
+
+
+# Damage
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"{",
+        b"",
+        b"[]",
+        b"null",
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b'{"accepted": 5}',
+        b'{"format": "two"}',
+    ],
+)
+def test_a_damaged_result_is_told_and_not_passed_over(
+    archive: FolderArchive, content: bytes
+) -> None:
+    """An older tip must not come into force again in silence."""
+    archive.store(result())
+    archive.store(result(accepted=NOON + timedelta(1)))
+    file = files_of(archive)[1]
+    file.write_bytes(content)
+
+    with pytest.raises(FileError, match="000002_") as caught:
+        archive.in_force("LP-04", "T-10")
+    assert str(file) in str(caught.value)
+
+
+def test_a_result_cut_anywhere_is_damaged(archive: FolderArchive) -> None:
+    archive.store(result())
+    (file,) = files_of(archive)
+    content = file.read_bytes()
+    for length in range(0, len(content) - 2, 7):
+        file.write_bytes(content[:length])
+        with pytest.raises(FileError, match="000001_"):
+            archive.in_force("LP-04", "T-10")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("accepted", "yesterday"),
+        ("accepted", "2026-01-02T12:00:00"),
+        ("ball_diameter_mm", "wide"),
+        ("images", 5),
+        ("calibration", []),
+        ("format", None),
+    ],
+)
+def test_an_entry_that_makes_no_sense_is_damage(
+    archive: FolderArchive, key: str, value: object
+) -> None:
+    archive.store(result())
+    (file,) = files_of(archive)
+    file.write_text(json.dumps(json.loads(file.read_bytes()) | {key: value}))
+
+    with pytest.raises(FileError, match="is damaged"):
+        archive.in_force("LP-04", "T-10")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("tip_pen_mm", [1.0, 2.0]),
+        ("tip_pen_mm", [1.0, 2.0, float("nan")]),
+        ("expanded_uncertainty_mm", [1.0, 2.0, float("inf")]),
+        ("cone_cam_mm", None),
+        ("covariance", [1.0, 2.0, 3.0]),
+    ],
+)
+def test_a_tip_that_makes_no_sense_is_damage(
+    archive: FolderArchive, key: str, value: object
+) -> None:
+    archive.store(result())
+    (file,) = files_of(archive)
+    entries = json.loads(file.read_bytes())
+    entries["calibration"][key] = value
+    file.write_text(json.dumps(entries))
+
+    with pytest.raises(FileError, match="is damaged"):
+        archive.in_force("LP-04", "T-10")
+
+
+def test_a_result_written_anew_by_other_programs_is_read(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result(3.0))
+    (file,) = files_of(archive)
+    file.write_text(json.dumps(json.loads(file.read_bytes())))
+
+    assert x_in_force(archive) == 1.0
+
+
+def test_a_result_of_a_later_version_is_refused_and_hides_none(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result(3.0, replace(NAMES, tip="T-11")))
+    archive.store(result(6.0))
+    archive.store(result(9.0))
+    file = files_of(archive)[2]
+    entries = json.loads(file.read_bytes())
+    file.write_text(json.dumps(entries | {"format": 3, "calibration": "elsewhere"}))
+
+    with pytest.raises(FileError, match=r"later version of the program \(format 3"):
+        archive.in_force("LP-04", "T-10")
+    assert x_in_force(archive, tip="T-11") == 1.0
+
+
+def test_a_ball_diameter_that_is_not_known_is_stored_as_none(
+    archive: FolderArchive,
+) -> None:
+    archive.store(replace(result(), names=replace(NAMES, ball_diameter=None)))
+
+    (file,) = files_of(archive)
+    assert json.loads(file.read_bytes())["ball_diameter_mm"] is None
+    assert in_force(archive).names.ball_diameter is None
+
+
+def test_a_damaged_result_that_is_older_does_not_matter(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result())
+    files_of(archive)[0].write_bytes(b"{")
+    archive.store(result(6.0))
+
+    assert x_in_force(archive) == 2.0
+
+
+def test_other_files_in_the_folder_are_left_alone(archive: FolderArchive) -> None:
+    archive.folder.mkdir(parents=True)
+    (archive.folder / "notes.json").write_text("{}")
+    (archive.folder / "000009_x.txt").write_text("no result")
+    archive.store(result(3.0))
+
+    assert [file.name[:7] for file in files_of(archive)] == ["000001_", "notes.j"]
+    assert x_in_force(archive) == 1.0
+
+
+# Where the swing is recorded
+
+
+def record_in(data: Path, name: str = "swing") -> Path:
+    folder = data / "records" / name
+    folder.mkdir(parents=True)
+    return folder
+
+
+def test_the_record_is_found_after_the_data_folder_has_moved(tmp_path: Path) -> None:
+    folder = record_in(tmp_path / "data")
+    FolderArchive(tmp_path / "data").store(result(record=folder))
+    (file,) = (tmp_path / "data" / "results").iterdir()
+    (tmp_path / "elsewhere").mkdir()
+
+    shutil.move(tmp_path / "data", tmp_path / "elsewhere" / "moved")
+
+    moved = FolderArchive(tmp_path / "elsewhere" / "moved")
+    there = tmp_path / "elsewhere" / "moved" / "records" / "swing"
+    assert in_force(moved).record == there
+    assert moved.of_record(there) is not None
+    text = (moved.folder / file.name).read_text()
+    assert json.loads(text)["record"] == "records/swing"
+    assert str(tmp_path) not in text
+
+
+def test_a_record_outside_the_data_folder_is_named_by_its_whole_path(
+    archive: FolderArchive, tmp_path: Path
+) -> None:
+    folder = record_in(tmp_path / "another disk")
+    archive.store(result(record=folder))
+
+    assert in_force(archive).record == folder
+    (file,) = files_of(archive)
+    assert json.loads(file.read_bytes())["record"] == folder.as_posix()
+
+
+def test_a_data_folder_named_from_the_current_one_is_the_same(
+    archive: FolderArchive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    FolderArchive(Path("data")).store(result(record=Path("data", "records", "swing")))
+    monkeypatch.chdir("/")
+
+    assert in_force(archive).record == tmp_path / "data" / "records" / "swing"
+
+
+def test_the_result_of_a_record_is_the_last_one_that_can_be_read(
+    archive: FolderArchive, tmp_path: Path
+) -> None:
+    one, other = (record_in(tmp_path / "data", name) for name in ("1", "2"))
+    for x, record in ((3.0, one), (6.0, one), (9.0, other), (12.0, one), (15.0, one)):
+        archive.store(result(x, record=record))
+    files_of(archive)[3].write_bytes(b"{")
+    files_of(archive)[4].write_bytes(b'{"record": "\\u0000"}')
+
+    found = archive.of_record(one)
+
+    assert found is not None
+    assert found.tip_pen[0] == 2.0
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "/home/ann/.local/share/lightpen/records/swing",
+        "C:\\Users\\ann\\AppData\\Local\\lightpen\\records\\swing",
+    ],
+)
+def test_the_record_of_a_result_of_version_0_1_is_found_in_the_data_folder(
+    archive: FolderArchive, tmp_path: Path, written: str
+) -> None:
+    folder = record_in(tmp_path / "data")
+    archive.folder.mkdir()
+    (archive.folder / "000001_x.json").write_text(of_format_1(written), "utf-8")
+
+    found = in_force(archive)
+
+    assert (found.names, found.accepted, found.grade) == (NAMES, NOON, "check")
+    assert found.tip_pen.tolist() == [1.0, -90.0, -25.0]
+    assert found.uncertainty.tolist() == [0.003, 0.004, 0.005]
+    assert (found.covariance, found.cone_cam, found.images) == (None, None, None)
+    assert found.record == folder
+
+
+def test_the_record_of_a_result_of_version_0_1_is_where_it_says_if_it_is_there(
+    archive: FolderArchive, tmp_path: Path
+) -> None:
+    record_in(tmp_path / "data")
+    folder = record_in(tmp_path / "another disk")
+    archive.folder.mkdir()
+    (archive.folder / "000001_x.json").write_text(of_format_1(str(folder)), "utf-8")
+
+    assert in_force(archive).record == folder
+
+
+# The disk
+
+
+def test_a_thousand_results_of_other_pens_cost_little(archive: FolderArchive) -> None:
+    """Only their first entries are read; one of 300 images has 1 MB."""
+    many = [{"file": f"{n:06d}.png", "leds": [0.5] * 100} for n in range(300)]
+    whole = replace(result(), calibration={**result().calibration, "frames": many})
+    archive.store(whole)
+    (first,) = files_of(archive)
+    content = first.read_bytes().replace(b"LP-04", b"LP-05")
+    for number in range(2, 1001):
+        (archive.folder / f"{number:06d}_x.json").write_bytes(content)
+
+    start = time.perf_counter()
+    found = in_force(archive)
+    elapsed = time.perf_counter() - start
+
+    assert len(found.calibration["frames"]) == 300
+    assert elapsed < 1.0  # 0.05 s on an idle machine; reading them whole takes 4 s
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("no folder")
+
+    with pytest.raises(FileError, match="cannot be made"):
+        FolderArchive(tmp_path / "data").store(result())
+
+
+OTHER_PROCESS = """
+import resource, signal, sys
+from pathlib import Path
+from lightpen.errors import FileError
+from lightpen.record.folder_archive import FolderArchive
+sys.path.insert(0, sys.argv[1])
+from test_folder_archive import result
+
+archive, limit = FolderArchive(Path(sys.argv[2])), int(sys.argv[3])
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+try:
+    archive.store(result(6.0))
+except FileError as error:
+    print(error)
+"""
+
+
+def stored_elsewhere(
+    archive: FolderArchive, limit: int = 100_000, words: Sequence[str] = ()
+) -> str:
+    """Store in a process whose files may have so many bytes; return what it says."""
+    own, data = Path(__file__).parent, archive.folder.parent
+    child = subprocess.run(
+        [*words, sys.executable, "-c", OTHER_PROCESS, own, data, str(limit)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return child.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a limit of file sizes")
+def test_a_full_disk_is_told_and_keeps_the_old_tip_in_force(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result(3.0))
+
+    assert "cannot be written" in stored_elsewhere(archive, limit=100)
+
+    assert len(list(archive.folder.iterdir())) == 1
+    assert x_in_force(archive) == 1.0
+    assert stored_elsewhere(archive) == ""
+    assert x_in_force(archive) == 2.0
+
+
+def test_a_write_protected_folder_is_told_and_keeps_the_old_tip_in_force(
+    archive: FolderArchive, obedient: Sequence[str]
+) -> None:
+    archive.store(result(3.0))
+    archive.folder.chmod(0o555)
+
+    assert "permission is denied" in stored_elsewhere(archive, words=obedient)
+
+    archive.folder.chmod(0o755)
+    assert x_in_force(archive) == 1.0
+    assert stored_elsewhere(archive, words=obedient) == ""
+    assert x_in_force(archive) == 2.0
