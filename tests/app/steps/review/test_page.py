@@ -47,7 +47,6 @@ from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.shortfall import N_MORE
-from lightpen_app.steps import review
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
@@ -640,7 +639,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
 def test_a_computation_shows_its_progress_and_can_be_cancelled(
     bed: Bed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(review, "PATIENCE_MS", 0)
+    monkeypatch.setattr("lightpen_app.steps.review.page.PATIENCE_MS", 0)
     workbench = bed.solve()
     page = bed.show()
     before = workbench.run.solution
