@@ -115,13 +115,11 @@ class Bed:
         header = json.loads((folder / "header.json").read_text("utf-8"))
         header["settings"]["max_uncertainty_mm"] = limit
         (folder / "header.json").write_text(json.dumps(header), "utf-8")
-        workbench.open_camera()
         workbench.run.go_on(read_resumable(folder))
         workbench.run.finish()
         self.qtbot.waitUntil(
             lambda: workbench.run.verdict is not None, timeout=PATIENCE_MS
         )
-        workbench.live.close()
         return workbench
 
     def show(self) -> ReviewPage:
