@@ -20,7 +20,8 @@ USAGE = """\
 Usage: {run} COMMAND
 
   demo             watch a simulated operator calibrate a tip
-  test [ARGS]      run the test suite; ARGS go to pytest
+  test             run the test suite, on all processor cores
+  test ARGS        run pytest with ARGS, in one process: {run} test -x -k pivot
   check            check style, types and the order of imports
   bench [ARGS]     measure every figure of speed and accuracy; try: {run} bench --help
   lightpen [ARGS]  run the program itself; try: {run} lightpen --help
@@ -29,6 +30,7 @@ Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"  # the first that installs dependency groups
+PARALLEL = ("--numprocesses", "auto", "--dist", "worksteal")
 CHECKS = (
     ("ruff", "check"),
     ("ruff", "format", "--check"),
@@ -227,7 +229,10 @@ def main(arguments: Sequence[str]) -> int:
             environment.set_up("development")
             os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
             os.chdir(ROOT)
-            become([environment.program("python"), "-m", "pytest", *options])
+            # A debugger, the output as it comes and an end at the first failure need
+            # one process; and for a few tests others are not worth their start.
+            words = options or PARALLEL
+            become([environment.program("python"), "-m", "pytest", *words])
         case _:
             run = r".\run.ps1" if os.name == "nt" else "./run"
             say(USAGE.format(run=run))

@@ -9,11 +9,16 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import IO, Any
 
 import pytest
+from filelock import FileLock
+
+# As the program does; NumPy reads it when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 HOLDER = """
 import sys, time
@@ -93,27 +98,52 @@ def script() -> Callable[..., CompletedProcess[str]]:
     return run
 
 
+MakeOnce = Callable[[str, Callable[[Path], object]], Path]
+
+
+@pytest.fixture(scope="session")
+def once(worker_id: str, tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
+    """Return a function that has a folder made once, by whoever needs it first.
+
+    It belongs to all processes of a parallel run: copy it before you change it.
+    """
+    own = tmp_path_factory.getbasetemp()
+    shelf = (own if worker_id == "master" else own.parent) / "made-once"
+    shelf.mkdir(exist_ok=True)
+
+    def made(what: str, make: Callable[[Path], object]) -> Path:
+        place = shelf / sha256(what.encode()).hexdigest()[:16]
+        with FileLock(place.with_suffix(".lock")):
+            if not place.exists():
+                draft = place.with_suffix(".draft")
+                shutil.rmtree(draft, ignore_errors=True)  # of one who failed
+                draft.mkdir()
+                make(draft)
+                draft.rename(place)
+        return place
+
+    return made
+
+
 @pytest.fixture(scope="session")
 def scene(
-    lightpen: Callable[..., CompletedProcess[str]],
-    tmp_path_factory: pytest.TempPathFactory,
+    lightpen: Callable[..., CompletedProcess[str]], once: MakeOnce
 ) -> Callable[..., Path]:
     """Return a function that simulates a set with `options`, each set once."""
 
-    @cache
     def simulated(*options: str) -> Path:
-        folder = tmp_path_factory.mktemp("scene") / "set"
-        outcome = lightpen("simulate", folder, *options)
-        assert outcome.returncode == 0, outcome.stderr
-        return folder
+        def simulate(folder: Path) -> None:
+            outcome = lightpen("simulate", folder / "set", *options)
+            assert outcome.returncode == 0, outcome.stderr
+
+        return once(f"scene {options}", simulate) / "set"
 
     return simulated
 
 
 @pytest.fixture(scope="session")
 def record(
-    lightpen: Callable[..., CompletedProcess[str]],
-    tmp_path_factory: pytest.TempPathFactory,
+    lightpen: Callable[..., CompletedProcess[str]], once: MakeOnce
 ) -> Callable[..., dict[str, Any]]:
     """Return a function that calibrates from a set and reads the JSON, each set once.
 
@@ -122,35 +152,40 @@ def record(
 
     @cache
     def calibrated(folder: Path, *options: str) -> dict[str, Any]:
-        file = tmp_path_factory.mktemp("record") / "calibration.json"
-        given = options if "--centers" in options else (folder / "images", *options)
-        outcome = lightpen(
-            "calibrate", *given,
-            "--camera", folder / "camera.yaml",
-            "--pen", folder / "leds.csv",
-            "--json", file,
-        )  # fmt: skip
-        assert outcome.returncode == 0, outcome.stderr
+        def calibrate(place: Path) -> None:
+            given = options if "--centers" in options else (folder / "images", *options)
+            outcome = lightpen(
+                "calibrate", *given,
+                "--camera", folder / "camera.yaml",
+                "--pen", folder / "leds.csv",
+                "--json", place / "calibration.json",
+            )  # fmt: skip
+            assert outcome.returncode == 0, outcome.stderr
+            (place / "printed.txt").write_text(outcome.stdout, encoding="utf-8")
+
+        place = once(f"record {folder} {options}", calibrate)
         fields: dict[str, Any] = json.loads(
-            file.read_text(encoding="utf-8"), parse_constant=_refuse_constant
+            (place / "calibration.json").read_text(encoding="utf-8"),
+            parse_constant=_refuse_constant,
         )
-        return fields | {"text": outcome.stdout}
+        return fields | {"text": (place / "printed.txt").read_text(encoding="utf-8")}
 
     return calibrated
 
 
 @pytest.fixture(scope="session")
-def swung(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def swung(once: MakeOnce) -> Callable[..., Path]:
     """Return a function that records a swing of small images and leaves it unfinished.
 
     Each record is made once; copy it before you change it.
     """
 
-    @cache
     def recorded(n_images: int = 20, mask: Sequence[Sequence[float]] = ()) -> Path:
-        folder = tmp_path_factory.mktemp("swung") / "swing"
-        _record_swing(folder, n_images, mask)
-        return folder
+        place = once(
+            f"swung {n_images} {mask}",
+            lambda place: _record_swing(place / "swing", n_images, mask),
+        )
+        return place / "swing"
 
     return recorded
 

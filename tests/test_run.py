@@ -2,7 +2,8 @@
 
 import importlib.util
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -144,23 +145,56 @@ def test_source_paths_of_the_installation_hold_no_umlaut(machine: Machine) -> No
     assert (packages / written).resolve() == core.resolve()
 
 
-def test_the_benchmark_gets_its_options_in_the_environment_of_the_program(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    set_up: list[str] = []
-    commands: list[list[str]] = []
-    monkeypatch.setattr(
-        run.Environment, "set_up", lambda _, group: set_up.append(group)
-    )
-    monkeypatch.setattr(run, "become", commands.append)
-    monkeypatch.chdir(run.ROOT)  # puts the folder back after the test
-    run.main(["bench", "speed"])
+@dataclass(frozen=True)
+class Started:
+    """What a command of the user set up and became."""
 
-    [[python, script, *options]] = commands
-    assert set_up == ["program"]
-    assert python == run.Environment(run.ROOT).program("python")
+    group: str
+    python: str
+    options: list[str]
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Started]:
+    """Return a function that gives a command without doing it."""
+
+    def start(*arguments: str) -> Started:
+        groups: list[str] = []
+        commands: list[list[str]] = []
+        with monkeypatch.context() as patch:
+            patch.setattr(
+                run.Environment, "set_up", lambda _, group: groups.append(group)
+            )
+            patch.setattr(run, "become", commands.append)
+            patch.setenv("QT_QPA_PLATFORM", "offscreen")
+            patch.chdir(run.ROOT)  # puts the folder back
+            run.main(arguments)
+        [group], [[python, *options]] = groups, commands
+        return Started(group, python, options)
+
+    return start
+
+
+def test_the_benchmark_gets_its_options_in_the_environment_of_the_program(
+    started: Callable[..., Started],
+) -> None:
+    bench = started("bench", "speed")
+
+    assert bench.group == "program"
+    assert bench.python == run.Environment(run.ROOT).program("python")
+    script, *options = bench.options
     assert Path(script).is_file()
     assert options == ["speed"]
+
+
+def test_the_whole_suite_runs_in_parallel_and_a_chosen_test_in_one_process(
+    started: Callable[..., Started],
+) -> None:
+    whole, chosen = started("test"), started("test", "-k", "pivot")
+
+    assert whole.options == ["-m", "pytest", *run.PARALLEL]
+    assert chosen.options == ["-m", "pytest", "-k", "pivot"]
+    assert whole.group == chosen.group == "development"
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
+from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.errors import LightpenError, UsageError
 from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
@@ -140,10 +141,12 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
 def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
     """Play the demo, and return the exit status.
 
-    Without a display it is played unseen; what happens is printed, and at the end the
-    tip. Settings and records of the user are left alone.
+    Without a display it is played unseen, in a time of its own that waits for a machine
+    too slow for it; what happens is printed, and at the end the tip. Settings and
+    records of the user are left alone.
     """
     is_seen = has_display()
+    around = Surroundings(clock=MachineClock() if is_seen else SkippingClock())
     if not is_seen:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         qInstallMessageHandler(_tell_but_hints)
@@ -155,7 +158,7 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         settings = Settings(Path(folder) / "lightpen.ini")
         users = Settings(settings_file()).preferences()
         settings.set_preferences(users)
-        wizard = Wizard(application, make_pages, settings, Path(folder))
+        wizard = Wizard(application, make_pages, settings, Path(folder), around)
         demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:
             demo.told.connect(partial(print, flush=True))

@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Event
 
 import pytest
-from PySide6.QtCore import QEvent, QLocale, QPoint, Qt, QTimer
+from PySide6.QtCore import QDeadlineTimer, QEvent, QLocale, QPoint, Qt, QTimer
 from PySide6.QtGui import QWindow
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -30,7 +30,9 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.exceptions import TimeoutError as WaitedInVain
 from pytestqt.qtbot import QtBot
+from typing_extensions import override
 
+from lightpen.cameras.clock import SkippingClock
 from lightpen.live.sources import Surroundings
 from lightpen.record.names import Names
 from lightpen.simulator.hand import Operator
@@ -67,25 +69,36 @@ def look(dressed: QApplication) -> Iterator[None]:
     QLocale.setDefault(before)
 
 
+@pytest.fixture(autouse=True)
+def frame_rate(monkeypatch: pytest.MonkeyPatch) -> float:
+    """Simulated cameras send half as many images as usual: looking at them takes long.
+
+    In 1/s.
+    """
+    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 10.0)
+    return 10.0
+
+
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     return Settings(tmp_path / "config" / "lightpen.ini")
 
 
-class HastyClock:
-    """The clock of a machine on which all goes `SPEED` times as fast."""
+class HastyClock(SkippingClock):
+    """A clock by which all goes `SPEED` times as fast, but waits for a slow machine.
+
+    A live camera that goes by it misses no image, however late its reader is.
+    """
 
     SPEED = 4
-    is_real = True
 
-    def now_ns(self) -> int:
-        return self.SPEED * time.monotonic_ns()
-
+    @override
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
         if wake is not None:
-            return wake.wait(seconds / self.SPEED)
-        time.sleep(max(seconds, 0.0) / self.SPEED)
-        return False
+            wake.wait(seconds / self.SPEED)
+        else:
+            time.sleep(max(seconds, 0.0) / self.SPEED)
+        return super().wait(seconds, wake)
 
 
 @pytest.fixture(scope="session")
@@ -120,7 +133,8 @@ def workbench(
 
 # The whole wizard, used as an operator uses it
 
-PATIENCE_MS = 40_000  # on a machine that does other things besides
+PATIENCE_MS = 120_000  # on a machine that does other things besides
+LOOK_MS = 50  # between two looks at what the window shows
 LONGEST_ROUND = 200  # presses of the Tab key
 LEFT = Qt.MouseButton.LeftButton
 NONE = Qt.KeyboardModifier.NoModifier
@@ -197,7 +211,11 @@ class Walker:
         return any(control.isEnabled() for control in controls)
 
     def until(self, happened: Callable[[], bool]) -> None:
-        self._qtbot.waitUntil(happened, timeout=PATIENCE_MS)
+        deadline = QDeadlineTimer(PATIENCE_MS)
+        while not happened():
+            if deadline.hasExpired():
+                raise WaitedInVain
+            self._qtbot.wait(LOOK_MS)
 
     def until_says(self, text: str) -> None:
         self._until_said(text, self.says)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Run = Callable[..., CompletedProcess[str]]
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "QT_QPA_PLATFORM": ""}
-LONGEST_S = 110  # it goes by the clock on the wall, as for whoever watches
+LONGEST_S = 400  # on a machine that does other things besides
 JOINT = re.compile(r"^ *joint +(\S+) +(\S+) +(\S+)$", re.MULTILINE)
 
 
@@ -64,7 +64,7 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     walker = open_wizard()
     demo = Demo(walker.window, walker.workbench, is_watched=False)
 
-    with qtbot.waitSignal(demo.ended, timeout=60_000):
+    with qtbot.waitSignal(demo.ended, timeout=1000 * LONGEST_S):
         demo.start()
 
     assert walker.workbench.run.status.result is None

@@ -1,7 +1,7 @@
 """Interrupted swings: found at little cost, gone on with, or set aside."""
 
+import os
 import subprocess
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -14,7 +14,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.reading import DISCARDED, HEADER, JOURNAL, open_record
 from lightpen.record.unfinished import (
     discard_damaged,
     discard_swing,
@@ -29,6 +29,7 @@ from lightpen.swing.resuming import read_for_more, read_resumable
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 BLACK = np.zeros((8, 8), np.uint8)
+TOO_MUCH = 1 << 40  # bytes, to be read into memory
 
 
 @pytest.fixture(scope="module")
@@ -153,29 +154,23 @@ def test_a_folder_that_cannot_be_read_is_told(
         find_unfinished(tmp_path)
 
 
-def test_a_thousand_concluded_swings_cost_little(
+@pytest.mark.skipif(os.name == "nt", reason="files have no holes here")
+def test_of_a_concluded_swing_only_the_end_of_its_journal_is_read(
     preparation: Preparation, tmp_path: Path
 ) -> None:
-    """Only the end of their journals is read; 300 images have some 300 kB of it."""
-    with recorded(preparation, tmp_path / "0", 1) as writer:
-        writer.conclude("pass")
-    journal = (tmp_path / "0" / "journal.jsonl").read_bytes()
-    image, verdict = journal.splitlines(keepends=True)
-    header = (tmp_path / "0" / "header.json").read_bytes()
-    for number in range(1, 1000):
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        (folder / "header.json").write_bytes(header)
-        (folder / "journal.jsonl").write_bytes(300 * image + verdict)
-    recorded(preparation, tmp_path / "open", 1).close()
+    """So that thousands of them cost little."""
+    for name in ("concluded", "open"):
+        recorded(preparation, tmp_path / name, 1).close()
+    verdict = b'\n{"kind": "verdict", "verdict": "pass"}\n'
+    with (tmp_path / "concluded" / JOURNAL).open("r+b") as journal:
+        journal.seek(TOO_MUCH)  # a hole: it takes no room on the disk
+        journal.write(verdict)
+    (tmp_path / "concluded" / HEADER).write_bytes(b"never read")
 
-    start = time.perf_counter()
     found = find_unfinished(tmp_path)
-    elapsed = time.perf_counter() - start
 
     assert [record.folder.name for record in found.interrupted] == ["open"]
     assert found.damaged == ()
-    assert elapsed < 1.0  # 0.05 s on an idle machine; reading them whole takes 4 s
 
 
 def test_an_interrupted_swing_goes_on_with_all_its_images(

@@ -1,6 +1,7 @@
 """The swing, driven by a simulated hand: states, rules and end."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -85,6 +86,7 @@ class Station:
         self.events: list[SwingEvent] = []
         self.phases = [self.state.phase]
         self.told: object = None
+        self.taken: list[Transition] = []
 
     def sight(self) -> Sighting:
         """Return what the camera sees now."""
@@ -112,6 +114,7 @@ class Station:
         return self.clock.now_ns() * 1e-9
 
     def take(self, transition: Transition) -> None:
+        self.taken.append(transition)
         self.state = transition.state
         self.events += transition.events
         if self.phases[-1] is not transition.state.phase:
@@ -151,9 +154,9 @@ class Station:
         return float(np.abs(self.state.kept.seat.tip_pen - PAPER_TIP).max())
 
 
-def capturing(seconds: float = 8.0, sigma: float = 0.05) -> Station:
-    """Return a station that has been capturing for some time."""
-    station = Station(sigma=sigma)
+@cache
+def capturing_for(seconds: float) -> Station:
+    station = Station()
     station.operator.seat()
     station.run(60.0, until=Phase.CAPTURING)
     return station.run(seconds)
@@ -201,6 +204,23 @@ def shown(
         transition = advance(setup, state, sighting, state.time + 0.1)
         state, events = transition.state, (*events, *transition.events)
     return Transition(state, events)
+
+
+def capturing(seconds: float = 8.0) -> Station:
+    """Return a station that has been capturing for some time.
+
+    What the first one saw and took is not worked out again for the others.
+    """
+    first = capturing_for(seconds)
+    station = Station()
+    station.operator.seat()
+    for transition in first.taken:
+        station.clock.wait(PERIOD)
+        station.operator.held(np.array([station.now]))
+        station.take(transition)
+        station.follow()
+    station.rng.bit_generator.state = first.rng.bit_generator.state
+    return station
 
 
 @pytest.fixture(scope="module")

@@ -113,13 +113,11 @@ class Bed:
         header = json.loads((folder / "header.json").read_text("utf-8"))
         header["settings"]["max_uncertainty_mm"] = limit
         (folder / "header.json").write_text(json.dumps(header), "utf-8")
-        workbench.open_camera()
         workbench.run.runner.go_on(read_resumable(folder))
         workbench.run.runner.finish()
         self.qtbot.waitUntil(
             lambda: workbench.run.status.verdict is not None, timeout=PATIENCE_MS
         )
-        workbench.live.close()
         return workbench
 
     def show(self) -> ReviewPage:
