@@ -12,10 +12,12 @@ import pytest
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
+from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
+from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.reading import HEADER, open_record
-from lightpen.record.results import Result, last_result
+from lightpen.record.results import Result
 from lightpen.record.solving import Solution
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter
@@ -26,7 +28,7 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen.swing.preparation import CameraFile, PenFile, Preparation
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingState
@@ -132,7 +134,11 @@ class Station:
 
     @property
     def results(self) -> Path:
-        return self.folder / "results"
+        return self.archive.folder
+
+    @property
+    def archive(self) -> FolderArchive:
+        return FolderArchive(self.folder)
 
     @property
     def n_recorded(self) -> int:
@@ -160,7 +166,7 @@ class Station:
 
     def in_force(self) -> Result | None:
         names = self.preparation.names
-        return last_result(self.results, names.pen, names.tip)
+        return self.archive.in_force(names.pen, names.tip)
 
     def new_camera(self) -> SimulatedCamera:
         """Return another camera before the same pen, not open yet."""
@@ -251,7 +257,7 @@ def station(tmp_path: Path, prepared: Preparation) -> Iterator[Station]:
     camera.open()
     camera.configure(CameraSettings(frame_rate=FRAME_RATE))
     camera.start()
-    runner = SwingRunner(tmp_path / "records", tmp_path / "results", witness)
+    runner = SwingRunner(tmp_path / "records", FolderArchive(tmp_path), witness)
     yield Station(tmp_path, prepared, runner, witness, clock, operator, camera)
     runner.shut_down()
     assert runner.await_end(TIMEOUT)

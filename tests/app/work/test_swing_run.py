@@ -103,7 +103,7 @@ def test_records_and_results_are_kept_in_the_folder(
     with qtbot.waitSignal(run.changed, timeout=round(1000 * TIMEOUT)):
         run.runner.begin(preparation)
 
-    assert run.records_folder.parent == run.results_folder.parent == tmp_path / "run"
+    assert run.records_folder.parent == run.archive.folder.parent == tmp_path / "run"
     assert run.status.record_folder is not None
     assert run.status.record_folder.parent == run.records_folder
     assert f"{NOON.astimezone():%Y}" in run.status.record_folder.name

@@ -192,7 +192,7 @@ def test_the_text_shows_tip_both_methods_and_what_was_dropped(method: str) -> No
 @pytest.mark.parametrize("method", ["joint", "two-stage"])
 def test_the_text_shows_the_uncertainty_of_the_cone_under_it(method: str) -> None:
     found = record(method)
-    lines = iter(calibration_text(calibration(), method, None).splitlines())
+    lines = iter(calibration_text(calibration(), method, None, verdict()).splitlines())
 
     assert any(line.startswith("Cone") for line in lines)
     shown = [next(lines).split()[-3:], next(lines).split()[-3:]]

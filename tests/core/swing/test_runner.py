@@ -15,6 +15,7 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import WorkerEvent
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade
+from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.live.looking import Live, LiveImage
 from lightpen.messages import Code
@@ -24,9 +25,6 @@ from lightpen.record.reading import DISCARDED, IMAGES, JOURNAL, open_record
 from lightpen.record.solving import solve_record
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.sample_pens import SAMPLE_PENS
-from lightpen.swing.preparation import (
-    PenFile,
-)
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.state import Happening, Pause, Phase
 
@@ -225,7 +223,7 @@ def test_a_paused_swing_keeps_nothing_until_it_is_resumed(
     station.runner.pause()
     station.wait_for_phase(Phase.PAUSED)
     assert station.state.pause is Pause.BY_USER
-    assert station.state.message.code is Code.PAUSED
+    assert station.state.message.code == Code.PAUSED
     assert station.status.is_paused_by_user
     n_images = station.n_recorded
     station.see(30)
@@ -277,10 +275,8 @@ def test_a_swing_without_images_ends_with_the_sentence_why(station: "Station") -
     station.begin()
     station.solve()
 
-    assert station.state.message.code is Code.NO_TIP
-    assert "holds no images. Resume the swing" in str(
-        station.state.message.arguments[0]
-    )
+    assert station.state.message.code == Code.NO_TIP
+    assert "holds no images. Resume the swing" in str(station.state.message)
     assert station.witness.happenings == [Happening.CAPTURED, Happening.FAILED]
     assert (station.status.solution, station.status.verdict) == (None, None)
     assert not station.status.is_solving

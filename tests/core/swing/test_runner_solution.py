@@ -1,16 +1,15 @@
 """From the end of the capture to the tip in force."""
 
-import json
 import shutil
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lightpen.estimation.report import calibration_json
+from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade
 from lightpen.messages import Code
-from lightpen.record.reading import DISCARDED, JOURNAL, open_record
+from lightpen.record.reading import DISCARDED, JOURNAL, open_record, recorded_limits
 from lightpen.record.solving import record_inputs
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import stillness
@@ -34,7 +33,8 @@ def test_the_tip_is_that_of_the_command_line_to_the_last_digit(
 ) -> None:
     solution = solved.solution
     inputs = record_inputs(solution.source)
-    fields = json.loads(calibration_json(solution.calibration, inputs, "joint"))
+    limits = recorded_limits(open_record(solved.record_folder))
+    fields = calibration_record(solution.calibration, inputs, "joint", limits)
     fields.pop("created")
 
     assert fields == command(solved.record_folder)
@@ -384,7 +384,7 @@ def test_a_result_bears_the_time_that_the_runner_goes_by(
 ) -> None:
     noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
     runner = SwingRunner(
-        station.records, station.results, station.witness, now=lambda: noon
+        station.records, station.archive, station.witness, now=lambda: noon
     )
     station.limit_uncertainty(interrupted, 1.0)
     runner.go_on(read_resumable(interrupted))
