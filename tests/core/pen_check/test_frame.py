@@ -81,6 +81,13 @@ def test_normals_that_were_measured_turn_with_the_pen() -> None:
     np.testing.assert_allclose(moved_into_frame(raw).normals, PEN.normals, atol=1e-9)
 
 
+def test_a_pen_upside_down_breaks_the_axis() -> None:
+    check = examine_frame(with_leds(PEN.leds * [-1.0, -1.0, 1.0]))
+
+    assert broken(check) == {Rule.AXIS}
+    assert check.can_be_moved
+
+
 def test_deviations_are_told_in_mm() -> None:
     leds = PEN.leds.copy()
     leds[2, 0] += 0.3

@@ -39,6 +39,13 @@ def test_lights_on_the_pen_are_found_with_their_spots() -> None:
     assert np.isfinite(unknown.pixels).all()
 
 
+def test_a_light_in_less_than_half_of_the_views_is_none() -> None:
+    poses, spots = seen(POINTS[:1])
+    some = [each[: i % 2] for i, each in enumerate(spots)]
+
+    assert len(find_unknown_leds(CAMERA, poses, some).points) == 0
+
+
 def test_a_lamp_that_stands_still_is_no_light_on_the_pen() -> None:
     poses, _ = seen(POINTS)
     lamp = [np.array([[400.0, 300.0]]) for _ in range(10)]
