@@ -1,9 +1,7 @@
 """The GUI sees the newest image and nothing of a closed camera."""
 
-import shutil
 import threading
 from collections.abc import Callable, Iterator
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +15,15 @@ from typing_extensions import override
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import Connection
+from lightpen.live.sources import Surroundings
 from lightpen.record.reading import open_record
 from lightpen.record.writing import encode_png
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
+from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_view import LiveView, Shown
 from lightpen_app.work.swing_run import SwingRun
-from lightpen_app.work.workbench import Workbench
 
 TIMEOUT = 20.0  # s until a test gives up
 SIGNALS = (
@@ -49,15 +48,6 @@ class Diary:
 
 
 @pytest.fixture
-def run(tmp_path: Path, qapp: QApplication) -> Iterator[SwingRun]:
-    run = SwingRun(tmp_path / "run", lambda: datetime.now().astimezone())
-    yield run
-    run.runner.shut_down()
-    assert run.runner.await_end(TIMEOUT)
-    QApplication.processEvents()
-
-
-@pytest.fixture
 def view(run: SwingRun) -> Iterator[LiveView]:
     view = LiveView(run)
     yield view
@@ -72,20 +62,19 @@ def diary(view: LiveView) -> Diary:
 
 @pytest.fixture
 def stage(
-    view: LiveView, workbench: Workbench, tmp_path: Path, qtbot: QtBot
+    view: LiveView, around: Surroundings, tmp_path: Path, qtbot: QtBot
 ) -> "Stage":
-    return Stage(view, workbench, tmp_path, qtbot)
+    return Stage(view, around, tmp_path, qtbot)
 
 
 class Stage:
     """The simulated pen before a live view."""
 
     def __init__(
-        self, view: LiveView, workbench: Workbench, folder: Path, qtbot: QtBot
+        self, view: LiveView, around: Surroundings, folder: Path, qtbot: QtBot
     ) -> None:
         self.view, self.folder, self.qtbot = view, folder, qtbot
-        self.preparation = workbench.preparation
-        self.around = workbench.around
+        self.around = around
 
     def open(self, camera: SimulatedCamera | ReplayCamera | None = None) -> None:
         """Show a camera; a simulated operator follows the swing."""
@@ -122,9 +111,9 @@ class Stage:
 
 
 def test_an_image_is_shown_at_half_its_size_with_what_is_seen_in_it(
-    view: LiveView, stage: Stage, qtbot: QtBot
+    view: LiveView, stage: Stage, prepared: Preparation, qtbot: QtBot
 ) -> None:
-    view.set_aim(stage.preparation.aim)
+    view.set_aim(prepared.aim)
     with qtbot.waitSignal(view.image_shown) as shown:
         stage.open()
     (image,) = shown.args
@@ -310,14 +299,6 @@ def test_closing_what_is_not_open_does_no_harm(view: LiveView, diary: Diary) -> 
 
 
 # A swing
-
-
-@pytest.fixture
-def interrupted(run: SwingRun, swung: Callable[..., Path]) -> Path:
-    """An interrupted swing among the records of the run."""
-    folder = run.records_folder / "interrupted"
-    shutil.copytree(swung(), folder)
-    return folder
 
 
 def n_kept(run: SwingRun) -> int:

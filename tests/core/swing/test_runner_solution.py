@@ -211,7 +211,7 @@ def test_more_images_than_needed_are_not_needed_because_they_were_asked_for(
     solved.solve()
 
     assert solved.status.verdict is not None
-    assert solved.status.verdict.reason.code is not Code.TOO_FEW_IMAGES
+    assert solved.status.verdict.reason.code != Code.TOO_FEW_IMAGES
 
 
 def test_more_images_can_be_captured_while_a_wish_is_computed(
