@@ -16,6 +16,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from PySide6.QtCore import QCoreApplication
 
+from lightpen.live.sources import sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.record.unfinished import (
@@ -45,10 +46,16 @@ def main() -> int:
             _say("kept", run.status.record_folder.name, *event.numbers)
 
     run.happened.connect(tell)
+    files = sample_files(workbench.around, folder / "samples")
     workbench.set_preparation(
-        replace(workbench.preparation, names=NAMES, limits=ENDLESS)
+        replace(
+            workbench.preparation,
+            names=NAMES,
+            limits=ENDLESS,
+            camera_file=files.camera_file,
+            pen_file=files.pen_file,
+        )
     )
-    workbench.use_sample_files()
     workbench.open_camera()
     operator = workbench.live.operator
     if operator is not None:

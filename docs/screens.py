@@ -31,7 +31,7 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
 from lightpen.detection.sighting import look, sight_centers
 from lightpen.live.looking import LiveImage
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import Surroundings, sample_files
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.results import Result
@@ -56,6 +56,7 @@ from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import SAMPLES
 
 FOLDER = Path(__file__).resolve().parent / "screens"
 DATA = Path("lightpen")  # below the present folder
@@ -122,8 +123,15 @@ class Stage:
         around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
         workbench = self._workbench = self.wizard.workbench
-        workbench.set_preparation(replace(workbench.preparation, names=NAMES))
-        workbench.use_sample_files()
+        files = sample_files(around, DATA / SAMPLES)
+        workbench.set_preparation(
+            replace(
+                workbench.preparation,
+                names=NAMES,
+                camera_file=files.camera_file,
+                pen_file=files.pen_file,
+            )
+        )
         workbench.live.open(
             StillCamera(self._scene, around.clock), CameraSettings(), around.clock
         )

@@ -37,7 +37,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.record.unfinished import (find_unfinished,)
 from lightpen.swing.resuming import read_resumable
 from lightpen.record.names import Names
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import Surroundings, sample_files
 from lightpen.swing.state import (Happening,)
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
@@ -69,9 +69,16 @@ def swing(folder):
     application = QCoreApplication([])
     around = Surroundings(Scene(camera=paper_camera(binning=4)), HastyClock())
     workbench = Workbench(Settings(folder / "lightpen.ini"), folder, around)
-    chosen = replace(workbench.preparation, names=NAMES, limits=ENDLESS)
-    workbench.set_preparation(chosen)
-    workbench.use_sample_files()
+    files = sample_files(around, folder / "samples")
+    workbench.set_preparation(
+        replace(
+            workbench.preparation,
+            names=NAMES,
+            limits=ENDLESS,
+            camera_file=files.camera_file,
+            pen_file=files.pen_file,
+        )
+    )
     run = workbench.run
 
     def say(event):

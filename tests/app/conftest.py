@@ -33,7 +33,7 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import Surroundings, sample_files
 from lightpen.record.names import Names
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
@@ -125,10 +125,22 @@ def workbench(
     `workbench.open_camera()` opens it; images then come four times as fast as usual.
     """
     workbench = Workbench(settings, tmp_path / "data", around)
-    workbench.set_preparation(replace(workbench.preparation, names=NAMES))
-    workbench.use_sample_files()
+    choose_samples(workbench, tmp_path / "samples")
     yield workbench
     workbench.shut_down()
+
+
+def choose_samples(workbench: Workbench, folder: Path) -> None:
+    """Choose names, and the simulated pen's files as written to a folder."""
+    files = sample_files(workbench.around, folder)
+    workbench.set_preparation(
+        replace(
+            workbench.preparation,
+            names=NAMES,
+            camera_file=files.camera_file,
+            pen_file=files.pen_file,
+        )
+    )
 
 
 # The whole wizard, used as an operator uses it

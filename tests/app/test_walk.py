@@ -127,7 +127,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     ).all()
     walker.click("Accept")
 
-    assert walker.says("IN FORCE")
+    walker.until_says("IN FORCE")
     assert set(walker.steps().values()) == {"done", "now"}
     result = _result_on_disk(walker)
     assert result.grade == "pass"
@@ -173,7 +173,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     walker.tab_to("Accept")
     walker.press(Key.Key_Return)
 
-    assert walker.says("IN FORCE")
+    walker.until_says("IN FORCE")
     assert _result_on_disk(walker).names.operator == "Ann"
     walker.until(walker.main_button().isEnabled)
     walker.press(Key.Key_PageDown)
@@ -218,7 +218,7 @@ def test_a_recorded_swing_gives_its_tip(
     # A solver that knows the images' model comes as near as 3.1 um.
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
-    assert walker.says("IN FORCE")
+    walker.until_says("IN FORCE")
     result = _result_on_disk(walker)
     assert _calibrated(lightpen, Path(result.record)) == result.tip_pen.tolist()
 

@@ -15,7 +15,7 @@ from typing_extensions import override
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
-from lightpen.live.sources import Surroundings
+from lightpen.live.sources import Surroundings, sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
 from lightpen.record.names import Names
@@ -236,8 +236,16 @@ def shared_desk(
     folder = tmp_path_factory.mktemp("shared")
     settings = Settings(folder / "lightpen.ini")
     workbench = Workbench(settings, folder / "data", around)
-    workbench.set_preparation(replace(workbench.preparation, names=NAMES, limits=SHORT))
-    workbench.use_sample_files()
+    files = sample_files(around, folder / "samples")
+    workbench.set_preparation(
+        replace(
+            workbench.preparation,
+            names=NAMES,
+            limits=SHORT,
+            camera_file=files.camera_file,
+            pen_file=files.pen_file,
+        )
+    )
     desk = Desk(workbench, settings)
     yield desk
     desk.close()
