@@ -89,6 +89,11 @@ class Workbench(QObject):
         """What simulated and recorded sources go by."""
         return self._around
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether the files of the station are being read, or sample files written."""
+        return self._reading is not None
+
     def start(self) -> None:
         """Take over what was chosen last, and open the camera."""
         self.choose_station(self._settings.last_station())
@@ -193,8 +198,12 @@ class Workbench(QObject):
 
         # Connections
         job.succeeded.connect(on_succeeded)
-        job.failed.connect(self.troubled)
+        job.failed.connect(self._on_refused)
         job.start()
+
+    def _on_refused(self, sentence: str) -> None:
+        self._reading = None
+        self.troubled.emit(sentence)
 
     def _stop_reading(self) -> None:
         job, self._reading = self._reading, None

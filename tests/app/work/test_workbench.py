@@ -48,7 +48,16 @@ class Stage:
         self.workbench = Workbench(again, self.folder, self.workbench.around)
         self.workbench.troubled.connect(self.sentences.append)
         self.workbench.start()
+        self.wait_for_files()
         return self.workbench.preparation
+
+    def choose_station(self, name: str) -> None:
+        """Take over what was chosen last at a station, its files, too."""
+        self.workbench.choose_station(name)
+        self.wait_for_files()
+
+    def wait_for_files(self) -> None:
+        self.qtbot.waitUntil(lambda: not self.workbench.is_reading)
 
     def wait_for_size(self, size: tuple[int, int]) -> None:
         self.qtbot.waitUntil(lambda: self.workbench.preparation.image_size == size)
@@ -132,11 +141,11 @@ def test_the_units_of_a_pen_file_that_does_not_say_are_remembered(
 def test_each_station_has_choices_of_its_own(stage: Stage) -> None:
     first = stage.workbench.preparation
     stage.choose(names=OTHER, mask=MASK)
-    stage.workbench.choose_station(first.names.station)
+    stage.choose_station(first.names.station)
     assert stage.workbench.preparation.names == first.names
     assert len(stage.workbench.preparation.mask) == 0
 
-    stage.workbench.choose_station(OTHER.station)
+    stage.choose_station(OTHER.station)
     assert stage.workbench.preparation.names == OTHER
     np.testing.assert_array_equal(stage.workbench.preparation.mask, MASK)
     assert set(stage.workbench.stations()) == {first.names.station, OTHER.station}
@@ -155,6 +164,7 @@ def test_a_first_start_has_the_files_of_the_simulated_pen(
     settings = Settings(tmp_path / "new" / "lightpen.ini")
     first = Workbench(settings, tmp_path / "new data", workbench.around)
     first.start()
+    qtbot.waitUntil(lambda: not first.is_reading)
     now = first.preparation
 
     assert now.names == Names()
@@ -208,7 +218,7 @@ def test_the_files_of_the_simulated_pen_are_those_of_its_scene(stage: Stage) -> 
 
 
 def test_sample_files_that_cannot_be_written_are_told(
-    tmp_path: Path, workbench: Workbench
+    tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
     (tmp_path / "a file").write_text("")
     settings = Settings(tmp_path / "new.ini")
@@ -216,6 +226,7 @@ def test_sample_files_that_cannot_be_written_are_told(
     sentences: list[str] = []
     first.troubled.connect(sentences.append)
     first.start()
+    qtbot.waitUntil(lambda: not first.is_reading)
     first.shut_down()
 
     assert first.preparation.camera_file is None
@@ -248,7 +259,7 @@ def test_settings_that_make_no_sense_are_passed_over(
     stage: Stage, station: Station
 ) -> None:
     stage.settings.set_station("Hall 4", station)
-    stage.workbench.choose_station("Hall 4")
+    stage.choose_station("Hall 4")
     now = stage.workbench.preparation
 
     assert now.source == SourceChoice()
@@ -353,7 +364,7 @@ def test_exposure_and_gain_come_back_with_their_station(stage: Stage) -> None:
         stage.workbench.live.settings_applied,
         check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (500.0, 6.0),
     ):
-        stage.workbench.choose_station("Hall 2")
+        stage.choose_station("Hall 2")
     stage.start_again()
     with stage.qtbot.waitSignal(
         stage.workbench.live.settings_applied,
