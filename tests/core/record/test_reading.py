@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 from threading import Timer
 
@@ -135,8 +136,8 @@ def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
         command = [sys.executable, "-c", WRITER, str(folder)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
             assert child.stdout is not None
-            acknowledged.append(int(child.stdout.readline()))
-            time.sleep(rng.uniform(0, 0.03))
+            acknowledged += map(int, islice(child.stdout, int(rng.integers(1, 5))))
+            time.sleep(rng.uniform(0, 0.01))
             child.kill()
             acknowledged += map(int, child.stdout.read().split("\n")[:-1])
         record = open_record(folder)
@@ -146,7 +147,6 @@ def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
         # At most the image in flight was written without being acknowledged.
         assert len(numbers) - len(acknowledged) <= N_KILLS
 
-    assert len(acknowledged) > 2 * N_KILLS
     for image, load in zip(record.images, source(record).images.open(), strict=True):
         np.testing.assert_array_equal(load(), dark_image(image.number))
         np.testing.assert_array_equal(
