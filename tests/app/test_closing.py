@@ -212,7 +212,7 @@ def test_closing_waits_for_all_that_is_under_way_together(
         stuck.wait()
         return solve_record(record, report)
 
-    monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
+    monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
     swing_before(workbench, stuck)
     workbench.run.runner.go_on(read_resumable(interrupted))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
@@ -269,7 +269,7 @@ def test_a_solution_that_ends_in_time_is_waited_for(
         ended.set()
         return solution
 
-    monkeypatch.setattr("lightpen_app.work.swing_run.solve_record", solve)
+    monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
     workbench.run.runner.go_on(read_resumable(interrupted))
     workbench.run.runner.finish()
     qtbot.waitUntil(began.is_set, timeout=TIMEOUT)
@@ -296,7 +296,7 @@ def test_the_window_closes_in_time_and_the_swing_is_offered_again(
     folder = run.records_folder / "interrupted"
     shutil.copytree(swung(), folder)
     with monkeypatch.context() as slow:
-        slow.setattr("lightpen_app.work.swing_run.solve_record", solve)
+        slow.setattr("lightpen.swing.course.solve_record", solve)
         run.runner.go_on(read_resumable(folder))
         run.runner.finish()
         walker.until(stuck.is_reached.is_set)

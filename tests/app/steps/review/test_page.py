@@ -44,7 +44,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.resuming import read_resumable
+from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.shortfall import N_MORE
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
@@ -768,14 +768,19 @@ def test_the_two_stage_method_stands_beside_the_joint_fit(
 # What next
 
 
+def accept(page: ReviewPage, qtbot: QtBot) -> None:
+    """Press the main button, and wait until the tip is in force."""
+    page.run_main_action()
+    qtbot.waitUntil(page.is_complete, timeout=PATIENCE_MS)
+
+
 def test_an_accepted_tip_is_in_force_and_said_to_be(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     assert page.unsaved().startswith("The tip is not accepted.")
     assert in_force(workbench) is None
 
-    with qtbot.waitSignal(page.changed):
-        page.run_main_action()
+    accept(page, qtbot)
 
     result = in_force(workbench)
     assert result is not None
@@ -792,7 +797,7 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
 def test_an_accepted_swing_is_changed_no_more(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    page.run_main_action()
+    accept(page, qtbot)
     why = "The tip is accepted; start the next calibration."
 
     for text in ("Take out", "Put back", "Capture more", "Repeat"):
@@ -806,7 +811,7 @@ def test_an_accepted_swing_is_changed_no_more(
 def test_after_acceptance_the_next_calibration_starts(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    page.run_main_action()
+    accept(page, qtbot)
     # The second click of a double one must not go on.
     assert page.main_action() == MainAction(
         "Start the next calibration", "The tip is in force."
@@ -825,7 +830,7 @@ def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
 ) -> None:
     workbench.run.archive.folder.write_text("a file where a folder should be")
 
-    with qtbot.waitSignal(page.notice_raised) as told:
+    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
         page.run_main_action()
 
     assert "cannot be" in told.args[0]
@@ -835,13 +840,24 @@ def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
 
 
 def test_more_images_are_captured_into_the_same_swing(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+    page: ReviewPage,
+    workbench: Workbench,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    may_read = Event()
+
+    def read(folder: Path) -> Resumable:
+        assert may_read.wait(PATIENCE_MS / 1000)
+        return read_for_more(folder)
+
+    monkeypatch.setattr("lightpen.swing.course.read_for_more", read)
     workbench.open_camera()
     assert page.main_action().why_not == ""
     with qtbot.waitSignal(page.step_requested, timeout=PATIENCE_MS) as asked:
         click(page, "Capture more")
-        assert page.main_action().why_not == "The swing goes on."
+        qtbot.waitUntil(lambda: page.main_action().why_not == "The swing goes on.")
+        may_read.set()
 
     assert asked.args == ["swing"]
     assert workbench.run.status.is_capturing
@@ -885,7 +901,7 @@ def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
 ) -> None:
     click(page, "Repeat")
 
-    with qtbot.waitSignal(page.step_requested) as asked:
+    with qtbot.waitSignal(page.step_requested, timeout=PATIENCE_MS) as asked:
         answer(page, "Repeat")
 
     assert asked.args == ["swing"]
@@ -901,7 +917,7 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
     shutil.rmtree(workbench.run.records_folder / "swing")
     click(page, "Repeat")
 
-    with qtbot.waitSignal(page.notice_raised) as told:
+    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
         answer(page, "Repeat")
 
     assert "does not exist" in told.args[0]

@@ -68,6 +68,7 @@ class Opened:
         self.page.notice_raised.connect(self.notices.append)
         self.page.status_changed.connect(self.statuses.append)
         self.page.step_requested.connect(self.steps.append)
+        workbench.run.troubled.connect(self.notices.append)
         qtbot.addWidget(self.page)
         self.page.resize(1000, 640)
         self.page.show()
@@ -308,7 +309,7 @@ def test_all_of_it_is_remembered_for_the_station(
 
 @pytest.mark.parametrize("name", [ODD, "a" * 200, "General", "../..", "王"])
 def test_any_name_will_do(
-    start: Opened, workbench: Workbench, settings: Settings, name: str
+    start: Opened, workbench: Workbench, settings: Settings, qtbot: QtBot, name: str
 ) -> None:
     for field in ("Station", "Operator", "Pen, serial number", "Probe tip", "Cone"):
         edit = start.field(field)
@@ -325,8 +326,9 @@ def test_any_name_will_do(
     assert again.stations() == tuple(sorted(("Hall 2", name)))
     again.start()
     assert again.preparation.names == names
+    qtbot.waitUntil(lambda: not again.is_reading)
     again.run.runner.begin(again.preparation)
-    assert again.run.status.record_folder is not None
+    qtbot.waitUntil(lambda: again.run.status.record_folder is not None)
     again.shut_down()
     accepted(workbench, timedelta(0))
     assert again.run.archive.in_force(name, name) is not None
@@ -432,6 +434,7 @@ def test_a_station_whose_files_are_gone_is_told(
     workbench.troubled.connect(told.append)
 
     start.type_into("Station", "Hall 3")
+    start.settle()
 
     assert any("/gone/lp04.csv does not exist" in sentence for sentence in told)
     assert start.text_of("Station") == "Hall 3"
