@@ -315,3 +315,4 @@ def test_the_end_cancels_the_tasks_and_waits_for_them(
     may_go_on.set()
     assert queue.await_end(TIMEOUT)
     assert outcomes.came.empty()
+    assert outcomes.fractions == []  # it ended where it would have told
