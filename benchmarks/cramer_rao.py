@@ -88,8 +88,6 @@ def cramer_rao_bound(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     swing : Swing
         The true poses.
     sigma : float

@@ -28,8 +28,6 @@ class ImageSet:
 
     Attributes
     ----------
-    folder : Path
-    camera : Camera
     pen : Pen
         As measured.
     truth : dict

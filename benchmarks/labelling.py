@@ -41,7 +41,6 @@ class View:
 
     Attributes
     ----------
-    spots : Spots
     spot : (L,) array
         Spot of each LED, -1 where it is missing.
     R, t : (3, 3) and (3,) array

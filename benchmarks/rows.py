@@ -16,10 +16,6 @@ class Row:
 
     Attributes
     ----------
-    what : str
-    measured : str
-    limit : str
-    others : str
     met : bool
         Whether the limit is kept; true where there is none.
     """

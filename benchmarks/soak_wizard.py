@@ -42,13 +42,7 @@ LIMITS = SwingLimits(max_uncertainty=1e-9)
 
 
 class Soak(QObject):
-    """Drives the wizard and takes the figures.
-
-    Parameters
-    ----------
-    wizard : Wizard
-    seconds : float
-    """
+    """Drives the wizard and takes the figures."""
 
     def __init__(self, wizard: Wizard, seconds: float) -> None:
         super().__init__(wizard.window)

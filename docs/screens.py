@@ -105,12 +105,7 @@ class StillCamera(SimulatedCamera):
 
 
 class Stage:
-    """The wizard in a folder of its own, shown step by step.
-
-    Parameters
-    ----------
-    application : QApplication
-    """
+    """The wizard in a folder of its own, shown step by step."""
 
     def __init__(self, application: QApplication) -> None:
         self._application = application

@@ -44,10 +44,8 @@ class Wizard(QObject):
 
     Parameters
     ----------
-    application : QApplication
     make_pages : callable
         Returns the pages in the order of the steps.
-    settings : Settings
     folder : Path
         For records, results, sounds and crash reports.
     around : Surroundings, optional

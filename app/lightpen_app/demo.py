@@ -24,7 +24,6 @@ class Demo(QObject):
 
     Parameters
     ----------
-    window : MainWindow
     workbench : Workbench
         With a simulated source.
     is_watched : bool

@@ -177,7 +177,6 @@ def lean_phrase(target: Posture, present: Posture | None, heading: float) -> Phr
 
     Parameters
     ----------
-    target : Posture
     present : Posture or None
         Where the pen is, if it is seen.
     heading : float

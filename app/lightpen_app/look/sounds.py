@@ -115,13 +115,7 @@ class FileSounds:
 
 
 class Mute:
-    """Passes sounds on unless it is muted.
-
-    Parameters
-    ----------
-    sounds : Sounds
-    muted : bool
-    """
+    """Passes sounds on unless it is muted."""
 
     def __init__(self, sounds: Sounds, *, muted: bool = False) -> None:
         self._sounds = sounds

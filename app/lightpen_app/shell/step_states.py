@@ -20,7 +20,6 @@ class Status:
 
     Attributes
     ----------
-    title : str
     complete : bool
         All that the step asks for is there.
     why_closed : str
@@ -38,8 +37,6 @@ class Step:
 
     Attributes
     ----------
-    title : str
-    state : StepState
     why_closed : str
         A sentence for a closed step, else empty.
     """

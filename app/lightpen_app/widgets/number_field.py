@@ -22,7 +22,6 @@ class NumberField(QDoubleSpinBox):
     unit : str
         Shown after the number.
     limits : (least, greatest)
-    n_decimals : int
     """
 
     def __init__(

@@ -32,12 +32,10 @@ class OperatorValue:
         What to do, a few words.
     hint : str
         A sentence more.
-    state : State
     count : str
         Such as "184 / 300".
     fraction : float or None
         How much is done, 0 to 1.
-    dial : DialValue or None
     """
 
     instruction: str = ""

@@ -29,8 +29,6 @@ class Remark:
     ----------
     text : str
         Empty for nothing to remark.
-    sign : Sign
-    tone : Tone
     """
 
     text: str = ""

@@ -47,7 +47,6 @@ class Shown:
         The image at half its size, see `lightpen_app.look.pooling.pooled`.
     size : QSize
         Of the whole image, px.
-    seen : LiveImage
     """
 
     half: Image

@@ -22,9 +22,6 @@ class Preferences:
 
     Attributes
     ----------
-    language : Language
-    appearance : Appearance
-    muted : bool
     distance_m : float
         From the operator's eyes to the screen, m.
     """
@@ -51,7 +48,6 @@ class Station:
         Kind of the image source; "simulated" unless something else was chosen.
     source_place : str
         Folder or serial number that the source needs.
-    camera_file, pen_file : str
     pen_units : str
         Of a pen file that does not say.
     mask : str
@@ -60,7 +56,6 @@ class Station:
         Of the camera; not a number when they were never set.
     max_uncertainty : float
         U (k = 2) of the tip that ends a swing, mm.
-    min_images, max_images : int
     """
 
     operator: str = ""
@@ -86,12 +81,7 @@ Group = TypeVar("Group", Preferences, Station)
 
 
 class Settings:
-    """The INI file; a value that is missing or makes no sense gives the default.
-
-    Parameters
-    ----------
-    file : Path
-    """
+    """The INI file; a value that is missing or makes no sense gives the default."""
 
     def __init__(self, file: Path) -> None:
         self._file = file

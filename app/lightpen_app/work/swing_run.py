@@ -28,7 +28,6 @@ class SwingRun(QObject):
 
     Attributes
     ----------
-    runner : SwingRunner
     follower : Follower or None
         Leads the hand of a simulated operator, if one is to do what is asked for.
 

@@ -31,15 +31,8 @@ class Workbench(QObject):
 
     Parameters
     ----------
-    settings : Settings
     folder : Path
         For records, results and sample files.
-    around : Surroundings, optional
-
-    Attributes
-    ----------
-    run : SwingRun
-    live : LiveView
 
     Signals
     -------

@@ -127,7 +127,6 @@ class Range:
 
     Attributes
     ----------
-    low, high : float
     step : float
         0 if any value between is taken.
     """
@@ -186,7 +185,6 @@ class CameraSettings:
     ----------
     exposure_us, gain_db, frame_rate : float or None
         In a request None means: leave it. In an answer: the camera has no such thing.
-    pixel_format : str or None
     """
 
     exposure_us: float | None = None

@@ -46,7 +46,6 @@ class ReplayCamera:
         1/s, at which the images come at most; `math.inf` for as fast as asked.
     loops : bool
         Whether the first image follows the last.
-    clock : Clock, optional
     """
 
     def __init__(

@@ -15,7 +15,6 @@ class Aim:
     ----------
     camera : Camera or None
         Intrinsics, if they are known.
-    pen : Pen or None
     mask : (M, 3) array or None
         Circles of stray light to leave out: centre x, y and radius, px.
     """

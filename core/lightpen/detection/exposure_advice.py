@@ -28,7 +28,6 @@ def advise(exposure: Exposure, settings: CameraSettings, caps: Caps | None) -> A
 
     Parameters
     ----------
-    exposure : Exposure
     settings : CameraSettings
         In force.
     caps : Caps or None

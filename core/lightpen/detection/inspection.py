@@ -76,13 +76,7 @@ def is_sharp(edge_width: float) -> bool:
 
 
 def inspect(spots: Spots, labels: Labels | None = None) -> Inspection:
-    """Inspect the LEDs of an image, or all its spots where none are labelled.
-
-    Parameters
-    ----------
-    spots : Spots
-    labels : Labels, optional
-    """
+    """Inspect the LEDs of an image, or all its spots where none are labelled."""
     are_leds = labels is not None and bool((labels.spot >= 0).any())
     chosen: IntArray = np.arange(len(spots))
     if labels is not None and are_leds:

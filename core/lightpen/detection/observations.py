@@ -103,19 +103,12 @@ def observe_images(
 
     Parameters
     ----------
-    source : ImageSource
-    camera : Camera
-    pen : Pen
     report : callable
         Called with the fraction done, 0 to 1.
     n_threads : int, optional
         One a core if not given.
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
-
-    Returns
-    -------
-    Observations
 
     Raises
     ------
@@ -150,16 +143,6 @@ def observe_images(
 
 def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     """Take LED centres that were found and labelled elsewhere.
-
-    Parameters
-    ----------
-    centers : Centers
-    camera : Camera
-    pen : Pen
-
-    Returns
-    -------
-    Observations
 
     Raises
     ------

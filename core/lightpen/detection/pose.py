@@ -100,17 +100,11 @@ def fit_poses(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen. Every image
         needs four LEDs.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start, cam_from_pen, mm.
-
-    Returns
-    -------
-    Poses
     """
     _require_seen(pixels)
     problem = _Reprojection(camera, pen.leds, pen.normals, pen.diameter / 2, pixels)
@@ -136,16 +130,10 @@ def fit_paper_poses(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Image points of the LEDs, px; NaN where an LED was not seen.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start for images without a linear solution, cam_from_pen, mm.
-
-    Returns
-    -------
-    Poses
     """
     _require_seen(pixels)
     normalised = np.full_like(pixels, np.nan)
@@ -168,8 +156,6 @@ def start_poses(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Image points of the LEDs, px; NaN where an LED was not seen. Every image
         needs four LEDs.
@@ -245,7 +231,6 @@ def disc_residuals(
 
     Parameters
     ----------
-    camera : Camera
     lever : (N, L, 3) array
         From the centre of rotation to the LEDs, camera frame, mm.
     centers_cam, normals_cam : (N, L, 3) array

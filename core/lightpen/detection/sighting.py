@@ -108,8 +108,6 @@ def look(
     ----------
     image : (H, W) array
         Grey image, 8 or 16 bit.
-    camera : Camera
-    pen : Pen
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
     before : Sighting, optional
@@ -144,7 +142,6 @@ def sightings_of(
         One per image.
     labels : sequence of Labels
         Likewise.
-    camera : Camera
 
     Returns
     -------

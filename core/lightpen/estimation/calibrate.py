@@ -47,7 +47,6 @@ class Calibration:
 
     Attributes
     ----------
-    observations : Observations
     reasons : tuple of Reason
         Why an image was left out; `Reason.NONE` for the used ones.
     used : (N,) array of bool
@@ -63,10 +62,6 @@ class Calibration:
         The paper's method on the same images.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
-    budget : Budget
-    halves : Halves
-    leds : LedQuality
-    coverage : Coverage
     """
 
     observations: Observations
@@ -95,16 +90,6 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
     Poses of single images come first; images whose LEDs do not fit are left out, then
     those in which the tip was not where the others have it. The rest goes into the
     joint fit, and into the paper's method beside it.
-
-    Parameters
-    ----------
-    camera : Camera
-    pen : Pen
-    observations : Observations
-
-    Returns
-    -------
-    Calibration
 
     Raises
     ------

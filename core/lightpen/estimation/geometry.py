@@ -70,16 +70,10 @@ def fit_geometry(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     joint : JointFit
         The joint fit of these images with the pen as it stands.
-
-    Returns
-    -------
-    GeometryFit
     """
     corrections = np.zeros_like(pen.leds)
     led_sigma, led_covariance = 0.0, np.zeros((6, 6))

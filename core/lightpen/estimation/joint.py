@@ -116,18 +116,12 @@ def fit_joint(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     rotations : (N, 3, 3) array
         Start, of cam_from_pen.
     tip_pen, cone_cam : (3,) array
         Start, mm.
-
-    Returns
-    -------
-    JointFit
 
     Raises
     ------
@@ -172,8 +166,6 @@ class ContactModel:
 
     Attributes
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Observed ellipse centres, px; NaN where an LED was not seen.
     """

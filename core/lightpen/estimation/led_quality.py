@@ -49,16 +49,10 @@ def measure_leds(
 
     Parameters
     ----------
-    camera : Camera
     pen : Pen
         As the file gives it.
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    geometry : GeometryFit
-
-    Returns
-    -------
-    LedQuality
     """
     joint = geometry.joint
     seen = np.isfinite(pixels[..., 0])

@@ -88,10 +88,6 @@ def fit_pivot(
     robust : bool
         Leave out poses that do not agree with the pivot of the others.
 
-    Returns
-    -------
-    PivotFit
-
     Raises
     ------
     CalibrationError

@@ -72,8 +72,6 @@ def calibration_record(
 
     Parameters
     ----------
-    calibration : Calibration
-    inputs : Inputs
     method : str
         ``"joint"`` or ``"two-stage"``, of the tip.
     limits : SwingLimits

@@ -74,10 +74,6 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
     rotations, translations : (N, 3, 3) and (N, 3) array
         Poses cam_from_pen, mm.
 
-    Returns
-    -------
-    TwoStageFit
-
     Raises
     ------
     CalibrationError

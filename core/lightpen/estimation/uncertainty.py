@@ -117,14 +117,8 @@ def combine(
     ----------
     camera : Camera
         Its covariance enters where the camera file has one.
-    pen : Pen
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs in the order of capture, px.
-    geometry : GeometryFit
-
-    Returns
-    -------
-    Budget
     """
     joint = geometry.joint
     noise = joint.covariance

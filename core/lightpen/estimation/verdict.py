@@ -72,13 +72,7 @@ _TOLD = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """A grade, and the reason that counts most.
-
-    Attributes
-    ----------
-    grade : Grade
-    reason : Sentence
-    """
+    """A grade, and the reason that counts most."""
 
     grade: Grade
     reason: Sentence

@@ -76,10 +76,6 @@ _CAMERA_OF_CHAIN = r"(?a)cam\d+"
 def read_camera(path: Path) -> Camera:
     """Read the intrinsics of a camera; see the module for the layouts.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     Camera
@@ -116,7 +112,6 @@ def write_camera(
 
     Parameters
     ----------
-    camera : Camera
     path : Path
         Name that ends in .yaml or .yml.
     layout : {"opencv", "ros"}

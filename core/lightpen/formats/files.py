@@ -61,7 +61,6 @@ def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
 
     Parameters
     ----------
-    path : Path
     what : Sentence
         What the file is, for the sentences: "camera file".
     limit : int
@@ -102,7 +101,6 @@ def read_text(path: Path, what: Sentence, limit: int) -> str:
 
     Parameters
     ----------
-    path : Path
     what : Sentence
         What the file is, for the sentences.
     limit : int
@@ -161,11 +159,6 @@ def write_whole(path: Path, data: bytes) -> None:
     The data goes to a new file in the same folder, which takes the place of the old
     one only when all of it is on the disk. Pipes and devices are written straight to.
 
-    Parameters
-    ----------
-    path : Path
-    data : bytes
-
     Raises
     ------
     FileError
@@ -192,11 +185,6 @@ def create_whole(path: Path, data: bytes) -> None:
     """Write a new file whole, or none; a file that has the name stays as it is.
 
     When this returns, the file is on the disk with its name, whatever happens next.
-
-    Parameters
-    ----------
-    path : Path
-    data : bytes
 
     Raises
     ------

@@ -23,7 +23,6 @@ class Inputs:
 
     Attributes
     ----------
-    camera, pen : InputFile
     observations : tuple of InputFile
         The images, the video or the file of LED centres.
     nominal_tip : (3,) array or None

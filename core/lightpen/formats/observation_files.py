@@ -84,7 +84,6 @@ def read_centers(path: Path, n_leds: int) -> Centers:
 
     Parameters
     ----------
-    path : Path
     n_leds : int
         Number of LEDs of the pen.
 

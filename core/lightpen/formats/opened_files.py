@@ -37,8 +37,6 @@ class PenFile:
 
     Attributes
     ----------
-    path : Path
-    pen : Pen
     units : str or None
         That were given for a file that does not say.
     """
@@ -67,8 +65,6 @@ class OpenedFiles:
 
     Attributes
     ----------
-    camera_file : CameraFile or None
-    pen_file : PenFile or None
     troubles : tuple of Sentence
         Why a file must be chosen again.
     """

@@ -73,7 +73,6 @@ def read_pen(
 
     Parameters
     ----------
-    path : Path
     units : {"mm", "cm", "m", "um", "inch"} or None
         Unit of the file's lengths; needed if the file does not state it.
     diameter : float or None
@@ -162,7 +161,6 @@ def write_pen(pen: Pen, path: Path) -> None:
 
     Parameters
     ----------
-    pen : Pen
     path : Path
         Name that ends in .csv or .json.
 

@@ -229,7 +229,6 @@ def read_table(path: Path, what: Sentence, limit: int) -> Table:
 
     Parameters
     ----------
-    path : Path
     what : Sentence
         What the file is, for the sentences.
     limit : int

@@ -44,7 +44,6 @@ class LiveImage:
 
     Attributes
     ----------
-    frame : Frame
     spots : Spots
         All that is bright in it and not masked.
     sighting : Sighting or None
@@ -76,7 +75,6 @@ class Live:
         Not open yet. Nobody else may call it any more.
     settings : CameraSettings
         To be applied when it is opened.
-    listener : LiveListener
     runner : SwingRunner
         Takes every image.
     clock : Clock, optional

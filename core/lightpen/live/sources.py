@@ -23,7 +23,6 @@ class Surroundings:
     ----------
     scene : Scene
         What the simulated camera sees.
-    clock : Clock
     now : callable
         Returns date and time with the time zone, to tell ages by.
     """

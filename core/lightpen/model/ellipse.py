@@ -47,7 +47,6 @@ def ellipse_centers(
 
     Parameters
     ----------
-    camera : Camera
     centers_cam, normals_cam : (..., 3) array
         Centres, mm, and unit normals of the discs in the camera frame.
     radius : float
@@ -68,7 +67,6 @@ def disc_images(
 
     Parameters
     ----------
-    camera : Camera
     centers_cam, normals_cam : (..., 3) array
         Centres, mm, and unit normals of the discs in the camera frame.
     radius : float
@@ -104,7 +102,6 @@ def centers_from_centroids(
 
     Parameters
     ----------
-    camera : Camera
     centroids : (..., 2) array
         Area centroids, px; NaN passes through.
     shapes : (..., 2, 2) array

@@ -13,7 +13,6 @@ class SwingLimits:
     ----------
     max_uncertainty : float
         U (k = 2) of the tip along its weakest direction, mm.
-    min_images, max_images : int
     min_per_field : int
         Images in each field of the dial.
     spacing : float

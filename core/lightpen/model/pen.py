@@ -156,10 +156,6 @@ def check_frame(pen: Pen) -> None:
     The layout is recognised from the geometry, whatever the order and the frame of the
     LEDs. Pens of other layouts pass.
 
-    Parameters
-    ----------
-    pen : Pen
-
     Raises
     ------
     FileError

@@ -58,7 +58,6 @@ class PenDraft:
         Of the LED discs, mm.
     tip : tuple of three str
         Nominal tip, pen frame, mm; all empty if it is not known.
-    name : str
     """
 
     rows: tuple[tuple[str, ...], ...] = ()
@@ -200,7 +199,6 @@ def check_draft(draft: PenDraft, pen: Pen | None = None) -> DraftCheck:
 
     Parameters
     ----------
-    draft : PenDraft
     pen : Pen, optional
         Of which it is the draft, unchanged; a draft shows fewer digits.
     """

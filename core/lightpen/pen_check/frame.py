@@ -45,8 +45,6 @@ class RuleCheck:
 
     Attributes
     ----------
-    rule : Rule
-    outcome : RuleStatus
     amount : float
         Largest deviation, mm; NaN for a rule without one.
     """

@@ -66,7 +66,6 @@ class Finding:
 
     Attributes
     ----------
-    what : What
     leds : tuple of int
         Numbers from 1.
     by : tuple of three float
@@ -137,10 +136,8 @@ def match_pen(camera: Camera, pen: Pen, views: Sequence[Spots]) -> PenMatch:
 
     Parameters
     ----------
-    camera : Camera
     pen : Pen
         One that `lightpen.model.pen.check_leds` passes.
-    views : sequence of Spots
     """
     labels = label_images(views, camera, pen, MODERATE)
     found = [

@@ -17,7 +17,6 @@ class OpenedPen:
 
     Attributes
     ----------
-    path : Path
     file : PenFile or None
         The pen, fit for use.
     draft : PenDraft or None

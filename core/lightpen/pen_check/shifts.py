@@ -73,8 +73,6 @@ def find_shifts(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     pixels : (N, L, 2) array
         Ellipse centres, px; NaN where an LED was not seen. Every image needs four.
     rotations, translations : (N, 3, 3) and (N, 3) array

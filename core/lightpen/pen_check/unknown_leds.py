@@ -48,7 +48,6 @@ def find_unknown_leds(
 
     Parameters
     ----------
-    camera : Camera
     poses : Poses
         Of N views.
     pixels : sequence of N arrays (K, 2)

@@ -37,7 +37,6 @@ def accept(archive: Archive, solution: Solution, now: datetime) -> Result:
 
     Parameters
     ----------
-    archive : Archive
     solution : Solution
         Of a record, as it is on the disk.
     now : datetime

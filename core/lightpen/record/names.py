@@ -40,7 +40,6 @@ def new_folder(root: Path, names: Names, now: datetime) -> Path:
         That the records are in.
     names : Names
         Whatever characters they have.
-    now : datetime
     """
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)

@@ -76,12 +76,10 @@ class Header:
 
     Attributes
     ----------
-    camera, pen : FileCopy
     created : datetime
         With its time zone.
     program : str
         Name and version.
-    station, operator, tip, cone : str
     units : str or None
         Of a pen file that does not say.
     led_diameter : float or None
@@ -115,9 +113,6 @@ class RecordedImage:
 
     Attributes
     ----------
-    number : int
-    file : Path
-    sha256 : str
     time : float
         s, by the clock of the session that took it.
     device_time_ns : int or None
@@ -144,8 +139,6 @@ class Record:
 
     Attributes
     ----------
-    folder : Path
-    header : Header
     images : tuple of RecordedImage
         All that were acknowledged, in the order of capture.
     taken_out : mapping of int to str
@@ -198,11 +191,8 @@ class RecordSource:
     images : ImageSource
         All images, in the order of capture; a damaged one raises `FileError` when
         loaded.
-    camera : Camera
-    pen : Pen
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
-    camera_file, pen_file : Path
     """
 
     folder: Path

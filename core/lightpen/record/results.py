@@ -40,7 +40,6 @@ class Result:
 
     Attributes
     ----------
-    names : Names
     accepted : datetime
         With its time zone.
     grade : str
@@ -96,7 +95,6 @@ def result_bytes(result: Result, record: str) -> bytes:
 
     Parameters
     ----------
-    result : Result
     record : str
         Where the folder of its swing is, as it is to be written.
     """
@@ -154,7 +152,6 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
 
     Parameters
     ----------
-    data : bytes
     file : Path
         For the sentence.
     locate : callable

@@ -36,14 +36,12 @@ class Solution:
 
     Attributes
     ----------
-    source : RecordSource
     numbers : (N,) array of int
         Of the images, in the record.
     observations : Observations
         What all N images show, whether they take part or not.
     taken_out : mapping of int to str
         Numbers of images that do not take part, and why.
-    calibration : Calibration
     residuals : (N, L, 2) array
         Observed minus modelled LED centres with the tip in the cone, px. An image that
         is left out is turned as fits it best. NaN for LEDs that were not seen, and for
@@ -80,7 +78,6 @@ def solve_record(
 
     Parameters
     ----------
-    record : Record
     report : callable
         Called with the fraction done, 0 to 1; what it raises ends the computation.
 
@@ -112,7 +109,6 @@ def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
 
     Parameters
     ----------
-    solution : Solution
     taken_out : mapping of int to str
         Numbers of all images that are not to take part, and why.
 

@@ -25,7 +25,6 @@ class DamagedSwing:
 
     Attributes
     ----------
-    folder : Path
     sentence : Sentence
         What is damaged, and what to do.
     """
@@ -44,7 +43,6 @@ class Unfinished:
         Those that wait to be gone on with; they have images.
     under_way : tuple of Record
         Those that somebody writes to just now.
-    damaged : tuple of DamagedSwing
     """
 
     interrupted: tuple[Record, ...] = ()

@@ -222,7 +222,6 @@ def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
 
     Parameters
     ----------
-    folder : Path
     taken_out : mapping of int to str
         Numbers of all images that do not, and why.
 

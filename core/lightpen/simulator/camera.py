@@ -59,18 +59,10 @@ class SimulatedCamera:
     scene : Scene, optional
         Pen, camera, tip, cone, optics and sensor; its swing and its disturbances are
         left out.
-    clock : Clock, optional
     operator : Operator, optional
         Must go by the same clock.
     lamps : tuple of Lamp
         Foreign lights in the picture.
-    serial : str
-
-    Attributes
-    ----------
-    operator : Operator
-    faults : Faults
-    scene : Scene
     """
 
     def __init__(

@@ -24,10 +24,8 @@ def random_lamps(
 
     Parameters
     ----------
-    camera : Camera
     discs : Ellipses
         The L discs in the image, px.
-    rng : numpy.random.Generator
     """
     lamps = []
     radius = _reaches(discs).mean()
@@ -51,10 +49,8 @@ def random_glares(
 
     Parameters
     ----------
-    camera : Camera
     discs : Ellipses
         The L discs in the image, px.
-    rng : numpy.random.Generator
     """
     glares = []
     for _ in range(rng.integers(3)):
@@ -77,7 +73,6 @@ def random_finger(discs: Ellipses, rng: np.random.Generator) -> Finger:
     ----------
     discs : Ellipses
         The L discs in the image, px.
-    rng : numpy.random.Generator
     """
     reach = _reaches(discs).mean()
     radius = reach * rng.uniform(1.0, 1.7)

@@ -16,7 +16,6 @@ class Broken:
         By the clock, s.
     n_to_lose, n_to_spoil : int
         Images still to come.
-    is_unplugged : bool
     n_unplugged : int
         How often the cable was pulled.
     """

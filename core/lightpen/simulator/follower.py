@@ -18,7 +18,6 @@ class Follower:
 
     Parameters
     ----------
-    operator : Operator
     heading : float
         The operator's right as the camera sees it, rad.
     """

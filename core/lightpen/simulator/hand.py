@@ -107,10 +107,8 @@ class Operator:
 
     Parameters
     ----------
-    clock : Clock
     seed : int
         Chooses the swing, the tremor and where slips go.
-    n_leds : int
     seated : bool
         Whether the tip is in the cone at first; else the pen is out of the image.
     """

@@ -53,8 +53,6 @@ class ImagePlan:
     ----------
     index : int
         From 0.
-    view : View
-    optics : Optics
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen at mid-exposure; mm.
     flags : tuple of str
@@ -75,14 +73,12 @@ class ScenePlan:
 
     Attributes
     ----------
-    scene : Scene
     swing : Swing
         True poses and tips of all images.
     measured_pen : Pen
         The pen as its geometry was measured.
     gains : (L,) array
         Brightness of each LED.
-    image_plans : tuple of ImagePlan
     """
 
     scene: Scene
@@ -94,10 +90,6 @@ class ScenePlan:
 
 def plan_scene(scene: Scene) -> ScenePlan:
     """Draw everything random of a scene but the noise.
-
-    Parameters
-    ----------
-    scene : Scene
 
     Returns
     -------
@@ -148,10 +140,6 @@ def live_plan(
         Of mid-exposure, seconds.
     exposure_time : float
         Seconds; the pen moves meanwhile.
-
-    Returns
-    -------
-    ImagePlan
     """
     ends = time + exposure_time * np.array([-0.5, 0.0, 0.5])
     first, middle, last = _operator_swing(scene, ends).rotations

@@ -66,7 +66,6 @@ def pursue(
         Now, rad and rad/s, or mm and mm/s.
     goal, goal_rate : (3,) array
         What it goes after, and how that moves.
-    pursuit : Pursuit
     """
     wish = pursuit.gain * (goal - place)
     speed = float(np.linalg.norm(wish))

@@ -71,8 +71,6 @@ def draw_postures(n: int, rng: np.random.Generator, kind: SwingKind) -> Postures
 
     Parameters
     ----------
-    n : int
-    rng : numpy.random.Generator
     kind : str
         ``field``: random all round. ``cone``: constant tilt that goes round once, with
         roll. ``operator``: a hand's smooth movement at `FRAME_RATE`. ``one-axis`` and

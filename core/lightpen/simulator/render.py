@@ -66,19 +66,7 @@ class Light:
 
 
 def render_view(camera: Camera, pen: Pen, view: View, optics: Optics) -> Light:
-    """Return the light of one exposure.
-
-    Parameters
-    ----------
-    camera : Camera
-    pen : Pen
-    view : View
-    optics : Optics
-
-    Returns
-    -------
-    Light
-    """
+    """Return the light of one exposure."""
     levels = np.zeros((camera.height, camera.width), dtype=np.float32)
     windows = _add_patches(levels, _led_patches(camera, pen, view, optics))
     for lamp in view.lamps:
@@ -117,10 +105,8 @@ def hidden_fraction(
 
     Parameters
     ----------
-    camera : Camera
     outline : (N, 2) array
         px.
-    fingers : sequence of Finger
 
     Returns
     -------

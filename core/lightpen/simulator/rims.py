@@ -83,7 +83,6 @@ def disc_rims(
 
     Parameters
     ----------
-    camera : Camera
     centers_cam, normals_cam : (S, N, 3) array
         Centres, mm, and unit normals of N discs in the camera frame at S times.
     radius : float

@@ -54,7 +54,6 @@ def write_scene(
 
     Parameters
     ----------
-    scene : Scene
     folder : Path
         Created if it is missing. Images of the same names are replaced.
     report : callable, optional

@@ -23,7 +23,6 @@ class Disturbances:
         A finger before an LED.
     missing : float
         One to four LEDs off.
-    motion_blur, defocus, saturated, dim : float
     slipped : float
         The tip is 0.2 to 2 mm out of the cone.
     blurred_away : float
@@ -78,18 +77,12 @@ class Scene:
 
     Attributes
     ----------
-    n_images : int
-    seed : int
     swing : str
         Kind of swing, see `lightpen.simulator.postures.draw_postures`.
-    disturbances : Disturbances
-    optics : Optics
-    sensor : Sensor
     led_noise : float
         Standard deviation of the measured LED coordinates about the truth, mm.
     pen : Pen
         The truth.
-    camera : Camera
     tip_pen, cone_cam : (3,) array
         The truth, mm.
     """

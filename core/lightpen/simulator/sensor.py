@@ -65,12 +65,6 @@ class Sensor:
 def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
     """Return the image that a sensor reads.
 
-    Parameters
-    ----------
-    light : Light
-    sensor : Sensor
-    rng : numpy.random.Generator
-
     Returns
     -------
     (H, W) array
@@ -89,11 +83,6 @@ def expose(light: Light, sensor: Sensor, rng: np.random.Generator) -> Image:
 
 def quantize(light: Light, sensor: Sensor) -> Image:
     """Return the image without noise.
-
-    Parameters
-    ----------
-    light : Light
-    sensor : Sensor
 
     Returns
     -------

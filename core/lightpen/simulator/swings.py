@@ -28,7 +28,6 @@ class Swing:
 
     Attributes
     ----------
-    postures : Postures
     rotations : (F, 3, 3) array
         Of cam_from_pen.
     translations : (F, 3) array
@@ -91,7 +90,6 @@ def flat_pen(name: str, leds: Sequence[tuple[float, float, float]]) -> Pen:
 
     Parameters
     ----------
-    name : str
     leds : sequence of tuple
         Centre of each LED, mm.
     """
@@ -125,18 +123,12 @@ def swing_poses(
 
     Parameters
     ----------
-    n_frames : int
-    rng : numpy.random.Generator
     kind : str
         See `lightpen.simulator.postures.draw_postures`.
     pen, camera : optional
         The paper's unless given.
     tip_pen, cone_cam : (3,) array
         Tip in the pen frame and bottom of the cone in the camera frame, mm.
-
-    Returns
-    -------
-    Swing
     """
     pen = pen or paper_pen()
     camera = camera or paper_camera()
@@ -214,7 +206,6 @@ def slip_tip(
         Frames that slip.
     distances : (F,) array or float
         How far from the bottom of the cone, mm, in a random direction.
-    rng : numpy.random.Generator
     """
     directions = rng.standard_normal(swing.tips_cam.shape)
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
@@ -242,14 +233,12 @@ def simulate_centers(
 
     Parameters
     ----------
-    camera : Camera
     pen : Pen
         With L LEDs.
     rotations, translations : (F, 3, 3) and (F, 3) array
         cam_from_pen; mm.
     sigma : float
         Standard deviation per coordinate, px.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -272,8 +261,6 @@ def drop_centers(
     ----------
     centers : (F, L, 2) array
         px.
-    n_missing : int
-    rng : numpy.random.Generator
     """
     order = np.argsort(rng.random(centers.shape[:-1]), axis=-1)
     return np.where((order < n_missing)[..., None], np.nan, centers)
@@ -292,7 +279,6 @@ def displace_centers(
         Of the frames, 0 to 1.
     distance : float
         Of the displaced LED from where it was, px, in a random direction.
-    rng : numpy.random.Generator
     """
     n_frames, n_leds, _ = centers.shape
     hit = rng.permutation(n_frames)[: round(fraction * n_frames)]
@@ -315,7 +301,6 @@ def swap_centers(
         px.
     fraction : float
         Of the frames, 0 to 1.
-    rng : numpy.random.Generator
     """
     n_frames, n_leds, _ = centers.shape
     swapped = centers.copy()
@@ -348,8 +333,6 @@ def rim_gaps(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     rotations, translations : (F, 3, 3) and (F, 3) array
         cam_from_pen; mm.
 

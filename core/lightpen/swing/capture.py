@@ -21,8 +21,6 @@ def capture_image(
 
     Parameters
     ----------
-    setup : SwingSetup
-    state : SwingState
     writer : RecordWriter
         Of the record that belongs to the state.
     image : (H, W) array

@@ -75,10 +75,8 @@ class SwingCourse:
         Folder that a new swing's record is made in.
     archive : Archive
         Of the accepted results.
-    listener : SwingListener
     now : callable
         Returns date and time with the time zone.
-    start : Start
     """
 
     def __init__(

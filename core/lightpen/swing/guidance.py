@@ -36,8 +36,6 @@ class Outlook:
 
     Attributes
     ----------
-    camera : Camera
-    pen : Pen
     tip_pen, cone_cam : (3,) array
         mm.
     information : (6, 6) array
@@ -67,7 +65,6 @@ def next_posture(
 
     Parameters
     ----------
-    outlook : Outlook
     present : (3, 3) array
         Where the pen is, cam_from_pen.
     wanted : (3, 8) array of bool, optional
@@ -104,7 +101,6 @@ def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    outlook : Outlook
     rotations : (N, 3, 3) array
         cam_from_pen.
     """

@@ -115,8 +115,6 @@ def kept_before(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
     numbers : (N,) array of int
         In the swing's record.
     pixels : (N, L, 2) array
@@ -221,9 +219,6 @@ def without_slipped(
 
     Parameters
     ----------
-    camera : Camera
-    pen : Pen
-    kept : KeptImages
     since : float
         From this time on, s, an image need not be far out: it was taken when the tip
         was about to leave.

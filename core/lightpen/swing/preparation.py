@@ -35,7 +35,6 @@ class SourceChoice:
 
     Attributes
     ----------
-    kind : SourceKind
     place : str
         Folder, pattern or video of a recording; else empty.
     """
@@ -66,17 +65,12 @@ class Preparation:
 
     Attributes
     ----------
-    names : Names
     nominal_tip : (3,) array or None
         Its centre by design, pen frame, mm; None leaves that of the LED file in force.
-    source : SourceChoice
     image_size : pair of int or None
         Width and height of the live images, px; None while there are none.
-    camera_file : CameraFile or None
-    pen_file : PenFile or None
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
-    limits : SwingLimits
     has_unsaved_leds : bool
         Whether LEDs were edited or opened that are not those of the file in use.
     """

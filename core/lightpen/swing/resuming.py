@@ -19,7 +19,6 @@ class Resumable:
 
     Attributes
     ----------
-    record : Record
     setup : SwingSetup
         Of the record's own files.
     state : SwingState
@@ -77,7 +76,6 @@ def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingS
     ----------
     setup : SwingSetup
         Of the record's own camera and pen.
-    record : Record
     time : float
         s.
     """

@@ -80,13 +80,7 @@ CONFIRMING = 3.0  # s upright and still, by which the operator says yes without 
 
 @dataclass(frozen=True, eq=False)
 class Transition:
-    """A swing after one more image.
-
-    Attributes
-    ----------
-    state : SwingState
-    events : tuple of SwingEvent
-    """
+    """A swing after one more image."""
 
     state: SwingState
     events: tuple[SwingEvent, ...] = ()
@@ -99,9 +93,6 @@ def advance(
 
     Parameters
     ----------
-    setup : SwingSetup
-    state : SwingState
-    sighting : Sighting
     time : float
         When the image was taken, s; never goes back.
 
@@ -168,7 +159,6 @@ def start_again(
 
     Parameters
     ----------
-    setup : SwingSetup
     kept : KeptImages
         See `lightpen.swing.kept_images.kept_before`.
     next_number : int

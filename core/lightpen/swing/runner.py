@@ -35,7 +35,6 @@ class SwingRunner:
         Folder that a new swing's record is made in.
     archive : Archive
         Of the accepted results.
-    listener : SwingListener
     now : callable
         Returns date and time with the time zone.
     """
@@ -158,7 +157,6 @@ class SwingRunner:
 
         Parameters
         ----------
-        frame : Frame
         sighting : Sighting or None
             What it shows, if it is of the right size.
         setup : SwingSetup, optional

@@ -57,15 +57,10 @@ def fit_seat(
 
     Parameters
     ----------
-    pen : Pen
     rotations, translations : (N, 3, 3) and (N, 3) array
         Poses cam_from_pen, mm.
     covariances : (N, 6, 6) array
         Of each pose's (theta, dt), rad and mm.
-
-    Returns
-    -------
-    Seat
     """
     expected, sigma = prior_of(pen)
     spread = tip_covariances(rotations, covariances, expected) + SEATING**2 * np.eye(3)
@@ -96,7 +91,6 @@ def tip_distances(
 
     Parameters
     ----------
-    seat : Seat
     rotations, translations : (N, 3, 3) and (N, 3) array
         Poses cam_from_pen, mm.
     covariances : (N, 6, 6) array

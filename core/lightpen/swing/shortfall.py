@@ -106,7 +106,6 @@ def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
 
     Parameters
     ----------
-    pen : Pen
     rotations : (N, 3, 3) array
         cam_from_pen.
 

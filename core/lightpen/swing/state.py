@@ -72,7 +72,6 @@ class SwingEvent:
 
     Attributes
     ----------
-    what : Happening
     numbers : tuple of int
         Of images: the one kept, or those that were kept and are now dropped; of a field
         that is full: its row and column on the dial.
@@ -88,9 +87,6 @@ class SwingSetup:
 
     Attributes
     ----------
-    camera : Camera
-    pen : Pen
-    limits : SwingLimits
     mask : (M, 3) array or None
         Circles of stray light: centre x, y and radius, px.
     """
@@ -134,7 +130,6 @@ class SwingState:
 
     Attributes
     ----------
-    phase : Phase
     since : float
         When the phase began, s.
     time : float
@@ -153,7 +148,6 @@ class SwingState:
         Of the last second.
     last_seen : float
         When the pen was seen last, s.
-    pause : Pause
     strayed_since : float or None
         When the tip left the cone, s; None while it is in it.
     stray_rotations : (M, 3, 3) array
@@ -170,7 +164,6 @@ class SwingState:
         When kept images were last dropped or the tip last slipped, s.
     still_since : float or None
         Since when the pen is upright and still, s.
-    trace : Trace
     """
 
     phase: Phase

@@ -42,7 +42,6 @@ class SwingStatus:
         What the solution is worth.
     result : Result or None
         The result that was accepted.
-    activity : Activity
     refusal : Sentence or None
         Why no swing could begin by itself.
     is_troubled : bool

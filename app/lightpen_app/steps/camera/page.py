@@ -41,12 +41,7 @@ SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
 
 
 class CameraPage(Rearranged, Page):
-    """The step Camera.
-
-    Parameters
-    ----------
-    workbench : Workbench
-    """
+    """The step Camera."""
 
     key = "camera"
     narrow_below = 120 * GRID  # px; then it has its panels all at the side

@@ -28,8 +28,6 @@ class SourceEntry:
 
     Attributes
     ----------
-    kind : SourceKind
-    name : str
     has_place : bool
         Whether the user says where its images are.
     """

@@ -39,10 +39,6 @@ class LedsPage(Rearranged, Page):
 
     The table shows a draft. The live match follows it at once; a swing needs a file, so
     a draft that differs from the file in use has to be saved before the next step.
-
-    Parameters
-    ----------
-    workbench : Workbench
     """
 
     key = "leds"

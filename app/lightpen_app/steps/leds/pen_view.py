@@ -43,7 +43,6 @@ class PenPicture:
 
     Attributes
     ----------
-    pen : Pen or None
     tip : (3,) array or None
         Centre of the probe tip, pen frame, mm.
     marked : frozenset of int

@@ -18,7 +18,6 @@ class ReviewDoubts(QObject):
 
         Parameters
         ----------
-        outcome : Outcome
         named : Names
             What the step Start names now.
         """

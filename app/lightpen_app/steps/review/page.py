@@ -52,12 +52,7 @@ TAB_WIDTH = 64 * GRID  # of the result in a tab
 
 
 class ReviewPage(Rearranged, Page):
-    """The step Review.
-
-    Parameters
-    ----------
-    workbench : Workbench
-    """
+    """The step Review."""
 
     key = "review"
     narrow_below = 112 * GRID  # px; then it has the result in a tab

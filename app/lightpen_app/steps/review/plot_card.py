@@ -27,7 +27,6 @@ class PlotCard(Translated, QFrame):
 
     Parameters
     ----------
-    plot : Plot
     file_stem : str
         Name that a saved file is given at first.
 
@@ -125,11 +124,6 @@ class PlotCard(Translated, QFrame):
 
 class PlotGrid(QWidget):
     """Plots side by side, of which one can be enlarged to fill the place of all.
-
-    Parameters
-    ----------
-    cards : sequence of PlotCard
-    n_columns : int
 
     Signals
     -------

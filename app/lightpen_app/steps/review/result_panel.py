@@ -27,7 +27,6 @@ class Outcome:
 
     Attributes
     ----------
-    solution : Solution
     names : Names
         Of what was swung.
     last : Result or None

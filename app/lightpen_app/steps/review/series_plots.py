@@ -27,12 +27,7 @@ FARTHEST = 36.0  # degrees of tilt that are always shown
 
 
 class NamedPlot(Plot):
-    """A plot of one or more series; of more, the names stand beside the title.
-
-    Parameters
-    ----------
-    series : sequence of Curve
-    """
+    """A plot of one or more series; of more, the names stand beside the title."""
 
     def __init__(
         self, axes: Axes, series: Sequence[Curve], parent: QWidget | None = None
@@ -68,7 +63,6 @@ class BarPlot(NamedPlot):
 
     Parameters
     ----------
-    series : sequence of Curve
     label_column : str
         Name of the column of labels in the CSV file.
     """

@@ -36,7 +36,6 @@ class InterruptedRow(Translated, QFrame):
 
     Parameters
     ----------
-    swing : Record or DamagedSwing
     is_under_way : bool
         Whether another program captures it.
 

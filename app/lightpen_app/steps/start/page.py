@@ -43,13 +43,7 @@ TYPING_PAUSE_MS = 400  # after which what was typed is taken over
 
 
 class StartPage(Rearranged, Page):
-    """Names, limits, the last result of the pen and tip, and interrupted swings.
-
-    Parameters
-    ----------
-    workbench : Workbench
-    sounds : Sounds
-    """
+    """Names, limits, the last result of the pen and tip, and interrupted swings."""
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column

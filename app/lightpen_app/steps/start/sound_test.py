@@ -19,7 +19,6 @@ class SoundTest(Translated, QWidget):
 
     Parameters
     ----------
-    sounds : Sounds
     step_ms : int, optional
         From one sound to the next.
     """

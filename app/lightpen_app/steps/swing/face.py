@@ -39,10 +39,6 @@ class SwingFace(Rearranged, Translated, QWidget):
     ----------
     buttons : sequence of QPushButton
         Put at the upper right.
-
-    Attributes
-    ----------
-    dial : LeaningDial
     """
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below

@@ -12,12 +12,7 @@ RATE_S = 2.0  # over which the images are counted
 
 
 class SwingSight(QObject):
-    """Looks at the live images, beside the swing that is captured from them.
-
-    Parameters
-    ----------
-    run : SwingRun
-    """
+    """Looks at the live images, beside the swing that is captured from them."""
 
     def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
         super().__init__(parent)

@@ -52,9 +52,6 @@ class Moment:
 
     Attributes
     ----------
-    setup : SwingSetup
-    state : SwingState
-    short : Shortfall
     connection : Connection
         How the camera is.
     seen : str
@@ -63,7 +60,6 @@ class Moment:
         Whether the swing was paused because an image could not be recorded.
     solving : float or None
         How far the tip is computed, 0 to 1; None while it is not.
-    verdict : Verdict or None
     is_accepted : bool
         Whether the tip is in force.
     stillness : float

@@ -42,13 +42,7 @@ SOUNDS: dict[Happening, Sound] = {
 
 
 class SwingPage(Page):
-    """Shows a swing and leads it; nothing on it must be pressed.
-
-    Parameters
-    ----------
-    workbench : Workbench
-    sounds : Sounds
-    """
+    """Shows a swing and leads it; nothing on it must be pressed."""
 
     key = "swing"
 

@@ -76,7 +76,6 @@ class SwingPlots(Translated, QWidget):
 
         Parameters
         ----------
-        state : SwingState
         max_uncertainty : float
             The limit of U, mm.
         """

@@ -66,10 +66,6 @@ def constellation_of(pen: Pen) -> Constellation:
     ----------
     pen : Pen
         With at least four LEDs, not all on one line.
-
-    Returns
-    -------
-    Constellation
     """
     if pen.n_leds < MIN_LEDS:
         raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")

@@ -29,8 +29,6 @@ def diagnose(spots: Sequence[Spots], camera: Camera, pen: Pen) -> Sentence | Non
     ----------
     spots : sequence of Spots
         One per image.
-    camera : Camera
-    pen : Pen
 
     Returns
     -------
@@ -79,12 +77,6 @@ def diagnose_mirror(
     ----------
     spots : sequence of Spots
         One per image.
-    camera : Camera
-    pen : Pen
-
-    Returns
-    -------
-    Sentence or None
     """
     sample = _Sample.of(spots, camera, pen)
     return None if sample.is_explained else _mirror(camera, pen, sample.fits)

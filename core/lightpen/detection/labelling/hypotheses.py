@@ -69,14 +69,7 @@ class Effort:
 def poses_from_triples(
     sight: SpotArrays, pen: Constellation, effort: Effort
 ) -> Candidates:
-    """Return the most promising poses of each image, each with another labelling.
-
-    Parameters
-    ----------
-    sight : SpotArrays
-    pen : Constellation
-    effort : Effort
-    """
+    """Return the most promising poses of each image, each with another labelling."""
     image, triple = _spot_triples(sight, pen, effort)
     of, leds = _led_triples(sight, pen, effort, image, triple)
     image, triple = image[of], triple[of]
@@ -101,8 +94,6 @@ def lookalike_poses(
 
     Parameters
     ----------
-    sight : SpotArrays
-    pen : Constellation
     best : Candidates
         The settled poses whose lookalikes are sought.
     """
@@ -134,7 +125,6 @@ def shifted_poses(
     ----------
     sight : SpotArrays
         Of one image.
-    pen : Constellation
     R : (3, 3) array
     t : (3,) array
         Predicted cam_from_pen.
@@ -282,7 +272,6 @@ def first_of_each(group: IntArray, score: FloatArray, n: int) -> IntArray:
     ----------
     group : (C,) array
     score : (C,) array
-    n : int
     """
     order = np.lexsort((score, group))
     ordered = group[order]

@@ -122,8 +122,6 @@ def label_images(
     ----------
     spots : sequence of Spots
         One per image.
-    camera : Camera
-    pen : Pen
     efforts : sequence of Effort
         How hard to search, one after the other, until an image is labelled.
 
@@ -155,12 +153,6 @@ def label_images(
 def label_spots(spots: Spots, camera: Camera, pen: Pen) -> Labels:
     """Label the LEDs in one image.
 
-    Parameters
-    ----------
-    spots : Spots
-    camera : Camera
-    pen : Pen
-
     See Also
     --------
     label_images : For many images, at a tenth of the time for each.
@@ -175,9 +167,6 @@ def track_spots(
 
     Parameters
     ----------
-    spots : Spots
-    camera : Camera
-    pen : Pen
     R : (3, 3) array
     t : (3,) array
         Predicted cam_from_pen: LEDs within some 30 px, rotation within some degrees.

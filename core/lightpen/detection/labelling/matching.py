@@ -105,8 +105,6 @@ def match(
 
     Parameters
     ----------
-    sight : SpotArrays
-    pen : Constellation
     image : (C,) array
     R : (C, 3, 3) array
     t : (C, 3) array

@@ -70,7 +70,6 @@ def spot_arrays(
     ----------
     spots : sequence of Spots
         One per image.
-    camera : Camera
     radius : float
         Radius of the discs, mm.
     use_unwhole : bool
