@@ -193,7 +193,7 @@ def _dark_distribution(
     low = max(int(np.floor(mean - 7 * sigma)), 0)
     high = min(int(np.ceil(mean + 7 * sigma)), sensor.full_scale)
     values = np.arange(low, max(high, low) + 1)
-    charges = NormalDist(mean, max(sigma, 1e-12))
-    upper = np.array([charges.cdf(value + 0.5) for value in values.tolist()])
+    reading = NormalDist(mean, max(sigma, 1e-12))
+    upper = np.array([reading.cdf(value + 0.5) for value in values.tolist()])
     upper[-1] = 1
     return values, np.diff(upper, prepend=0.0)
