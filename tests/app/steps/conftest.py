@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QCoreApplication, Qt, QThreadPool
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
@@ -56,12 +56,18 @@ class Seen:
         QTest.mouseClick(self.named(name), Qt.MouseButton.LeftButton)
 
     def enter(self, name: str, text: str) -> None:
-        """Type into a field and press Enter."""
+        """Type into a field and press Enter, and see what comes of it."""
         field = self.named(name)
         field.setFocus()
         QTest.keySequence(field, "Ctrl+A")
         QTest.keyClicks(field, text)
         QTest.keyClick(field, Qt.Key.Key_Return)
+        self.settle()
+
+    def settle(self) -> None:
+        """Let jobs end: they read and write the files."""
+        QThreadPool.globalInstance().waitForDone()
+        QCoreApplication.processEvents()
 
     def choose(self, choice: str) -> None:
         """Choose by the keyboard."""

@@ -249,7 +249,7 @@ def test_recorded_images_have_no_exposure_to_set(
 def test_the_checks_of_the_intrinsics_are_shown(live: "Seen") -> None:
     assert "Fits the live images: 1224 x 1024" in live.words
     assert "2319.10 and 2318.55 px" in live.words
-    assert "k1\u00a0-0.082" in live.words
+    assert "k1 -0.082" in live.words
     assert "no date, no uncertainty in the file" in live.words
 
 

@@ -100,6 +100,7 @@ def save_as(seen: "Seen", path: Path) -> None:
     dialog.selectFile(str(path))
     dialog.accept()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    seen.settle()
 
 
 @pytest.fixture
@@ -192,6 +193,7 @@ def test_the_simulated_pens_file_is_used_at_a_click(
     workbench.set_preparation(replace(workbench.preparation, pen_file=None))
 
     seen.click("Use the simulated pen's file")
+    seen.settle()
 
     assert in_use(workbench).path.name == "pen.json"
     assert seen.page.is_complete()
@@ -242,6 +244,7 @@ def test_a_file_is_picked_in_a_dialog(
     dialog = seen.child(QFileDialog)
     dialog.selectFile(str(path))
     dialog.accept()
+    seen.settle()
 
     assert in_use(workbench).path == path
 
@@ -293,6 +296,7 @@ def test_units_are_asked_for_where_a_file_does_not_say_them(
     assert choice.hasFocus()
     QTest.keyClicks(choice, "inch")
     choice.textActivated.emit(choice.currentText())
+    seen.settle()
 
     file = in_use(workbench)
     assert (file.path, file.units) == (path, "inch")
@@ -308,6 +312,7 @@ def test_wrong_units_are_told(
     choice = seen.child(QComboBox)
     QTest.keyClicks(choice, "um")
     choice.textActivated.emit(choice.currentText())
+    seen.settle()
 
     assert "Are the coordinates in metres?" in seen.words
     assert in_use(workbench) is before
@@ -455,6 +460,7 @@ def test_a_file_that_exists_is_replaced_only_if_the_user_agrees(
 
     save_as(seen, path)
     seen.click("Replace")
+    seen.settle()
     assert read_pen(path).leds[6, 1] == 161
     assert in_use(workbench).path == path
 
@@ -473,6 +479,7 @@ def test_a_file_that_cannot_be_written_is_told(seen: "Seen", tmp_path: Path) -> 
     type_cell(seen, 7, Y, "161")
 
     seen.child(LedFilePanel).save_chosen.emit(tmp_path / "no folder" / "leds.json")
+    seen.settle()
 
     assert "leds.json" in seen.words
     assert seen.page.unsaved()
@@ -508,6 +515,7 @@ def test_opening_another_file_asks_before_changes_are_lost(
 
     open_file(seen, path)
     seen.click("Discard them")
+    seen.settle()
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
 
@@ -532,6 +540,7 @@ def test_choosing_units_asks_before_changes_are_lost(
     type_cell(seen, 7, Y, "160")
     choose_units()
     seen.click("Discard them")
+    seen.settle()
     assert in_use(workbench).path == path
     assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
