@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import pytest
 from PySide6.QtCore import QDeadlineTimer, QEvent, QLocale, QPoint, Qt, QTimer
@@ -30,6 +31,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.exceptions import TimeoutError as WaitedInVain
 from pytestqt.qtbot import QtBot
+from pytestqt.wait_signal import SignalBlocker
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
@@ -47,6 +49,30 @@ from lightpen_app.work.workbench import Workbench
 
 # No windows on the desk of whoever runs the tests; set it to see them.
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+
+PATIENCE_MS = 120_000  # on a machine that does other things besides
+
+
+class PatientBot(QtBot):
+    """Waits as long as a loaded machine may take, unless told otherwise."""
+
+    @override
+    def waitUntil(
+        self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS
+    ) -> None:
+        super().waitUntil(callback, timeout=timeout)
+
+    @override
+    def waitSignal(
+        self, signal: object, *, timeout: int = PATIENCE_MS, **options: Any
+    ) -> SignalBlocker:
+        return super().waitSignal(signal, timeout=timeout, **options)
+
+
+@pytest.fixture
+def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
+    return PatientBot(request)
 
 
 @pytest.fixture(scope="session")
@@ -145,7 +171,6 @@ def choose_samples(workbench: Workbench, folder: Path) -> None:
 
 # The whole wizard, used as an operator uses it
 
-PATIENCE_MS = 120_000  # on a machine that does other things besides
 LOOK_MS = 50  # between two looks at what the window shows
 LONGEST_ROUND = 200  # presses of the Tab key
 LEFT = Qt.MouseButton.LeftButton

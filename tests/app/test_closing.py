@@ -215,9 +215,9 @@ def test_closing_waits_for_all_that_is_under_way_together(
     monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
     swing_before(workbench, stuck)
     workbench.run.runner.go_on(read_resumable(interrupted))
-    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
+    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
     workbench.run.runner.finish()
-    qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
+    qtbot.waitUntil(stuck.is_reached.is_set)
 
     assert closing_time(workbench) < SOON + AT_ONCE
     assert_whole(interrupted, N_IMAGES + 2)
@@ -237,14 +237,14 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     workbench.live.open(camera, CameraSettings(), around.clock)
     workbench.live.set_following(True)
     workbench.run.runner.go_on(read_resumable(interrupted))
-    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2, timeout=TIMEOUT)
+    qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)
 
     def write(writer: RecordWriter, *image: object) -> int:
         stuck.wait()
         return append(writer, *image)  # type: ignore[arg-type]
 
     monkeypatch.setattr(RecordWriter, "append", write)
-    qtbot.waitUntil(stuck.is_reached.is_set, timeout=TIMEOUT)
+    qtbot.waitUntil(stuck.is_reached.is_set)
     n_acknowledged = n_kept(workbench)
 
     assert closing_time(workbench) < SOON + AT_ONCE
@@ -272,7 +272,7 @@ def test_a_solution_that_ends_in_time_is_waited_for(
     monkeypatch.setattr("lightpen.swing.course.solve_record", solve)
     workbench.run.runner.go_on(read_resumable(interrupted))
     workbench.run.runner.finish()
-    qtbot.waitUntil(began.is_set, timeout=TIMEOUT)
+    qtbot.waitUntil(began.is_set)
 
     assert workbench.shut_down()
     assert ended.is_set()
@@ -372,7 +372,7 @@ def test_a_signal_closes_the_window_unasked_and_the_swing_is_offered_again(
 def test_signals_are_left_to_whoever_heard_them_before(qtbot: QtBot) -> None:
     before = [signal.getsignal(number) for number in END_SIGNALS]
     with EndSignals() as signals:
-        with qtbot.waitSignal(signals.came, timeout=TIMEOUT) as came:
+        with qtbot.waitSignal(signals.came) as came:
             signal.raise_signal(signal.SIGTERM)
         assert came.args == [signal.SIGTERM]
 

@@ -64,7 +64,7 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
     walker = open_wizard()
     demo = Demo(walker.window, walker.workbench, is_watched=False)
 
-    with qtbot.waitSignal(demo.ended, timeout=1000 * LONGEST_S):
+    with qtbot.waitSignal(demo.ended):
         demo.start()
 
     assert walker.workbench.run.status.result is None

@@ -379,7 +379,8 @@ class LedsPage(Rearranged, Page):
         self._match.set_why_unknown(why)
 
     def _on_image_shown(self, shown: Shown) -> None:
-        if not self._is_shown:
+        is_live = self._workbench.live.connection is Connection.STREAMING
+        if not (self._is_shown and is_live):  # the last image comes after the loss
             return
         self._match.set_image(shown)
         self._watch.add(shown.seen.spots)

@@ -1,10 +1,10 @@
 """The step Camera as an operator sees it: live image, exposure, intrinsics, masks."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -13,7 +13,6 @@ from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
-    QComboBox,
     QFileDialog,
     QLabel,
     QLineEdit,
@@ -40,7 +39,6 @@ from lightpen.swing.preparation import (
 )
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import unbroken
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import FocusMeter
@@ -48,10 +46,13 @@ from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.steps.conftest import See, Seen
 
 LAMPS = (
     Lamp(np.array([200.0, 150.0]), (8.0, 6.0)),
@@ -59,87 +60,21 @@ LAMPS = (
 )
 
 
-W = TypeVar("W", bound=QWidget)
+def numbers(seen: "Seen") -> set[str]:
+    """Return those of the LEDs that are marked."""
+    return {marker.label for marker in seen.markers if marker.tone is Tone.GOOD}
 
 
-class Seen:
-    """What an operator finds on the page, by the words on it."""
+def others(seen: "Seen") -> list[Marker]:
+    return [marker for marker in seen.markers if marker.tone is Tone.WARN]
 
-    def __init__(self, page: CameraPage, qtbot: QtBot) -> None:
-        self.page = page
-        self._qtbot = qtbot
 
-    @property
-    def words(self) -> str:
-        """All that is written on the page."""
-        labels = self.page.findChildren(QLabel)
-        view = self.child(ImageView)
-        shown = [unbroken(each.text()) for each in labels if each.isVisible()]
-        return "\n".join([*shown, view.accessibleDescription()])
+def crossed(seen: "Seen") -> list[Marker]:
+    return [marker for marker in seen.markers if marker.crossed]
 
-    @property
-    def markers(self) -> tuple[Marker, ...]:
-        return self.child(ImageView).markers()
 
-    @property
-    def numbers(self) -> set[str]:
-        return {marker.label for marker in self.markers if marker.tone is Tone.GOOD}
-
-    @property
-    def others(self) -> list[Marker]:
-        return [marker for marker in self.markers if marker.tone is Tone.WARN]
-
-    @property
-    def crossed(self) -> list[Marker]:
-        return [marker for marker in self.markers if marker.crossed]
-
-    @property
-    def exposure(self) -> str:
-        return self.child(ExposureBar).accessibleDescription()
-
-    def child(self, kind: type[W]) -> W:
-        """Return the only, or the first, widget of a kind."""
-        widget = self.page.findChild(kind)
-        assert isinstance(widget, kind)
-        return widget
-
-    def named(self, name: str) -> QWidget:
-        """Return the visible control of that name or on which it is written."""
-        for each in self.page.findChildren(QWidget):
-            written = each.text() if isinstance(each, QPushButton) else ""
-            if each.isVisible() and name in (written, each.accessibleName()):
-                return each
-        raise AssertionError(f"No {name} on the page, but:\n{self.words}")
-
-    def click(self, name: str) -> None:
-        QTest.mouseClick(self.named(name), Qt.MouseButton.LeftButton)
-
-    def enter(self, name: str, text: str) -> None:
-        """Type into a field and press Enter."""
-        field = self.named(name)
-        field.setFocus()
-        QTest.keySequence(field, "Ctrl+A")
-        QTest.keyClicks(field, text)
-        QTest.keyClick(field, Qt.Key.Key_Return)
-
-    def choose(self, source: str) -> None:
-        """Choose a source by the keyboard."""
-        combo = self.child(QComboBox)
-        combo.setFocus()
-        is_below = combo.findText(source) > combo.currentIndex()
-        QTest.keyClick(combo, Qt.Key.Key_Down if is_below else Qt.Key.Key_Up)
-        assert combo.currentText() == source
-
-    def wait(self, words: str) -> None:
-        """Wait until it is written on the page."""
-
-        def is_written() -> None:
-            assert words in self.words, self.words
-
-        self._qtbot.waitUntil(is_written)
-
-    def until(self, condition: Callable[[], object]) -> None:
-        self._qtbot.waitUntil(lambda: bool(condition()))
+def exposure(seen: "Seen") -> str:
+    return seen.child(ExposureBar).accessibleDescription()
 
 
 @pytest.fixture
@@ -153,12 +88,12 @@ def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
 
 
 @pytest.fixture
-def seen(page: CameraPage, qtbot: QtBot) -> Seen:
-    return Seen(page, qtbot)
+def seen(page: CameraPage, see: "See") -> "Seen":
+    return see(page)
 
 
 @pytest.fixture
-def live(seen: Seen) -> Seen:
+def live(seen: "Seen") -> "Seen":
     """The page with live images of the simulated pen."""
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
@@ -198,37 +133,37 @@ def intrinsics(workbench: Workbench, folder: Path, **changes: object) -> Path:
 # Live image
 
 
-def test_each_led_has_a_ring_with_its_number(live: Seen) -> None:
-    assert live.numbers == {str(led) for led in range(1, 11)}
-    assert live.others == []
+def test_each_led_has_a_ring_with_its_number(live: "Seen") -> None:
+    assert numbers(live) == {str(led) for led in range(1, 11)}
+    assert others(live) == []
 
 
-def test_size_and_rate_of_the_images_are_told(live: Seen) -> None:
+def test_size_and_rate_of_the_images_are_told(live: "Seen") -> None:
     assert "1224 x 1024 px" in live.words
     assert "images/s" in live.words
     assert "Live" in live.words
 
 
-def test_the_simulated_pen_comes_by_itself(seen: Seen) -> None:
+def test_the_simulated_pen_comes_by_itself(seen: "Seen") -> None:
     seen.page.entered()
 
     seen.wait("10 of 10 LEDs")
-    assert seen.exposure == "Good: 10 LEDs"
+    assert exposure(seen) == "Good: 10 LEDs"
 
 
 def test_spots_that_are_no_leds_are_dashed(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     plugged(workbench, small_scene, *LAMPS)
     seen.page.entered()
 
     seen.wait("10 of 10 LEDs, other spots: 2")
-    assert len(seen.others) == 2
-    assert seen.exposure == "Good: 10 LEDs"
+    assert len(others(seen)) == 2
+    assert exposure(seen) == "Good: 10 LEDs"
 
 
 def test_without_a_pen_file_all_spots_are_equal(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     workbench.set_preparation(replace(workbench.preparation, pen_file=None))
     plugged(workbench, small_scene, LAMPS[0])
@@ -236,11 +171,11 @@ def test_without_a_pen_file_all_spots_are_equal(
 
     seen.wait("bright spots: 11")
     assert {marker.tone for marker in seen.markers} == {Tone.ACTIVE}
-    assert seen.exposure == "Good: 11 spots"
+    assert exposure(seen) == "Good: 11 spots"
 
 
 def test_images_are_taken_only_while_the_page_is_shown(
-    live: Seen, workbench: Workbench, qtbot: QtBot
+    live: "Seen", workbench: Workbench, qtbot: QtBot
 ) -> None:
     live.page.left()
     before = live.markers
@@ -251,7 +186,7 @@ def test_images_are_taken_only_while_the_page_is_shown(
     assert live.markers is before
 
 
-def test_a_sharp_image_has_narrow_rims(live: Seen) -> None:
+def test_a_sharp_image_has_narrow_rims(live: "Seen") -> None:
     meter = live.child(FocusMeter)
 
     assert meter.verdict() == "Sharp"
@@ -261,27 +196,27 @@ def test_a_sharp_image_has_narrow_rims(live: Seen) -> None:
 # Exposure and gain
 
 
-def test_a_long_exposure_saturates_and_a_short_one_is_dark(live: Seen) -> None:
+def test_a_long_exposure_saturates_and_a_short_one_is_dark(live: "Seen") -> None:
     assert "All lie in the good part of the scale." in live.words
 
     live.enter("Exposure", "4")
-    live.until(lambda: live.exposure == "Saturated: 10 of 10 LEDs")
+    live.until(lambda: exposure(live) == "Saturated: 10 of 10 LEDs")
     assert "Shorten the exposure until no LED is saturated." in live.words
 
     live.enter("Exposure", "0.2")
-    live.until(lambda: live.exposure == "Too dark: 10 of 10 LEDs")
+    live.until(lambda: exposure(live) == "Too dark: 10 of 10 LEDs")
     assert "Lengthen the exposure until all LEDs are good." in live.words
 
 
-def test_gain_that_saturates_is_to_be_lowered(live: Seen) -> None:
+def test_gain_that_saturates_is_to_be_lowered(live: "Seen") -> None:
     live.enter("Gain", "12")
 
-    live.until(lambda: live.exposure == "Saturated: 10 of 10 LEDs")
+    live.until(lambda: exposure(live) == "Saturated: 10 of 10 LEDs")
     assert "Lower the gain until no LED is saturated." in live.words
 
 
 def test_exposure_and_gain_in_force_are_shown(
-    seen: Seen, workbench: Workbench, qtbot: QtBot
+    seen: "Seen", workbench: Workbench, qtbot: QtBot
 ) -> None:
     workbench.open_camera()
     seen.page.entered()
@@ -296,7 +231,7 @@ def test_exposure_and_gain_in_force_are_shown(
 
 
 def test_recorded_images_have_no_exposure_to_set(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     place = str(recording(tmp_path / "swing"))
     source = SourceChoice(SourceKind.RECORDED, place)
@@ -311,15 +246,15 @@ def test_recorded_images_have_no_exposure_to_set(
 # Intrinsics
 
 
-def test_the_checks_of_the_intrinsics_are_shown(live: Seen) -> None:
+def test_the_checks_of_the_intrinsics_are_shown(live: "Seen") -> None:
     assert "Fits the live images: 1224 x 1024" in live.words
     assert "2319.10 and 2318.55 px" in live.words
-    assert "k1\u00a0-0.082" in live.words
+    assert "k1 -0.082" in live.words
     assert "no date, no uncertainty in the file" in live.words
 
 
 def test_date_and_uncertainty_of_the_intrinsics_are_shown(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = intrinsics(
         workbench,
@@ -337,7 +272,7 @@ def test_date_and_uncertainty_of_the_intrinsics_are_shown(
 
 
 def test_facts_that_are_not_known_take_no_focus(
-    live: Seen, workbench: Workbench
+    live: "Seen", workbench: Workbench
 ) -> None:
     facts = live.child(IntrinsicsPanel).findChildren(QLabel)
     selectable = Qt.TextInteractionFlag.TextSelectableByMouse
@@ -352,7 +287,7 @@ def test_facts_that_are_not_known_take_no_focus(
 
 
 def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = intrinsics(workbench, tmp_path, width=612, height=512)
 
@@ -376,7 +311,11 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
     ],
 )
 def test_an_unfit_file_is_told_beside_the_field_and_the_one_before_stays(
-    live: Seen, workbench: Workbench, tmp_path: Path, content: str | None, sentence: str
+    live: "Seen",
+    workbench: Workbench,
+    tmp_path: Path,
+    content: str | None,
+    sentence: str,
 ) -> None:
     path = tmp_path / "other.yaml"
     if content is not None:
@@ -396,7 +335,7 @@ def test_an_unfit_file_is_told_beside_the_field_and_the_one_before_stays(
 
 
 def test_the_complaint_goes_with_a_fit_file(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     live.enter("Intrinsics file", str(tmp_path / "nowhere.yaml"))
     live.wait("does not exist")
@@ -409,7 +348,7 @@ def test_the_complaint_goes_with_a_fit_file(
 
 
 def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
-    live: Seen, qapp: QApplication, tmp_path: Path
+    live: "Seen", qapp: QApplication, tmp_path: Path
 ) -> None:
     broken = tmp_path / "broken.yaml"
     broken.write_text("image_width: 1224\ncamera_matrix: [1, 2\n")
@@ -423,7 +362,7 @@ def test_what_is_wrong_with_a_file_is_told_in_the_language_of_the_wizard(
 
 
 def test_a_file_is_opened_in_the_dialog(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = intrinsics(workbench, tmp_path)
     live.click("Open...")
@@ -435,7 +374,7 @@ def test_a_file_is_opened_in_the_dialog(
 
 
 def test_a_dialog_that_is_left_changes_nothing(
-    live: Seen, workbench: Workbench
+    live: "Seen", workbench: Workbench
 ) -> None:
     before = workbench.preparation
     live.click("Open...")
@@ -445,7 +384,7 @@ def test_a_dialog_that_is_left_changes_nothing(
 
 
 def test_the_files_of_the_simulated_pen_are_used_at_a_click(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     workbench.set_preparation(
         replace(workbench.preparation, camera_file=None, pen_file=None)
@@ -465,7 +404,7 @@ def test_the_files_of_the_simulated_pen_are_used_at_a_click(
 # Recorded images
 
 
-def test_a_recording_asks_where_it_is(live: Seen, workbench: Workbench) -> None:
+def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> None:
     live.choose("Recorded images")
 
     live.wait("Choose the folder of the recorded images.")
@@ -473,12 +412,12 @@ def test_a_recording_asks_where_it_is(live: Seen, workbench: Workbench) -> None:
         "Choose the folder of the recorded images."
     )
     assert live.markers == ()
-    assert live.exposure == "No LED is seen"
+    assert exposure(live) == "No LED is seen"
     assert live.named("Folder, record or video").hasFocus()
 
 
 def test_a_recorded_swing_is_played(
-    live: Seen, small_scene: Scene, tmp_path: Path
+    live: "Seen", small_scene: Scene, tmp_path: Path
 ) -> None:
     write_scene(replace(small_scene, n_images=2), tmp_path / "swing")
     live.choose("Recorded images")
@@ -490,7 +429,7 @@ def test_a_recorded_swing_is_played(
 
 
 def test_a_folder_is_picked_in_the_dialog(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     folder = recording(tmp_path / "swing")
     live.choose("Recorded images")
@@ -505,7 +444,7 @@ def test_a_folder_is_picked_in_the_dialog(
     live.wait("80 x 64 px")
 
 
-def test_a_missing_folder_is_told_and_tried_again(live: Seen, tmp_path: Path) -> None:
+def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) -> None:
     folder = tmp_path / "swing"
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(folder))
@@ -519,7 +458,7 @@ def test_a_missing_folder_is_told_and_tried_again(live: Seen, tmp_path: Path) ->
     assert "Live" in live.words
 
 
-def test_a_folder_without_images_is_told(live: Seen, tmp_path: Path) -> None:
+def test_a_folder_without_images_is_told(live: "Seen", tmp_path: Path) -> None:
     folder = tmp_path / "empty"
     folder.mkdir()
     live.choose("Recorded images")
@@ -531,7 +470,7 @@ def test_a_folder_without_images_is_told(live: Seen, tmp_path: Path) -> None:
 
 
 def test_a_damaged_image_is_counted_and_the_others_are_shown(
-    live: Seen, workbench: Workbench, tmp_path: Path, qtbot: QtBot
+    live: "Seen", workbench: Workbench, tmp_path: Path, qtbot: QtBot
 ) -> None:
     folder = recording(tmp_path / "swing", 3)
     damaged = folder / "frame_1.png"
@@ -546,7 +485,7 @@ def test_a_damaged_image_is_counted_and_the_others_are_shown(
     assert "80 x 64 px" in live.words
 
 
-def test_a_recording_that_begins_damaged_is_told(live: Seen, tmp_path: Path) -> None:
+def test_a_recording_that_begins_damaged_is_told(live: "Seen", tmp_path: Path) -> None:
     folder = recording(tmp_path / "swing")
     (folder / "frame_0.png").write_bytes(b"no image")
     live.choose("Recorded images")
@@ -556,7 +495,7 @@ def test_a_recording_that_begins_damaged_is_told(live: Seen, tmp_path: Path) -> 
     live.wait("frame_0.png is damaged or no image")
 
 
-def test_the_pen_is_back_after_a_recording(live: Seen, tmp_path: Path) -> None:
+def test_the_pen_is_back_after_a_recording(live: "Seen", tmp_path: Path) -> None:
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "nowhere"))
     live.wait("There is no folder")
@@ -568,7 +507,7 @@ def test_the_pen_is_back_after_a_recording(live: Seen, tmp_path: Path) -> None:
 
 
 def test_another_source_takes_the_notice_of_the_last_away(
-    live: Seen, tmp_path: Path, qtbot: QtBot
+    live: "Seen", tmp_path: Path, qtbot: QtBot
 ) -> None:
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "nowhere"))
@@ -584,7 +523,7 @@ def test_another_source_takes_the_notice_of_the_last_away(
 
 
 def test_a_camera_that_is_unplugged_is_told_and_comes_back(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
     seen.page.entered()
@@ -604,7 +543,7 @@ def test_a_camera_that_is_unplugged_is_told_and_comes_back(
 
 @pytest.mark.parametrize("kind", ["folder", "images"])
 def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
-    live: Seen, small_scene: Scene, tmp_path: Path, kind: str
+    live: "Seen", small_scene: Scene, tmp_path: Path, kind: str
 ) -> None:
     write_scene(replace(small_scene, n_images=3), tmp_path / "swing")
     gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
@@ -619,7 +558,7 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     for stale in ("of 10 LEDs", "images/s", "Live"):
         assert stale not in live.words
     assert live.markers == ()
-    assert live.exposure == "No LED is seen"
+    assert exposure(live) == "No LED is seen"
 
     (tmp_path / "elsewhere").rename(gone)
     live.wait("Live")
@@ -628,7 +567,7 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
 
 
 def test_a_camera_that_is_not_there_is_told(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     clock = workbench.around.clock
     camera = SimulatedCamera(small_scene, clock)
@@ -642,7 +581,7 @@ def test_a_camera_that_is_not_there_is_told(
 
 
 def test_a_silent_camera_is_told(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
     seen.page.entered()
@@ -656,7 +595,7 @@ def test_a_silent_camera_is_told(
 
 
 def test_a_search_ends_with_the_images(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
     seen.page.entered()
@@ -673,7 +612,7 @@ def test_a_search_ends_with_the_images(
 
 
 def test_what_shines_beside_the_covered_pen_is_found_and_masked(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     plugged(workbench, small_scene, *LAMPS)
     seen.page.entered()
@@ -689,30 +628,30 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen.wait("Masked places: 2")
     seen.click("Uncover the LEDs")
     seen.wait("10 of 10 LEDs")
-    seen.until(lambda: not seen.others)
-    assert len(seen.crossed) == 2
+    seen.until(lambda: not others(seen))
+    assert len(crossed(seen)) == 2
     assert len(workbench.preparation.mask) == 2
 
 
 def test_a_mask_is_cleared(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     mask = np.array([[*lamp.center, 30.0] for lamp in LAMPS])
     workbench.set_preparation(replace(workbench.preparation, mask=mask))
     plugged(workbench, small_scene, *LAMPS)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")
-    seen.until(lambda: len(seen.crossed) == 2)
+    seen.until(lambda: len(crossed(seen)) == 2)
 
     seen.click("Clear the mask")
 
-    seen.until(lambda: len(seen.others) == 2)
-    assert seen.crossed == []
+    seen.until(lambda: len(others(seen)) == 2)
+    assert crossed(seen) == []
     assert not seen.named("Clear the mask").isEnabled()
 
 
 def test_a_mask_is_of_one_source_only(
-    live: Seen, workbench: Workbench, tmp_path: Path
+    live: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     workbench.set_preparation(
         replace(workbench.preparation, mask=np.array([[9.0, 9.0, 5.0]]))
@@ -727,7 +666,7 @@ def test_a_mask_is_of_one_source_only(
 
 
 def test_a_mask_adds_to_the_one_before(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     first = np.array([[*LAMPS[0].center, 30.0]])
     workbench.set_preparation(replace(workbench.preparation, mask=first))
@@ -744,14 +683,14 @@ def test_a_mask_adds_to_the_one_before(
     assert len(workbench.preparation.mask) == 2
 
 
-def test_a_pen_that_is_still_seen_is_not_masked(live: Seen) -> None:
+def test_a_pen_that_is_still_seen_is_not_masked(live: "Seen") -> None:
     live.click("Search")
 
     live.wait("The pen is still seen. Cover all of its LEDs, then search again.")
     assert not live.named("Mask the spots").isEnabled()
 
 
-def test_nothing_left_is_told(live: Seen) -> None:
+def test_nothing_left_is_told(live: "Seen") -> None:
     live.click("Cover the LEDs")
     live.wait("no LED seen")
 
@@ -761,7 +700,7 @@ def test_nothing_left_is_told(live: Seen) -> None:
 
 
 def test_without_a_pen_file_the_operator_is_asked_whether_it_is_covered(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     workbench.set_preparation(replace(workbench.preparation, pen_file=None))
     seen.page.entered()
@@ -792,7 +731,7 @@ def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
     assert len(panel.found()) == 0
 
 
-def test_a_grey_button_says_why(seen: Seen) -> None:
+def test_a_grey_button_says_why(seen: "Seen") -> None:
     reasons = {
         name: seen.named(name).toolTip()
         for name in ("Search", "Mask the spots", "Clear the mask")
@@ -806,7 +745,7 @@ def test_a_grey_button_says_why(seen: Seen) -> None:
 
 
 def test_the_pen_is_uncovered_when_the_page_is_left(
-    live: Seen, workbench: Workbench
+    live: "Seen", workbench: Workbench
 ) -> None:
     live.click("Cover the LEDs")
     live.wait("no LED seen")
@@ -818,7 +757,7 @@ def test_the_pen_is_uncovered_when_the_page_is_left(
     assert live.named("Cover the LEDs")
 
 
-def test_another_simulated_operator_covers_nothing(live: Seen) -> None:
+def test_another_simulated_operator_covers_nothing(live: "Seen") -> None:
     live.click("Cover the LEDs")
     live.wait("no LED seen")
     live.choose("Recorded images")
@@ -850,7 +789,7 @@ class Ends(Page):
 
 
 @pytest.fixture
-def window(live: Seen, settings: Settings, qtbot: QtBot) -> MainWindow:
+def window(live: "Seen", settings: Settings, qtbot: QtBot) -> MainWindow:
     window = MainWindow([live.page, Ends()], settings, Preferences())
     qtbot.addWidget(window)
     window.show()
@@ -858,7 +797,7 @@ def window(live: Seen, settings: Settings, qtbot: QtBot) -> MainWindow:
 
 
 def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
-    window: MainWindow, seen: Seen, workbench: Workbench, small_scene: Scene
+    window: MainWindow, seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     workbench.troubled.connect(window.show_notice)
     camera = plugged(workbench, small_scene)
@@ -874,7 +813,7 @@ def test_the_notice_of_a_lost_camera_goes_when_it_is_back(
 
 
 def test_the_trouble_of_a_swing_is_not_taken_for_one_of_the_camera(
-    window: MainWindow, live: Seen, workbench: Workbench
+    window: MainWindow, live: "Seen", workbench: Workbench
 ) -> None:
     workbench.troubled.connect(window.show_notice)
     workbench.live.troubled.emit("The disk is full.")
@@ -887,7 +826,7 @@ def test_the_trouble_of_a_swing_is_not_taken_for_one_of_the_camera(
     assert "The disk is full." in window.words()
 
 
-def test_the_step_leads_on_to_the_leds(window: MainWindow, live: Seen) -> None:
+def test_the_step_leads_on_to_the_leds(window: MainWindow, live: "Seen") -> None:
     assert live.page.main_action() == MainAction("Continue to the LEDs")
     button = window.findChild(QPushButton, "main_button")
     assert isinstance(button, QPushButton)
@@ -902,7 +841,7 @@ def test_the_step_leads_on_to_the_leds(window: MainWindow, live: Seen) -> None:
     [("Intrinsics file", "/nowhere.yaml"), ("Exposure", "2"), ("Gain", "1")],
 )
 def test_enter_in_a_field_does_not_leave_the_step(
-    window: MainWindow, live: Seen, field: str, text: str
+    window: MainWindow, live: "Seen", field: str, text: str
 ) -> None:
     live.enter(field, text)
 
@@ -917,7 +856,7 @@ def test_names_come_before_the_camera(page: CameraPage, workbench: Workbench) ->
     assert page.why_closed() == "Enter the name of the station."
 
 
-def test_a_swing_under_way_is_told(live: Seen, workbench: Workbench) -> None:
+def test_a_swing_under_way_is_told(live: "Seen", workbench: Workbench) -> None:
     assert "A swing is under way." not in live.words
 
     workbench.run.runner.begin(workbench.preparation)
@@ -926,7 +865,7 @@ def test_a_swing_under_way_is_told(live: Seen, workbench: Workbench) -> None:
 
 
 def test_every_control_is_named_and_reached_by_tab(
-    live: Seen, window: MainWindow
+    live: "Seen", window: MainWindow
 ) -> None:
     reached = set()
     for _ in range(40):
@@ -949,7 +888,7 @@ def test_every_control_is_named_and_reached_by_tab(
     }
 
 
-def test_another_language_keeps_what_is_shown(live: Seen) -> None:
+def test_another_language_keeps_what_is_shown(live: "Seen") -> None:
     live.click("Search")
     live.wait("The pen is still seen.")
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QFileDialog,
-    QLabel,
     QLineEdit,
     QPushButton,
     QWidget,
@@ -34,134 +33,90 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import unbroken
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
 from lightpen_app.steps.leds.pen_view import PenView
-from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.image_view import ImageView
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
+if TYPE_CHECKING:
+    from tests.app.steps.conftest import See, Seen
+
 LEDS = paper_pen().leds
 X, Y, Z = 1, 2, 3  # columns of the table
-W = TypeVar("W", bound=QWidget)
 
 
-class Seen:
-    """What an operator finds on the page, by the words on it."""
+def why_not(seen: "Seen") -> str:
+    return seen.page.main_action().why_not
 
-    def __init__(self, page: LedsPage, qtbot: QtBot) -> None:
-        self.page = page
-        self.qtbot = qtbot
-        self.statuses: list[str] = []
-        page.status_changed.connect(self.statuses.append)
 
-    @property
-    def words(self) -> str:
-        """All that is written on the page, blanks alike."""
-        labels = self.page.findChildren(QLabel)
-        shown = [unbroken(label.text()) for label in labels if label.isVisible()]
-        banner = self.child(StateBanner).value()
-        parts = [*shown, banner.word, banner.detail]
-        return "\n".join(parts).replace("\N{NO-BREAK SPACE}", " ")
+def led_table(seen: "Seen") -> LedTable:
+    return seen.child(LedTable)
 
-    @property
-    def why_not(self) -> str:
-        return self.page.main_action().why_not
 
-    @property
-    def markers(self) -> tuple[Marker, ...]:
-        return self.child(ImageView).markers()
+def shown_path(seen: "Seen") -> str:
+    field = seen.named("LED file")
+    assert isinstance(field, QLineEdit)
+    return field.text()
 
-    @property
-    def table(self) -> LedTable:
-        return self.child(LedTable)
 
-    @property
-    def path(self) -> str:
-        field = self.named("LED file")
-        assert isinstance(field, QLineEdit)
-        return field.text()
+def open_file(seen: "Seen", path: Path) -> None:
+    seen.enter("LED file", str(path))
 
-    def child(self, kind: type[W]) -> W:
-        """Return the only widget of a kind."""
-        widget = self.page.findChild(kind)
-        assert isinstance(widget, kind)
-        return widget
 
-    def named(self, name: str) -> QWidget:
-        """Return the visible control of that name or on which it is written."""
-        for each in self.page.findChildren(QWidget):
-            written = each.text() if isinstance(each, QPushButton) else ""
-            if each.isVisible() and name in (written, each.accessibleName()):
-                return each
-        raise AssertionError(f"No {name} on the page, but:\n{self.words}")
+def type_cell(seen: "Seen", led: int, column: int, text: str) -> None:
+    """Type into a cell of the table and press Enter."""
+    table = led_table(seen)
+    table.setCurrentIndex(table.model().index(led - 1, column))
+    QTest.keyClick(table, Qt.Key.Key_F2)
+    editor = QApplication.focusWidget()
+    assert isinstance(editor, QLineEdit)
+    editor.selectAll()
+    QTest.keyClicks(editor, text)
+    QTest.keyClick(editor, Qt.Key.Key_Return)
+    QApplication.processEvents()
 
-    def click(self, name: str) -> None:
-        QTest.mouseClick(self.named(name), Qt.MouseButton.LeftButton)
 
-    def enter(self, name: str, text: str) -> None:
-        """Type into a field and press Enter."""
-        field = self.named(name)
-        field.setFocus()
-        QTest.keySequence(field, "Ctrl+A")
-        QTest.keyClicks(field, text)
-        QTest.keyClick(field, Qt.Key.Key_Return)
+def cell(seen: "Seen", led: int, column: int) -> str:
+    return str(led_table(seen).model().index(led - 1, column).data())
 
-    def open(self, path: Path) -> None:
-        self.enter("LED file", str(path))
 
-    def type_cell(self, led: int, column: int, text: str) -> None:
-        """Type into a cell of the table and press Enter."""
-        table = self.table
-        table.setCurrentIndex(table.model().index(led - 1, column))
-        QTest.keyClick(table, Qt.Key.Key_F2)
-        editor = QApplication.focusWidget()
-        assert isinstance(editor, QLineEdit)
-        editor.selectAll()
-        QTest.keyClicks(editor, text)
-        QTest.keyClick(editor, Qt.Key.Key_Return)
-        QApplication.processEvents()
+def told_of(seen: "Seen", led: int) -> str:
+    """Return what the table says of an LED."""
+    index = led_table(seen).model().index(led - 1, 0)
+    return str(index.data(Qt.ItemDataRole.ToolTipRole) or "")
 
-    def cell(self, led: int, column: int) -> str:
-        return str(self.table.model().index(led - 1, column).data())
 
-    def told_of(self, led: int) -> str:
-        """Return what the table says of an LED."""
-        index = self.table.model().index(led - 1, 0)
-        return str(index.data(Qt.ItemDataRole.ToolTipRole) or "")
-
-    def save_as(self, path: Path) -> None:
-        self.click("Save as...")
-        dialog = self.child(QFileDialog)
-        dialog.selectFile(str(path))
-        dialog.accept()
-        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-
-    def wait(self, words: str) -> None:
-        self.qtbot.waitUntil(lambda: words in self.words, timeout=8000)
+def save_as(seen: "Seen", path: Path) -> None:
+    seen.click("Save as...")
+    dialog = seen.child(QFileDialog)
+    dialog.selectFile(str(path))
+    dialog.accept()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    seen.settle()
 
 
 @pytest.fixture
-def seen(qtbot: QtBot, workbench: Workbench) -> Iterator[Seen]:
+def seen(qtbot: QtBot, workbench: Workbench, see: "See") -> Iterator["Seen"]:
     page = LedsPage(workbench)
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
     page.activateWindow()
-    yield Seen(page, qtbot)
+    yield see(page)
     page.left()
     page.shut_down()
 
 
 @pytest.fixture
-def live(seen: Seen, workbench: Workbench, small_scene: Scene) -> Seen:
+def live(seen: "Seen", workbench: Workbench, small_scene: Scene) -> "Seen":
     """The page with a camera before which the pen is swung in the cone."""
     plugged(workbench, small_scene)
     seen.page.entered()
@@ -204,45 +159,48 @@ def raw() -> FloatArray:
 # What is in use
 
 
-def test_the_file_in_use_is_shown(seen: Seen, workbench: Workbench) -> None:
-    assert seen.path == str(in_use(workbench).path)
-    assert [seen.cell(8, column) for column in (X, Y, Z)] == ["25", "35", "0"]
+def test_the_file_in_use_is_shown(seen: "Seen", workbench: Workbench) -> None:
+    assert shown_path(seen) == str(in_use(workbench).path)
+    assert [cell(seen, 8, column) for column in (X, Y, Z)] == ["25", "35", "0"]
     for words in ("Numbers in order", "LED 1 over the origin", "Axes right-handed"):
         assert words in seen.words
     assert seen.page.is_complete()
-    assert seen.why_not == ""
+    assert why_not(seen) == ""
 
 
-def test_the_rules_say_in_words_how_they_fare(seen: Seen) -> None:
+def test_the_rules_say_in_words_how_they_fare(seen: "Seen") -> None:
     label = seen.named("LEDs 1 to 4 in a line")
 
     assert label.accessibleDescription() == "fulfilled"
     assert "0.00 mm" in seen.words
 
 
-def test_without_a_file_one_has_to_be_opened(seen: Seen, workbench: Workbench) -> None:
+def test_without_a_file_one_has_to_be_opened(
+    seen: "Seen", workbench: Workbench
+) -> None:
     workbench.set_preparation(replace(workbench.preparation, pen_file=None))
 
-    assert seen.why_not == "Open the LED geometry file."
+    assert why_not(seen) == "Open the LED geometry file."
     assert not seen.page.is_complete()
-    assert seen.table.model().rowCount() == 0
+    assert led_table(seen).model().rowCount() == 0
     save = seen.named("Save as...")
     assert (save.isEnabled(), save.toolTip()) == (False, "There are no LEDs yet.")
 
 
 def test_the_simulated_pens_file_is_used_at_a_click(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     workbench.set_preparation(replace(workbench.preparation, pen_file=None))
 
     seen.click("Use the simulated pen's file")
+    seen.settle()
 
     assert in_use(workbench).path.name == "pen.json"
     assert seen.page.is_complete()
 
 
 def test_the_simulated_pens_file_is_offered_for_that_pen_alone(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     recorded = SourceChoice(SourceKind.RECORDED, "")
     workbench.set_preparation(replace(workbench.preparation, source=recorded))
@@ -252,7 +210,7 @@ def test_the_simulated_pens_file_is_offered_for_that_pen_alone(
 
 
 def test_the_step_is_closed_until_names_and_camera_are_there(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     assert seen.page.why_closed() == "No image has come from the camera yet."
 
@@ -267,25 +225,26 @@ def test_the_step_is_closed_until_names_and_camera_are_there(
 
 
 def test_another_file_is_opened(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     write_pen(fanned_pen(), path := tmp_path / "fanned.json")
 
-    seen.open(path)
+    open_file(seen, path)
 
     assert in_use(workbench).path == path
-    assert not seen.table.isColumnHidden(4)  # its discs do not all face +z
+    assert not led_table(seen).isColumnHidden(4)  # its discs do not all face +z
     assert seen.page.is_complete()
 
 
 def test_a_file_is_picked_in_a_dialog(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = write_table(tmp_path / "leds.csv", LEDS)
     seen.click("Open...")
     dialog = seen.child(QFileDialog)
     dialog.selectFile(str(path))
     dialog.accept()
+    seen.settle()
 
     assert in_use(workbench).path == path
 
@@ -300,43 +259,44 @@ def test_a_file_is_picked_in_a_dialog(
     ],
 )
 def test_an_error_in_a_file_is_told_and_the_one_before_stays(
-    seen: Seen, workbench: Workbench, tmp_path: Path, content: str, sentence: str
+    seen: "Seen", workbench: Workbench, tmp_path: Path, content: str, sentence: str
 ) -> None:
     before = in_use(workbench)
     path = tmp_path / "bad.csv"
     path.write_text(content)
 
-    seen.open(path)
+    open_file(seen, path)
 
     assert sentence in seen.words
     assert in_use(workbench) is before
-    assert seen.cell(8, Y) == "35"
+    assert cell(seen, 8, Y) == "35"
     assert seen.page.is_complete()
 
 
 def test_a_missing_file_is_told(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
 
-    seen.open(tmp_path / "nowhere.csv")
+    open_file(seen, tmp_path / "nowhere.csv")
 
     assert "nowhere.csv" in seen.words
     assert in_use(workbench) is before
 
 
 def test_units_are_asked_for_where_a_file_does_not_say_them(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = write_table(tmp_path / "leds.csv", LEDS / 25.4, units="")
 
-    seen.open(path)
+    open_file(seen, path)
     assert "leds.csv does not say the units of its coordinates." in seen.words
     choice = seen.named("Units of the file")
     assert isinstance(choice, QComboBox)
     assert choice.hasFocus()
     QTest.keyClicks(choice, "inch")
     choice.textActivated.emit(choice.currentText())
+    seen.settle()
 
     file = in_use(workbench)
     assert (file.path, file.units) == (path, "inch")
@@ -344,21 +304,24 @@ def test_units_are_asked_for_where_a_file_does_not_say_them(
     assert "does not say the units" not in seen.words
 
 
-def test_wrong_units_are_told(seen: Seen, workbench: Workbench, tmp_path: Path) -> None:
+def test_wrong_units_are_told(
+    seen: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
     before = in_use(workbench)
-    seen.open(write_table(tmp_path / "leds.csv", LEDS, units=""))
+    open_file(seen, write_table(tmp_path / "leds.csv", LEDS, units=""))
     choice = seen.child(QComboBox)
     QTest.keyClicks(choice, "um")
     choice.textActivated.emit(choice.currentText())
+    seen.settle()
 
     assert "Are the coordinates in metres?" in seen.words
     assert in_use(workbench) is before
 
 
-def test_a_pen_of_another_layout_keeps_its_frame(seen: Seen, tmp_path: Path) -> None:
+def test_a_pen_of_another_layout_keeps_its_frame(seen: "Seen", tmp_path: Path) -> None:
     write_pen(six_led_pen(), path := tmp_path / "six.json")
 
-    seen.open(path)
+    open_file(seen, path)
 
     assert "Not the layout of the ten-LED pen" in seen.words
     assert "LEDs 1 to 4 in a line" not in seen.words
@@ -369,48 +332,48 @@ def test_a_pen_of_another_layout_keeps_its_frame(seen: Seen, tmp_path: Path) -> 
 
 
 def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
     path = write_table(tmp_path / "swapped.csv", exchanged())
 
-    seen.open(path)
+    open_file(seen, path)
     assert "swapped.csv: LEDs 5 and 8 are exchanged" in seen.words
     numbers = seen.named("Numbers in order")
     assert numbers.accessibleDescription() == "not fulfilled"
     assert in_use(workbench) is before
-    assert seen.why_not == "Mend the LED table first: what is wrong is told above."
+    assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
     assert not seen.named("Save as...").isEnabled()
 
     for led in (5, 8):
         for column in (X, Y):
-            seen.type_cell(led, column, f"{LEDS[led - 1, column - 1]:g}")
+            type_cell(seen, led, column, f"{LEDS[led - 1, column - 1]:g}")
 
     assert "exchanged" not in seen.words
-    assert seen.why_not == "Save the LED table first: the record needs its file."
-    seen.save_as(tmp_path / "mended.csv")
+    assert why_not(seen) == "Save the LED table first: the record needs its file."
+    save_as(seen, tmp_path / "mended.csv")
     assert in_use(workbench).path == tmp_path / "mended.csv"
-    assert seen.why_not == ""
+    assert why_not(seen) == ""
 
 
 def test_a_file_that_cannot_be_used_is_left_again(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
-    seen.open(write_table(tmp_path / "swapped.csv", exchanged()))
+    open_file(seen, write_table(tmp_path / "swapped.csv", exchanged()))
 
     discard = seen.named("Discard")
     assert discard.toolTip() == "Go back to the file in use."
     seen.click("Discard")
 
-    assert seen.path == str(in_use(workbench).path)
+    assert shown_path(seen) == str(in_use(workbench).path)
     assert "exchanged" not in seen.words
     assert seen.page.is_complete()
 
 
 def test_raw_coordinates_are_put_into_the_pen_frame(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
-    seen.open(write_table(tmp_path / "raw.csv", raw()))
+    open_file(seen, write_table(tmp_path / "raw.csv", raw()))
     assert "The LEDs are not in the pen frame" in seen.words
     origin = seen.named("LED 1 over the origin")
     assert origin.accessibleDescription() == "not fulfilled"
@@ -418,12 +381,12 @@ def test_raw_coordinates_are_put_into_the_pen_frame(
     seen.click("Put into the pen frame")
 
     assert "not in the pen frame" not in seen.words
-    assert seen.cell(8, Y) == "35"
-    seen.save_as(tmp_path / "leds.csv")
+    assert cell(seen, 8, Y) == "35"
+    save_as(seen, tmp_path / "leds.csv")
     np.testing.assert_allclose(in_use(workbench).pen.leds, LEDS, atol=1e-5)
 
 
-def test_a_pen_in_its_frame_need_not_be_moved(seen: Seen) -> None:
+def test_a_pen_in_its_frame_need_not_be_moved(seen: "Seen") -> None:
     with pytest.raises(AssertionError):
         seen.named("Put into the pen frame")
 
@@ -431,215 +394,221 @@ def test_a_pen_in_its_frame_need_not_be_moved(seen: Seen) -> None:
 # The table
 
 
-def test_a_cell_that_is_no_number_is_told(seen: Seen) -> None:
-    seen.type_cell(5, Y, "12,4O")
+def test_a_cell_that_is_no_number_is_told(seen: "Seen") -> None:
+    type_cell(seen, 5, Y, "12,4O")
 
     assert 'LED 5, y: "12,4O" is not a number (letter O).' in seen.words
-    assert seen.why_not == "Mend the LED table first: what is wrong is told above."
+    assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
     assert not seen.page.is_complete()
 
 
-def test_leds_that_cannot_be_a_pen_are_told_and_still_drawn(seen: Seen) -> None:
-    seen.type_cell(7, Y, "16")
+def test_leds_that_cannot_be_a_pen_are_told_and_still_drawn(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "16")
 
     assert "LEDs 5 and 7 are 4.00 mm apart, too close" in seen.words
     assert seen.child(PenView).value().pen is not None
 
 
-def test_a_number_that_no_pen_has_is_told(seen: Seen) -> None:
-    seen.type_cell(7, Y, "1e300")
+def test_a_number_that_no_pen_has_is_told(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "1e300")
 
     assert "LED 7 is 1e+297 m from the origin, which no pen is." in seen.words
 
 
 def test_a_changed_cell_is_in_use_once_it_is_saved(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
-    seen.type_cell(7, Y, "160,25")
+    type_cell(seen, 7, Y, "160,25")
 
     assert in_use(workbench) is before
-    assert seen.why_not == "Save the LED table first: the record needs its file."
+    assert why_not(seen) == "Save the LED table first: the record needs its file."
     assert seen.page.unsaved() == "The LED table has changes that are not saved."
     assert workbench.preparation.leds_lacks() == (Lack.SAVED_LEDS,)
 
-    seen.save_as(tmp_path / "other")  # the dialog adds the ending
+    statuses: list[str] = []
+    seen.page.status_changed.connect(statuses.append)
+    save_as(seen, tmp_path / "other")  # the dialog adds the ending
 
     path = tmp_path / "other.json"
     assert read_pen(path).leds[6, 1] == 160.25
-    assert (in_use(workbench).path, seen.path) == (path, str(path))
-    assert seen.statuses == ["The LEDs are saved as other.json and in use."]
-    assert (seen.why_not, seen.page.unsaved()) == ("", "")
+    assert (in_use(workbench).path, shown_path(seen)) == (path, str(path))
+    assert statuses == ["The LEDs are saved as other.json and in use."]
+    assert (why_not(seen), seen.page.unsaved()) == ("", "")
     assert workbench.preparation.leds_lacks() == ()
 
 
-def test_typing_the_old_number_again_leaves_nothing_to_save(seen: Seen) -> None:
-    seen.type_cell(7, Y, "161")
-    seen.type_cell(7, Y, "160")
+def test_typing_the_old_number_again_leaves_nothing_to_save(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "161")
+    type_cell(seen, 7, Y, "160")
 
-    assert (seen.why_not, seen.page.unsaved()) == ("", "")
+    assert (why_not(seen), seen.page.unsaved()) == ("", "")
 
 
 def test_a_file_that_exists_is_replaced_only_if_the_user_agrees(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     path = tmp_path / "other.json"
     path.write_text("precious")
-    seen.type_cell(7, Y, "161")
+    type_cell(seen, 7, Y, "161")
 
-    seen.save_as(path)
+    save_as(seen, path)
     assert "other.json exists already. Replace it by these LEDs?" in seen.words
     seen.click("Cancel")
     assert path.read_text() == "precious"
     assert seen.page.unsaved()
 
-    seen.save_as(path)
+    save_as(seen, path)
     seen.click("Replace")
+    seen.settle()
     assert read_pen(path).leds[6, 1] == 161
     assert in_use(workbench).path == path
 
 
-def test_a_table_has_no_place_for_the_tip(seen: Seen, tmp_path: Path) -> None:
-    seen.type_cell(7, Y, "161")
+def test_a_table_has_no_place_for_the_tip(seen: "Seen", tmp_path: Path) -> None:
+    type_cell(seen, 7, Y, "161")
 
-    seen.save_as(tmp_path / "leds.csv")
+    save_as(seen, tmp_path / "leds.csv")
 
     assert "Choose a name that ends in .json." in seen.words
     assert seen.page.unsaved()
     assert not (tmp_path / "leds.csv").exists()
 
 
-def test_a_file_that_cannot_be_written_is_told(seen: Seen, tmp_path: Path) -> None:
-    seen.type_cell(7, Y, "161")
+def test_a_file_that_cannot_be_written_is_told(seen: "Seen", tmp_path: Path) -> None:
+    type_cell(seen, 7, Y, "161")
 
     seen.child(LedFilePanel).save_chosen.emit(tmp_path / "no folder" / "leds.json")
+    seen.settle()
 
     assert "leds.json" in seen.words
     assert seen.page.unsaved()
 
 
-def test_discarding_changes_asks_first(seen: Seen) -> None:
+def test_discarding_changes_asks_first(seen: "Seen") -> None:
     discard = seen.named("Discard")
     assert (discard.isEnabled(), discard.toolTip()) == (False, "Nothing is changed.")
-    seen.type_cell(7, Y, "161")
+    type_cell(seen, 7, Y, "161")
 
     seen.click("Discard")
     assert seen.child(QuestionBar).words()
     seen.click("Cancel")
-    assert seen.cell(7, Y) == "161"
+    assert cell(seen, 7, Y) == "161"
 
     seen.click("Discard")
     seen.click("Discard them")
-    assert seen.cell(7, Y) == "160"
+    assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
 
 
 def test_opening_another_file_asks_before_changes_are_lost(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
     path = write_table(tmp_path / "leds.csv", LEDS)
-    seen.type_cell(7, Y, "161")
+    type_cell(seen, 7, Y, "161")
 
-    seen.open(path)
+    open_file(seen, path)
     seen.click("Cancel")
-    assert (in_use(workbench), seen.path) == (before, str(before.path))
-    assert seen.cell(7, Y) == "161"
+    assert (in_use(workbench), shown_path(seen)) == (before, str(before.path))
+    assert cell(seen, 7, Y) == "161"
 
-    seen.open(path)
+    open_file(seen, path)
     seen.click("Discard them")
+    seen.settle()
     assert in_use(workbench).path == path
-    assert seen.cell(7, Y) == "160"
+    assert cell(seen, 7, Y) == "160"
 
 
 def test_choosing_units_asks_before_changes_are_lost(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     before = in_use(workbench)
     path = write_table(tmp_path / "leds.csv", LEDS, units="")
 
     def choose_units() -> None:
-        seen.open(path)
-        seen.type_cell(7, Y, "161")
+        open_file(seen, path)
+        type_cell(seen, 7, Y, "161")
         seen.child(QComboBox).textActivated.emit("mm")
 
     choose_units()
     seen.click("Cancel")
-    assert (in_use(workbench), seen.path) == (before, str(before.path))
-    assert seen.cell(7, Y) == "161"
+    assert (in_use(workbench), shown_path(seen)) == (before, str(before.path))
+    assert cell(seen, 7, Y) == "161"
     assert "does not say the units" not in seen.words
 
-    seen.type_cell(7, Y, "160")
+    type_cell(seen, 7, Y, "160")
     choose_units()
     seen.click("Discard them")
+    seen.settle()
     assert in_use(workbench).path == path
-    assert seen.cell(7, Y) == "160"
+    assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
 
 
 def test_changes_outlive_another_file_that_another_step_puts_in_use(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     write_pen(six_led_pen(), path := tmp_path / "six.json")
-    seen.type_cell(7, Y, "161")
+    type_cell(seen, 7, Y, "161")
 
     workbench.set_preparation(
         replace(workbench.preparation, pen_file=PenFile.read(path))
     )
-    assert seen.cell(7, Y) == "161"
-    assert seen.path == str(path)
+    assert cell(seen, 7, Y) == "161"
+    assert shown_path(seen) == str(path)
     assert seen.page.unsaved()
-    assert seen.why_not == "Save the LED table first: the record needs its file."
+    assert why_not(seen) == "Save the LED table first: the record needs its file."
 
     seen.click("Discard")
     seen.click("Discard them")
-    assert seen.table.model().rowCount() == 6
-    assert (seen.why_not, seen.page.unsaved()) == ("", "")
+    assert led_table(seen).model().rowCount() == 6
+    assert (why_not(seen), seen.page.unsaved()) == ("", "")
 
 
-def test_the_simulated_pens_file_asks_before_changes_are_lost(seen: Seen) -> None:
-    seen.type_cell(7, Y, "161")
+def test_the_simulated_pens_file_asks_before_changes_are_lost(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "161")
 
     seen.click("Use the simulated pen's file")
-    assert seen.cell(7, Y) == "161"
+    assert cell(seen, 7, Y) == "161"
     seen.click("Discard them")
 
-    assert seen.cell(7, Y) == "160"
+    assert cell(seen, 7, Y) == "160"
     assert seen.page.unsaved() == ""
 
 
-def test_leds_are_added_and_removed(seen: Seen) -> None:
+def test_leds_are_added_and_removed(seen: "Seen") -> None:
     remove = seen.named("Remove")
     assert not remove.isEnabled()
     assert remove.toolTip() == "Choose an LED in the table first."
 
     seen.click("Add")
     assert "LED 11, x: a cell is empty where a number is needed." in seen.words
-    assert seen.table.chosen() == 11
+    assert led_table(seen).chosen() == 11
 
     seen.click("Remove")
-    assert seen.table.model().rowCount() == 10
+    assert led_table(seen).model().rowCount() == 10
     assert seen.page.unsaved() == ""
 
 
-def test_a_pen_keeps_four_leds(seen: Seen) -> None:
-    seen.table.set_chosen(1)
+def test_a_pen_keeps_four_leds(seen: "Seen") -> None:
+    led_table(seen).set_chosen(1)
     for _ in range(6):
         seen.click("Remove")
 
     remove = seen.named("Remove")
-    assert seen.table.model().rowCount() == 4
+    assert led_table(seen).model().rowCount() == 4
     assert (remove.isEnabled(), remove.toolTip()) == (
         *(False, "A pen needs at least 4 LEDs."),
     )
 
 
 def test_diameter_and_tip_are_edited_with_the_table(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     seen.enter("Diameter of the LED discs, mm", "8")
     seen.enter("Nominal centre of the tip, y, mm", "-95,5")
-    seen.save_as(tmp_path / "leds.json")
+    save_as(seen, tmp_path / "leds.json")
 
     pen = in_use(workbench).pen
     assert pen.diameter == 8
@@ -647,7 +616,7 @@ def test_diameter_and_tip_are_edited_with_the_table(
     assert pen.nominal_tip.tolist() == [0.0, -95.5, -25.0]
 
 
-def test_a_diameter_or_tip_that_cannot_be_is_told(seen: Seen) -> None:
+def test_a_diameter_or_tip_that_cannot_be_is_told(seen: "Seen") -> None:
     seen.enter("Diameter of the LED discs, mm", "x")
     assert 'Diameter of the discs: "x" is not a number.' in seen.words
 
@@ -657,7 +626,7 @@ def test_a_diameter_or_tip_that_cannot_be_is_told(seen: Seen) -> None:
 
 
 def test_the_nominal_tip_of_the_first_step_is_told_where_it_rules(
-    seen: Seen, workbench: Workbench
+    seen: "Seen", workbench: Workbench
 ) -> None:
     tip = np.array([1.0, -80.0, -20.0])
     workbench.set_preparation(replace(workbench.preparation, nominal_tip=tip))
@@ -669,32 +638,32 @@ def test_the_nominal_tip_of_the_first_step_is_told_where_it_rules(
     assert shown.tolist() == tip.tolist()
 
 
-def test_row_and_disc_are_chosen_together(seen: Seen) -> None:
+def test_row_and_disc_are_chosen_together(seen: "Seen") -> None:
     view = seen.child(PenView)
-    seen.table.set_chosen(4)
+    led_table(seen).set_chosen(4)
     assert view.chosen() == 4
 
     place = view.place_of(7).toPoint()
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=place)
-    assert (seen.table.chosen(), view.chosen()) == (7, 7)
+    assert (led_table(seen).chosen(), view.chosen()) == (7, 7)
 
 
 # The live match
 
 
-def test_a_pen_that_fits_is_said_to(live: Seen) -> None:
+def test_a_pen_that_fits_is_said_to(live: "Seen") -> None:
     live.wait("10 of 10 LEDs")
     live.wait("Every LED is within 0.1 mm of its place in the table, in")
 
     assert "misfit 0.0" in live.words
     assert live.child(StateBanner).value().tone is Tone.GOOD
-    live.qtbot.waitUntil(lambda: live.cell(7, MISFIT).startswith("0.0"))
+    live.qtbot.waitUntil(lambda: cell(live, 7, MISFIT).startswith("0.0"))
     labels = {marker.label for marker in live.markers}
     assert labels <= {str(led) for led in range(1, 11)} | {""}
 
 
 def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_compared(
-    live: Seen, monkeypatch: pytest.MonkeyPatch
+    live: "Seen", monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caught: list[BaseException] = []
     monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
@@ -703,37 +672,37 @@ def test_a_bug_in_the_comparison_leaves_no_old_finding_and_the_next_views_are_co
         broken.setattr(
             "lightpen_app.steps.leds.match_watch.match_pen", lambda *_: 1 / 0
         )
-        live.qtbot.waitUntil(lambda: bool(caught), timeout=8000)
-        live.qtbot.waitUntil(lambda: not live.cell(7, MISFIT), timeout=8000)
+        live.qtbot.waitUntil(lambda: bool(caught))
+        live.qtbot.waitUntil(lambda: not cell(live, 7, MISFIT))
         assert "Every LED sits" not in live.words
 
     live.wait("Every LED is within 0.1 mm of its place in the table, in")
-    live.qtbot.waitUntil(lambda: live.cell(7, MISFIT).startswith("0.0"))
+    live.qtbot.waitUntil(lambda: cell(live, 7, MISFIT).startswith("0.0"))
     assert all(isinstance(error, ZeroDivisionError) for error in caught)
 
 
-def test_a_displaced_led_is_named_and_marked_everywhere(live: Seen) -> None:
+def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     live.wait("10 of 10 LEDs")
 
-    live.type_cell(7, Y, "160.5")
+    type_cell(live, 7, Y, "160.5")
 
     live.wait("LED 7 sits 0.50 mm off its place: x 0.00, y -0.50, z 0.00 mm.")
-    assert "LED 7 sits" in live.told_of(7)
-    assert float(live.cell(7, MISFIT)) > 0.5
+    assert "LED 7 sits" in told_of(live, 7)
+    assert float(cell(live, 7, MISFIT)) > 0.5
     assert live.child(PenView).value().marked == {7}
     assert live.child(StateBanner).value().tone is Tone.WARN
 
-    live.type_cell(7, Y, "160")
+    type_cell(live, 7, Y, "160")
 
     live.wait("Every LED is within 0.1 mm of its place in the table, in")
-    assert live.told_of(7) == ""
+    assert told_of(live, 7) == ""
 
 
 def test_the_match_follows_the_table_before_it_is_saved(
-    live: Seen, workbench: Workbench
+    live: "Seen", workbench: Workbench
 ) -> None:
     live.wait("10 of 10 LEDs")
-    live.table.set_chosen(10)
+    led_table(live).set_chosen(10)
     live.click("Remove")
 
     live.wait("9 of 9 LEDs")
@@ -742,9 +711,9 @@ def test_the_match_follows_the_table_before_it_is_saved(
 
 
 def test_another_page_sees_the_pen_in_use_again(
-    live: Seen, workbench: Workbench, qtbot: QtBot
+    live: "Seen", workbench: Workbench, qtbot: QtBot
 ) -> None:
-    live.table.set_chosen(10)
+    led_table(live).set_chosen(10)
     live.click("Remove")
     live.wait("9 of 9 LEDs")
 
@@ -758,15 +727,15 @@ def test_another_page_sees_the_pen_in_use_again(
         pass
 
 
-def test_raw_coordinates_are_matched_too(live: Seen, tmp_path: Path) -> None:
-    live.open(write_table(tmp_path / "raw.csv", raw()))
+def test_raw_coordinates_are_matched_too(live: "Seen", tmp_path: Path) -> None:
+    open_file(live, write_table(tmp_path / "raw.csv", raw()))
 
     live.wait("10 of 10 LEDs")
     live.wait("The LEDs fit the images, but not the pen frame")
 
 
 def test_a_covered_led_is_told(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
     camera.operator.cover(leds=[6])
@@ -776,16 +745,16 @@ def test_a_covered_led_is_told(
     assert "9 of 10 LEDs" in seen.words
 
 
-def test_another_pens_file_is_told(live: Seen, tmp_path: Path) -> None:
+def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:
     leds = np.random.default_rng(3).uniform(-60, 60, (10, 3))
-    live.open(write_table(tmp_path / "other.csv", leds))
+    open_file(live, write_table(tmp_path / "other.csv", leds))
 
     live.wait("Pen not found")
     live.wait("these do not fit the pen file")
 
 
 def test_a_pen_that_is_away_is_not_found(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = SimulatedCamera(small_scene, workbench.around.clock)
     workbench.live.open(camera, CameraSettings(), workbench.around.clock)
@@ -795,7 +764,7 @@ def test_a_pen_that_is_away_is_not_found(
     assert "No LED seen" in seen.words
 
 
-def test_too_few_views_do_not_say_that_a_pen_fits(seen: Seen) -> None:
+def test_too_few_views_do_not_say_that_a_pen_fits(seen: "Seen") -> None:
     seen.page.entered()
     panel = seen.child(MatchPanel)
     panel.set_why_unknown("")
@@ -833,7 +802,7 @@ def test_too_few_views_do_not_say_that_a_pen_fits(seen: Seen) -> None:
     ids=lambda value: value.what if isinstance(value, Finding) else "",
 )
 def test_each_finding_has_its_sentence(
-    seen: Seen, finding: Finding, sentence: str
+    seen: "Seen", finding: Finding, sentence: str
 ) -> None:
     panel = seen.child(MatchPanel)
     rms = np.full(10, 0.05)
@@ -845,7 +814,7 @@ def test_each_finding_has_its_sentence(
 
 
 def test_what_is_missing_for_a_match_is_told(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     seen.page.entered()
     assert "The camera is not open. See the step Camera." in seen.words
@@ -857,7 +826,7 @@ def test_what_is_missing_for_a_match_is_told(
 
 
 def test_a_camera_that_is_lost_leaves_no_old_image(
-    seen: Seen, workbench: Workbench, small_scene: Scene
+    seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = plugged(workbench, small_scene)
     seen.page.entered()
@@ -873,7 +842,7 @@ def test_a_camera_that_is_lost_leaves_no_old_image(
 
 
 def test_nothing_is_compared_while_another_page_is_shown(
-    seen: Seen, workbench: Workbench, small_scene: Scene, qtbot: QtBot
+    seen: "Seen", workbench: Workbench, small_scene: Scene, qtbot: QtBot
 ) -> None:
     plugged(workbench, small_scene)
     for _ in range(3):
@@ -909,7 +878,7 @@ def test_it_can_be_used_by_keys_alone(
     }
 
 
-def test_every_control_has_a_name(seen: Seen) -> None:
+def test_every_control_has_a_name(seen: "Seen") -> None:
     controls = (QPushButton, QLineEdit, QComboBox, LedTable, PenView, ImageView)
     nameless = [
         each
@@ -923,23 +892,23 @@ def test_every_control_has_a_name(seen: Seen) -> None:
     assert nameless == []
 
 
-def test_another_language_keeps_what_is_typed(seen: Seen) -> None:
-    seen.type_cell(7, Y, "161")
+def test_another_language_keeps_what_is_typed(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "161")
 
     for widget in (seen.page, *seen.page.findChildren(QWidget)):
         QCoreApplication.sendEvent(widget, QEvent(QEvent.Type.LanguageChange))
 
-    assert seen.cell(7, Y) == "161"
+    assert cell(seen, 7, Y) == "161"
     assert seen.page.unsaved()
 
 
 def test_a_pen_keeps_every_digit_while_nothing_is_changed(
-    seen: Seen, workbench: Workbench, tmp_path: Path
+    seen: "Seen", workbench: Workbench, tmp_path: Path
 ) -> None:
     pen: Pen = replace(paper_pen(), leds=LEDS + 1e-9)
     write_pen(pen, path := tmp_path / "exact.json")
-    seen.open(path)
+    open_file(seen, path)
 
-    seen.save_as(tmp_path / "copy.json")
+    save_as(seen, tmp_path / "copy.json")
 
     np.testing.assert_array_equal(in_use(workbench).pen.leds, pen.leds)

@@ -115,9 +115,7 @@ class Bed:
         (folder / "header.json").write_text(json.dumps(header), "utf-8")
         workbench.run.runner.go_on(read_resumable(folder))
         workbench.run.runner.finish()
-        self.qtbot.waitUntil(
-            lambda: workbench.run.status.verdict is not None, timeout=PATIENCE_MS
-        )
+        self.qtbot.waitUntil(lambda: workbench.run.status.verdict is not None)
         return workbench
 
     def show(self) -> ReviewPage:
@@ -218,7 +216,7 @@ def tip(workbench: Workbench) -> FloatArray:
 
 
 def await_solution(qtbot: QtBot, workbench: Workbench) -> None:
-    qtbot.waitUntil(lambda: not workbench.run.status.is_solving, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
 
 
 def in_force(workbench: Workbench) -> Result | None:
@@ -505,7 +503,7 @@ def test_the_chosen_image_is_shown_with_its_leds_and_residuals(
     assert workbench.run.status.solution is not None
     points = workbench.run.status.solution.observations.seen_pixels[2]
     seen = points[np.isfinite(points[:, 0])].tolist()
-    qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: centres(page) == seen)
     shown = the(page, ResidualView)
     assert (
         shown.image_size().width() == workbench.run.status.solution.source.camera.width
@@ -526,14 +524,14 @@ def test_of_images_passed_over_quickly_the_last_is_shown(
     assert workbench.run.status.solution is not None
     points = workbench.run.status.solution.observations.seen_pixels[number - 1]
     seen = points[np.isfinite(points[:, 0])].tolist()
-    qtbot.waitUntil(lambda: centres(page) == seen, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: centres(page) == seen)
 
 
 def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
     page: ReviewPage, workbench: Workbench, qtbot: QtBot
 ) -> None:
     panel, view = the(page, ImagesPanel), the(page, ResidualView)
-    qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: bool(view.markers()))
     solution, number = workbench.run.status.solution, table(page).number()
     assert solution is not None
     other = replace(solution, source=replace(solution.source))
@@ -543,7 +541,7 @@ def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
     assert view.image_size().isEmpty()
     panel.set_value(replace(other, source=replace(other.source)))  # while it is read
 
-    qtbot.waitUntil(lambda: not view.image_size().isEmpty(), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: not view.image_size().isEmpty())
     assert panel.number() == number
     assert view.markers()
 
@@ -556,7 +554,6 @@ def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
     assert table(page).number() == DAMAGED
     bed.qtbot.waitUntil(
         lambda: "wrong checksum" in the(page, ResidualView).accessibleDescription(),
-        timeout=PATIENCE_MS,
     )
     assert the(page, ResidualView).image_size().isEmpty()
 
@@ -575,7 +572,6 @@ def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
         view, numbers = the(page, ResidualView), table(page)
         bed.qtbot.waitUntil(
             lambda: "The image cannot be shown." in view.accessibleDescription(),
-            timeout=PATIENCE_MS,
         )
     assert isinstance(caught[0], ZeroDivisionError)
     assert view.image_size().isEmpty()
@@ -583,8 +579,8 @@ def test_a_bug_while_an_image_is_read_is_told_and_other_images_are_shown(
 
     for key in (Qt.Key.Key_Down, Qt.Key.Key_Up):
         QTest.keyClick(numbers, key)
-        bed.qtbot.waitUntil(lambda: bool(view.markers()), timeout=PATIENCE_MS)
-    bed.qtbot.waitUntil(lambda: not view.image_size().isEmpty(), timeout=PATIENCE_MS)
+        bed.qtbot.waitUntil(lambda: bool(view.markers()))
+    bed.qtbot.waitUntil(lambda: not view.image_size().isEmpty())
     assert numbers.number() == first
     assert "cannot be shown" not in view.accessibleDescription()
 
@@ -674,7 +670,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
     before = tip(workbench).copy()
     table(page).selectAll()
 
-    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+    with qtbot.waitSignal(workbench.troubled) as told:
         click(page, "Take out")
 
     assert "at least 6" in told.args[0]
@@ -854,7 +850,7 @@ def test_more_images_are_captured_into_the_same_swing(
     monkeypatch.setattr("lightpen.swing.course.read_for_more", read)
     workbench.open_camera()
     assert page.main_action().why_not == ""
-    with qtbot.waitSignal(page.step_requested, timeout=PATIENCE_MS) as asked:
+    with qtbot.waitSignal(page.step_requested) as asked:
         click(page, "Capture more")
         qtbot.waitUntil(lambda: page.main_action().why_not == "The swing goes on.")
         may_read.set()
@@ -873,7 +869,7 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 ) -> None:
     (workbench.run.records_folder / "swing" / "journal.jsonl").write_text("{}\n{}\n")
 
-    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+    with qtbot.waitSignal(workbench.troubled) as told:
         click(page, "Capture more")
 
     assert "is damaged" in told.args[0]
