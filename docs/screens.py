@@ -185,8 +185,8 @@ class Stage:
     def _fill_swing(self) -> None:
         swing = _swing(self._workbench.preparation.swing_setup(), self._scene)
         run = self._workbench.run
-        self._show_image(0)
-        self._wait_until(lambda: run.status.state is not None)  # of its own beginning
+        run.runner.begin(self._workbench.preparation)
+        self._wait_until(lambda: run.status.state is not None)
         run.on_swing(replace(run.status, state=swing), ())
         for index in range(N_SHOWN):
             self._show_image(index)

@@ -305,6 +305,7 @@ def test_all_of_it_is_remembered_for_the_station(
         "Hall 2", "Bea", "LP-07", "T-3", "C-9", 3.0005
     )
     assert again.preparation.limits == SwingLimits(0.0075, 80, 250)
+    again.shut_down()
 
 
 @pytest.mark.parametrize("name", [ODD, "a" * 200, "General", "../..", "王"])
