@@ -224,7 +224,7 @@ def leds_misfit(sigma: float, usual: float) -> Sentence:
     )
 
 
-def no_tip(why: Sentence | str) -> Sentence:
+def no_tip(why: Sentence) -> Sentence:
     """Tell why there is no tip."""
     return sentence(Code.NO_TIP, "{why}", why=why)
 

@@ -1559,6 +1559,10 @@
         <translation>摆动继续进行。</translation>
     </message>
     <message>
+        <source>The result is being stored.</source>
+        <translation>正在保存结果。</translation>
+    </message>
+    <message>
         <source>Not good enough: capture more images, or repeat the swing.</source>
         <translation>结果不够好：请继续采集图像，或重做摆动。</translation>
     </message>
@@ -2007,13 +2011,6 @@
     <message>
         <source>U (k = 2) of the tip / µm</source>
         <translation>测头的 U (k = 2) / µm</translation>
-    </message>
-</context>
-<context>
-    <name>SwingRun</name>
-    <message>
-        <source>Without these images there is no tip, so they stay in. {0}</source>
-        <translation>剔除这些图像后求不出测头，因此它们仍参与计算。{0}</translation>
     </message>
 </context>
 <context>
@@ -2582,6 +2579,10 @@
         <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
     </message>
     <message>
+        <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
+        <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
+    </message>
+    <message>
         <source>The file has {n_leds} LEDs.</source>
         <translation>文件有 {n_leds} 个 LED。</translation>
     </message>
@@ -2668,6 +2669,10 @@
     <message>
         <source>The program made a mistake of its own and looks at no more images. Open the camera again.</source>
         <translation>程序自身出错，不再查看图像。请重新打开相机。</translation>
+    </message>
+    <message>
+        <source>The program made a mistake of its own. The images kept so far are safe; go on, or start the program again.</source>
+        <translation>程序自身出错。已保留的图像是安全的；请继续，或重新启动程序。</translation>
     </message>
     <message>
         <source>The record {name} holds no images. Resume the swing, or begin a new one.</source>
@@ -2820,6 +2825,10 @@
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm.</source>
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>Without these images there is no tip, so they stay in. {why}</source>
+        <translation>剔除这些图像后求不出测头，因此它们仍参与计算。{why}</translation>
     </message>
     <message>
         <source>a cell is empty where a number is needed.</source>
