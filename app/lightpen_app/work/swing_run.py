@@ -53,7 +53,7 @@ class SwingRun(QObject):
     _told = Signal()
     _progress_told = Signal(float)
     _trouble_told = Signal(object)
-    _relief_told = Signal(object)
+    _relief_told = Signal()
 
     def __init__(
         self,
@@ -69,6 +69,7 @@ class SwingRun(QObject):
         self._newest: SwingStatus | None = None  # what the GUI has not seen yet
         self._events: tuple[SwingEvent, ...] = ()
         self.follower: Follower | None = None
+        self._trouble = ""
 
         # Connections
         queued = Qt.ConnectionType.QueuedConnection
@@ -116,8 +117,8 @@ class SwingRun(QObject):
         self._trouble_told.emit(sentence)
 
     def on_relief(self, sentence: Sentence) -> None:
-        """Hand on whose cause is gone."""
-        self._relief_told.emit(sentence)
+        """Hand on that the cause of the last trouble is gone."""
+        self._relief_told.emit()
 
     # On the thread of the GUI
 
@@ -133,7 +134,8 @@ class SwingRun(QObject):
         self.changed.emit()
 
     def _on_trouble_told(self, sentence: Sentence) -> None:
-        self.troubled.emit(worded(sentence))
+        self._trouble = worded(sentence)
+        self.troubled.emit(self._trouble)
 
-    def _on_relief_told(self, sentence: Sentence) -> None:
-        self.relieved.emit(worded(sentence))
+    def _on_relief_told(self) -> None:
+        self.relieved.emit(self._trouble)  # as it was told, in whatever language
