@@ -68,7 +68,7 @@ N_IMAGES = 20
 DAMAGED = 7
 SLIPPED = 9
 THEN = datetime.now().astimezone() - timedelta(days=99)
-PATIENCE_MS = 10_000
+PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
 @pytest.fixture(scope="session")
@@ -215,8 +215,9 @@ def tip(workbench: Workbench) -> FloatArray:
     return workbench.run.status.solution.calibration.joint.tip_pen
 
 
-def await_solution(qtbot: QtBot, workbench: Workbench) -> None:
-    qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
+def await_count(qtbot: QtBot, page: ReviewPage, words: str) -> None:
+    """Wait until the tip is solved from other images than before."""
+    qtbot.waitUntil(lambda: count(page) == words and not page.main_action().why_not)
 
 
 def in_force(workbench: Workbench) -> Result | None:
@@ -602,11 +603,12 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
     assert not button(page, "Put back").isEnabled()
     assert button(page, "Put back").toolTip() == "It takes part already."
 
+    hindrances: list[str] = []
+    page.changed.connect(lambda: hindrances.append(page.main_action().why_not))
     click(page, "Take out")
-    assert page.main_action().why_not == "The tip is being computed."
-    await_solution(qtbot, workbench)
+    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
 
-    assert count(page) == f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out"
+    assert "The tip is being computed." in hindrances
     assert table(page).number() == number
     assert not np.array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {
@@ -616,9 +618,8 @@ def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
     assert page.main_action().why_not == ""
 
     click(page, "Put back")
-    await_solution(qtbot, workbench)
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
 
-    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
     np.testing.assert_array_equal(tip(workbench), before)
 
 
@@ -631,25 +632,23 @@ def test_keys_take_several_images_out_and_put_them_back(
         QTest.keyClick(table(page), Qt.Key.Key_Down, shift)
 
     QTest.keyClick(table(page), Qt.Key.Key_Delete)
-    await_solution(qtbot, workbench)
-    assert count(page) == f"{N_IMAGES - 3} of {N_IMAGES} used; 3 taken out"
+    await_count(qtbot, page, f"{N_IMAGES - 3} of {N_IMAGES} used; 3 taken out")
     assert len(table(page).selected()) == 3
 
     QTest.keyClick(table(page), Qt.Key.Key_Insert)
-    await_solution(qtbot, workbench)
-    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
 
 
 def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
     slip(bed.swing)
-    workbench = bed.solve()
+    bed.solve()
     page = bed.show()
     table(page).choose(SLIPPED)
 
+    assert "1 tip slipped" in count(page)
     click(page, "Put back")
-    await_solution(bed.qtbot, workbench)
 
-    assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
+    await_count(bed.qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
 
 
 def test_an_image_that_the_program_left_out_cannot_be_put_back(bed: Bed) -> None:
@@ -690,8 +689,8 @@ def test_a_computation_shows_its_progress_and_can_be_cancelled(
     workbench.run.runner.solve()
     bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
     click(page, "Cancel")
+    bed.qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
 
-    assert not workbench.run.status.is_solving
     assert not button(page, "Cancel").isVisible()
     assert workbench.run.status.solution is before
     assert page.main_action().why_not == ""
@@ -767,7 +766,7 @@ def test_the_two_stage_method_stands_beside_the_joint_fit(
 def accept(page: ReviewPage, qtbot: QtBot) -> None:
     """Press the main button, and wait until the tip is in force."""
     page.run_main_action()
-    qtbot.waitUntil(page.is_complete, timeout=PATIENCE_MS)
+    qtbot.waitUntil(page.is_complete)
 
 
 def test_an_accepted_tip_is_in_force_and_said_to_be(
@@ -818,7 +817,7 @@ def test_after_acceptance_the_next_calibration_starts(
         page.run_main_action()
 
     assert asked.args == ["start"]
-    assert page.why_closed() == "Swing the pen first."
+    qtbot.waitUntil(lambda: page.why_closed() == "Swing the pen first.")
 
 
 def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
@@ -826,7 +825,7 @@ def test_a_result_that_cannot_be_stored_is_told_and_the_old_one_stays(
 ) -> None:
     workbench.run.archive.folder.write_text("a file where a folder should be")
 
-    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+    with qtbot.waitSignal(workbench.troubled) as told:
         page.run_main_action()
 
     assert "cannot be" in told.args[0]
@@ -897,7 +896,7 @@ def test_a_repetition_sets_the_swing_aside_and_keeps_its_images(
 ) -> None:
     click(page, "Repeat")
 
-    with qtbot.waitSignal(page.step_requested, timeout=PATIENCE_MS) as asked:
+    with qtbot.waitSignal(page.step_requested) as asked:
         answer(page, "Repeat")
 
     assert asked.args == ["swing"]
@@ -913,7 +912,7 @@ def test_a_swing_that_cannot_be_set_aside_is_told(
     shutil.rmtree(workbench.run.records_folder / "swing")
     click(page, "Repeat")
 
-    with qtbot.waitSignal(workbench.troubled, timeout=PATIENCE_MS) as told:
+    with qtbot.waitSignal(workbench.troubled) as told:
         answer(page, "Repeat")
 
     assert "does not exist" in told.args[0]
