@@ -199,7 +199,7 @@ class Stage:
     def solve(self) -> None:
         """Record a swing and solve it, so that the review opens."""
         run = self._workbench.run
-        folder = run.records_folder / "20260930-100000_LP-04_T-10-80"
+        folder = run.records_folder / "20260930-095900_LP-04_T-10-80"
         _record(folder, self._workbench.preparation)
         run.runner.go_on(read_resumable(folder))
         run.runner.finish()
