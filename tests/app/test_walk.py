@@ -120,6 +120,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert walker.n_inputs == n_inputs
 
     assert walker.says("PASS: Good")
+    walker.until(walker.main_button().isEnabled)
     shown = _read_out(walker)
     # Four standard deviations: U is two.
     assert (
@@ -169,6 +170,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     walker.press(Key.Key_PageDown)
 
     assert walker.says("PASS: Good")
+    walker.until(walker.main_button().isEnabled)
     _check_round(walker)
     walker.tab_to("Accept")
     walker.press(Key.Key_Return)
@@ -212,6 +214,7 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until(walker.main_button().isEnabled)
     assert walker.n_inputs == n_inputs
     walker.click("Review")
+    walker.until(walker.main_button().isEnabled)
 
     tip = _read_out(walker).tip
     true_tip = np.array(truth(folder)["pen"][BEST_FIT])

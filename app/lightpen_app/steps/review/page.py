@@ -290,6 +290,7 @@ class ReviewPage(Rearranged, Page):
         else:
             self._patience.stop()
             self._solving.hide()
+        self._take_solution()  # seen or not, so that all is known when it is
         if self.isVisible():
             self._refresh()
         self.changed.emit()
@@ -303,13 +304,16 @@ class ReviewPage(Rearranged, Page):
 
     def _refresh(self) -> None:
         """Show what there is now."""
+        self._take_solution()
+        self._fill_tab()
+        self._refresh_words()
+
+    def _take_solution(self) -> None:
         solution = self._run.status.solution
         if solution is not self._solution:
             self._solution = solution
             self._question.hide()
             self._look_up_last(solution)
-        self._fill_tab()
-        self._refresh_words()
 
     def _fill_tab(self) -> None:
         """Show the solution in the tab that is seen; the others wait until they are."""
