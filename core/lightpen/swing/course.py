@@ -230,7 +230,6 @@ class SwingCourse:
         self._close_record()
         self._writer = writer
         self._limits = limits  # asking for more does not raise them
-        self._wanted = {}
         self._n_since_kept = 0
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()

@@ -297,6 +297,14 @@ def test_a_recording_ends_the_swing_after_a_whole_pass_without_a_new_image(
     assert station.state.phase is not Phase.CAPTURING
     assert station.witness.happenings[-1] is Happening.CAPTURED
 
+    station.runner.abandon()
+    station.wait_until(lambda: station.status.state is None)
+    station.go_on(interrupted)  # whose pass begins anew
+    station.see_until(lambda: station.state.phase is Phase.CAPTURING)
+    setup = station.status.setup
+    station.runner.take(frame, sighting, setup, n_images=5)
+    assert station.status.is_capturing
+
 
 def test_a_disk_that_is_gone_pauses_the_swing_and_costs_one_image(
     station: "Station", interrupted: Path

@@ -1,16 +1,25 @@
 """From the end of the capture to the tip in force."""
 
 import shutil
+import threading
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade
 from lightpen.messages import Code
-from lightpen.record.reading import DISCARDED, JOURNAL, open_record, recorded_limits
-from lightpen.record.solving import record_inputs
+from lightpen.record.reading import (
+    DISCARDED,
+    JOURNAL,
+    Record,
+    open_record,
+    recorded_limits,
+)
+from lightpen.record.solving import Solution, record_inputs, solve_record
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import stillness
 from lightpen.swing.runner import SwingRunner
@@ -145,6 +154,44 @@ def test_solving_can_be_cancelled_and_done_again(
     station.runner.solve()
     station.wait_for_phase(Phase.VERDICT)
     assert station.status.solution is not None
+
+
+def test_a_swing_is_solved_from_the_moment_that_it_ends(solved: "Station") -> None:
+    ended = [
+        status
+        for status in solved.witness.statuses
+        if status.state is not None and status.state.phase is Phase.SOLVING
+    ]
+
+    assert ended
+    assert all(status.is_solving for status in ended)
+
+
+def test_nothing_comes_of_a_solution_after_its_swing_was_abandoned(
+    station: "Station", interrupted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    may_go_on, is_solved = threading.Event(), threading.Event()
+
+    def solve_late(record: Record, report: Callable[[float], None]) -> Solution:
+        may_go_on.wait(TIMEOUT)
+        solution = solve_record(record)
+        is_solved.set()
+        return solution
+
+    monkeypatch.setattr("lightpen.swing.course.solve_record", solve_late)
+    station.go_on(interrupted)
+    station.runner.finish()
+    station.runner.abandon()
+    station.see()
+    may_go_on.set()
+    assert is_solved.wait(TIMEOUT)
+    for thread in threading.enumerate():
+        if thread.name == "swing task":
+            thread.join(TIMEOUT)
+    station.see()
+
+    assert station.status.solution is None
+    assert station.witness.troubles == []
 
 
 def test_a_cancelled_wish_leaves_solution_and_record_as_they_were(
