@@ -111,6 +111,7 @@ class Stage:
         self._application = application
         application.setCursorFlashTime(0)  # a cursor that blinks is not the same twice
         self._scene = Scene(n_images=N_SHOWN)
+        self._looked_at: dict[int, Shown] = {}
         self._image_plans = plan_scene(self._scene).image_plans
         settings = Settings(DATA / "lightpen.ini")
         settings.set_preferences(Preferences())
@@ -206,6 +207,12 @@ class Stage:
         self._wait_until(lambda: run.status.solution is not None)
 
     def _show_image(self, index: int) -> None:
+        if index not in self._looked_at:
+            self._looked_at[index] = self._looked(index)
+        self._workbench.live.image_shown.emit(self._looked_at[index])
+        self._settle()
+
+    def _looked(self, index: int) -> Shown:
         image = sealed(render_plan(self._scene, self._image_plans[index]))
         frame = Frame(image, seq=index, host_ts_ns=round(index * PERIOD * 1e9))
         now = self._workbench.preparation
@@ -215,10 +222,7 @@ class Stage:
         assert sighting.spots is not None
         height, width = image.shape
         seen = LiveImage(frame, sighting.spots, sighting)
-        self._workbench.live.image_shown.emit(
-            Shown(pooled(image), QSize(width, height), seen)
-        )
-        self._settle()
+        return Shown(pooled(image), QSize(width, height), seen)
 
     def _wait_until(self, condition: Callable[[], bool]) -> None:
         while not condition():

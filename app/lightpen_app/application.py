@@ -36,6 +36,10 @@ from lightpen_app.work.settings import Preferences, Settings, data_folder, setti
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
 
+# s after which a thread that computes lets the window go on. A change of theme calls
+# thousands of methods, and by Python's 5 ms each would wait for the live images.
+SWITCH_INTERVAL = 0.0005
+
 MakePages: TypeAlias = Callable[[Workbench, Sounds], Sequence[Page]]
 
 
@@ -105,6 +109,7 @@ class Wizard(QObject):
 
 def make_application(arguments: Sequence[str]) -> QApplication:
     """Return the QApplication of the program."""
+    sys.setswitchinterval(SWITCH_INTERVAL)
     QApplication.setStyle("Fusion")
     application = QApplication(list(arguments))
     application.setApplicationName("lightpen")

@@ -1,6 +1,7 @@
 """Fixtures of the application's tests: its own look, whatever the machine has."""
 
 import os
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,7 +41,7 @@ from lightpen.record.names import Names
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen_app.application import Wizard
+from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts, style_sheet
 from lightpen_app.wizard_pages import make_pages
@@ -77,6 +78,7 @@ def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
 
 @pytest.fixture(scope="session")
 def dressed(qapp: QApplication) -> QApplication:
+    sys.setswitchinterval(SWITCH_INTERVAL)
     QApplication.setStyle("Fusion")
     load_fonts()
     return qapp
