@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 import time
+from array import array
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,7 +51,7 @@ class Soak(QObject):
         self._seconds = seconds
         self._start = 0.0
         self._last_tick = 0.0
-        self._lateness: list[float] = []
+        self._lateness = array("f")
         self._memory: list[tuple[float, float]] = []
         self._n_paints: dict[int, int] = {}
         self._n_swings = 0

@@ -92,8 +92,9 @@ def swing(folder):
     workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted
     if offered:
-        run.runner.go_on(read_resumable(offered[0].folder))
-        tell("resumed", offered[0].folder.name, run.status.state.n_kept)
+        resumed = read_resumable(offered[0].folder)
+        tell("resumed", resumed.record.folder.name, resumed.state.n_kept)
+        run.runner.go_on(resumed)
     else:
         run.runner.begin(workbench.preparation)
     application.exec()
