@@ -169,7 +169,7 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
             demo.ended.connect(wizard.window.close)
         QTimer.singleShot(0, demo.start)
         status = _shown(application, wizard, signals)
-        if not is_seen and wizard.workbench.run.status.result is None:
+        if not is_seen and not demo.is_accepted:
             status = status or 1
     return _ended(wizard, status)
 

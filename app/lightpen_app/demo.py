@@ -51,6 +51,7 @@ class Demo(QObject):
         self._pause_ticks = round(1000 * pause_s / TICK_MS)
         self._key = ""
         self._n_ticks = 0
+        self._is_accepted = False
 
         # Widgets
         self._timer = QTimer(self)
@@ -59,6 +60,11 @@ class Demo(QObject):
         # Connections
         self._timer.timeout.connect(self._on_tick)
         self.told.connect(self._show)
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether it has led to a tip in force."""
+        return self._is_accepted
 
     def start(self) -> None:
         """Begin on the page that is shown."""
@@ -76,6 +82,7 @@ class Demo(QObject):
             return
         status = self._workbench.run.status
         if status.result is not None:
+            self._is_accepted = True
             self._end(self._farewell() if self._is_watched else "")
         elif self._has_failed() or self._n_ticks * TICK_MS > 1000 * LONGEST_S:
             self._end(self.tr("The demo ends here: there is no tip to accept."))

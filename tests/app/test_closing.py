@@ -92,6 +92,11 @@ def swing(workbench):
     folder = workbench.run.records_folder / "interrupted"
     shutil.copytree(sys.argv[1], folder)
     workbench.run.runner.go_on(read_resumable(folder))
+    await_swing(workbench, folder)
+
+def await_swing(workbench, folder):
+    if not workbench.run.status.is_capturing:
+        return QTimer.singleShot(20, lambda: await_swing(workbench, folder))
     tell_it = lambda: tell(folder, sys.argv[2])
     QTimer.singleShot(100, tell_it)
     if sys.argv[2]:

@@ -10,6 +10,7 @@ import pytest
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -34,6 +35,7 @@ class Stage:
         self.settings, self.folder, self.workbench = settings, folder, workbench
         self.qtbot = qtbot
         self.sentences: list[str] = []
+        self.applied: list[CameraSettings] = []  # since it was started again
 
     def choose(self, **choices: object) -> None:
         """Choose something in place of what is chosen."""
@@ -47,6 +49,8 @@ class Stage:
         again = Settings(self.settings.file)
         self.workbench = Workbench(again, self.folder, self.workbench.around)
         self.workbench.troubled.connect(self.sentences.append)
+        self.applied.clear()
+        self.workbench.live.settings_applied.connect(self.applied.append)
         self.workbench.start()
         self.wait_for_files()
         return self.workbench.preparation
@@ -199,7 +203,9 @@ def test_files_that_are_gone_are_told_one_by_one(
 ) -> None:
     source = SourceChoice(SourceKind.RECORDED, str(recording))
     stage.choose(source=source)
-    shutil.rmtree(stage.folder / SAMPLES)
+    pen_file = stage.workbench.preparation.pen_file
+    assert pen_file is not None
+    shutil.rmtree(pen_file.path.parent)
     now = stage.start_again()
 
     assert (now.camera_file, now.pen_file) == (None, None)
@@ -366,11 +372,9 @@ def test_exposure_and_gain_come_back_with_their_station(stage: Stage) -> None:
     ):
         stage.choose_station("Hall 2")
     stage.start_again()
-    with stage.qtbot.waitSignal(
-        stage.workbench.live.settings_applied,
-        check_params_cb=lambda s: (s.exposure_us, s.gain_db) == (500.0, 6.0),
-    ):
-        pass
+    stage.qtbot.waitUntil(
+        lambda: any((s.exposure_us, s.gain_db) == (500.0, 6.0) for s in stage.applied)
+    )
 
 
 def set_camera(stage: Stage, exposure_us: float, gain_db: float) -> None:
