@@ -165,7 +165,7 @@ class SwingPage(Page):
 
     @override
     def unsaved(self) -> str:
-        state = self._run.status.state
+        state = self._runner.status.state  # also what the window was not told yet
         if state is None or state.phase is Phase.VERDICT or not state.n_kept:
             return ""
         return self.tr(
