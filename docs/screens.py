@@ -136,7 +136,7 @@ class Stage:
     def close(self) -> None:
         """Close the window without a question."""
         self._workbench.run.runner.abandon()
-        self.wizard.window.close()
+        self.wizard.window.close_unasked()
 
     def set_look(self, look: Look) -> None:
         """Change language, colours and size."""

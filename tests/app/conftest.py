@@ -99,12 +99,12 @@ def look(dressed: QApplication) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def frame_rate(monkeypatch: pytest.MonkeyPatch) -> float:
-    """Simulated cameras send half as many images as usual: looking at them takes long.
+    """Simulated cameras send fewer images than usual: looking at them takes long.
 
     In 1/s.
     """
-    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 10.0)
-    return 10.0
+    monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
+    return 7.0
 
 
 @pytest.fixture

@@ -615,7 +615,9 @@ def test_pressing_enter_again_and_again_accepts_once(
     walker.until(walker.main_button().isEnabled)
     walker.click("Review")
     button = walker.main_button()
+    walker.until(button.isEnabled)
     place = button.mapTo(walker.window, button.rect().center())
+    results = walker.workbench.run.archive.folder
 
     QTest.mouseDClick(
         walker.window.windowHandle(),
@@ -623,8 +625,10 @@ def test_pressing_enter_again_and_again_accepts_once(
         Qt.KeyboardModifier.NoModifier,
         place,
     )
+    walker.until(lambda: any(results.glob("*.json")))
+    walker.window.close()  # which waits for all that is under way
 
-    assert len(list(walker.workbench.run.archive.folder.glob("*.json"))) == 1
+    assert len(list(results.glob("*.json"))) == 1
 
 
 @pytest.mark.parametrize("step", ["Start", "Camera", "LEDs", "Swing"])
