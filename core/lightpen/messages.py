@@ -38,6 +38,8 @@ class Code(StrEnum):
     LEDS_OFF = "verdict.leds-off"
     LED_DISPLACED = "verdict.led-displaced"
     LEDS_MISFIT = "verdict.leds-misfit"
+    FILE_UNCERTAIN = "verdict.file-uncertain"
+    FILE_CONTRADICTED = "verdict.file-contradicted"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
 
@@ -166,6 +168,46 @@ def uncertain(uncertainty: float, limit: float) -> Sentence:
         uncertainty=uncertainty,
         limit=limit,
     )
+
+
+def file_uncertain(
+    uncertainty: float, limit: float, share: float, advice: Sentence, assumed: bool
+) -> Sentence:
+    """Tell that U (k = 2) of the tip is above its limit by what a file says, mm.
+
+    Parameters
+    ----------
+    share : float
+        U (k = 2) by that alone, mm.
+    advice : Sentence
+        What it is and what to do, to be put after "from".
+    assumed : bool
+        Whether the file leaves its uncertainty out.
+    """
+    if assumed:
+        return sentence(
+            Code.FILE_UNCERTAIN,
+            "U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. "
+            "{share:.4f} mm of it is assumed, for {advice}. More images hardly help.",
+            uncertainty=uncertainty,
+            limit=limit,
+            share=share,
+            advice=advice,
+        )
+    return sentence(
+        Code.FILE_UNCERTAIN,
+        "U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. "
+        "{share:.4f} mm of it comes from {advice}. More images hardly help.",
+        uncertainty=uncertainty,
+        limit=limit,
+        share=share,
+        advice=advice,
+    )
+
+
+def file_contradicted(why: Sentence) -> Sentence:
+    """Tell what the images say against a file."""
+    return sentence(Code.FILE_CONTRADICTED, "{why}", why=why)
 
 
 def halves_differ(difference: float, usual: float) -> Sentence:

@@ -8,6 +8,7 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication
 
 from lightpen.detection.reasons import Reason
+from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade
 from lightpen.messages import MOST_SIDES, SIDES, Code
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
@@ -72,6 +73,8 @@ _SHORTS: dict[Code, str] = {
     Code.LEDS_OFF: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
     Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED out of place"),
     Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
+    Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
+    Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),
 }
@@ -80,6 +83,16 @@ _AT_THE_SCREEN: dict[Code, str] = {
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Press Space to go on."),
     Code.MANY_DROPPED: QT_TRANSLATE_NOOP("phrases", "{0} Review has their reasons."),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "{0} Accept it at the screen."),
+}
+_SHARES: dict[ShareName, str] = {
+    ShareName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
+    ShareName.SEAT: QT_TRANSLATE_NOOP("phrases", "seat"),
+    ShareName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
+    ShareName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
+    ShareName.SCALE: QT_TRANSLATE_NOOP("phrases", "scale"),
+    ShareName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "discs"),
+    ShareName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
+    ShareName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
 }
 _LACKS: dict[Lack, str] = {
     Lack.STATION: QT_TRANSLATE_NOOP("phrases", "Enter the name of the station."),
@@ -212,6 +225,11 @@ def lack_text(lack: Lack) -> str:
 def reason_text(reason: Reason) -> str:
     """Return why an image does not take part, a few words; empty for one that does."""
     return worded(reason.words) if reason else ""
+
+
+def share_text(name: ShareName) -> str:
+    """Return a part of the uncertainty in the user's language."""
+    return _translated(_SHARES[name])
 
 
 def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:

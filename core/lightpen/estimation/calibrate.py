@@ -1,6 +1,6 @@
 """The calibration of a probe tip: from observations to the tip and what it is worth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,19 +12,26 @@ from lightpen.detection.observations import (
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
-from lightpen.estimation.geometry import GeometryFit, fit_geometry
-from lightpen.estimation.joint import JointFit, fit_joint
+from lightpen.estimation.bundle import Bundle, fit_bundle
+from lightpen.estimation.contradictions import Contradiction, find_contradictions
+from lightpen.estimation.correlation import Correlation, measure_correlation
+from lightpen.estimation.joint import JointFit, fit_joint, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
+from lightpen.estimation.linearised import State
 from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.priors import Priors, priors_of
 from lightpen.estimation.two_stage import (
     TwoStageFit,
     fit_two_stage,
     propagated_covariance,
 )
 from lightpen.estimation.uncertainty import Budget, Halves, combine, compare_halves
+from lightpen.estimation.unknowns import lean_forms
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
 from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
 from lightpen.sentences import Sentence, sentence
 
 MIN_IMAGES = 6  # the paper starts from six
@@ -34,6 +41,7 @@ USUAL_SIGMA = 0.1  # px
 # pose of a blurred image by some hundredths of a millimetre; more is a slip.
 MAX_SMEAR = 0.15  # mm
 SMEARED = 1.25  # times the usual width of the LEDs' rims
+RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 
@@ -56,8 +64,14 @@ class Calibration:
         Root mean square residual of each image, px: of a used one in the joint fit, of
         another about its own pose; NaN without a pose.
     leds_used : (N, L) array of bool
-    geometry : GeometryFit
-        The joint fit, with the LED geometry as far as the images tell it.
+    joint : JointFit
+        Tip, cone and rotations, with all else as the bundle adjustment has it.
+    bundle : Bundle
+        The bundle adjustment: everything that the files may have wrong.
+    priors : Priors
+        What it took from the files, as stated or assumed.
+    contradictions : tuple of Contradiction
+        What the images say against the files.
     two_stage : TwoStageFit
         The paper's method on the same images.
     two_stage_covariance : (6, 6) array
@@ -70,7 +84,10 @@ class Calibration:
     tips_cam: FloatArray
     rms: FloatArray
     leds_used: BoolArray
-    geometry: GeometryFit
+    joint: JointFit
+    bundle: Bundle
+    priors: Priors
+    contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit
     two_stage_covariance: FloatArray
     budget: Budget
@@ -79,17 +96,31 @@ class Calibration:
     coverage: Coverage
 
     @property
-    def joint(self) -> JointFit:
-        """The joint fit."""
-        return self.geometry.joint
+    def led_sigma(self) -> float:
+        """Standard deviation of the LED file's coordinates by the images, mm.
+
+        0 where they show no significant errors, or the file states its uncertainty.
+        """
+        found = self.bundle.components.leds
+        return found.sigma if found.is_significant else 0.0
 
 
-def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibration:
+def calibrate(
+    camera: Camera,
+    pen: Pen,
+    observations: Observations,
+    assumptions: Assumptions = USUAL,
+) -> Calibration:
     """Calibrate the tip of a pen from the LED centres of a swing.
 
     Poses of single images come first; images whose LEDs do not fit are left out, then
     those in which the tip was not where the others have it. The rest goes into the
-    joint fit, and into the paper's method beside it.
+    bundle adjustment, and into the paper's method beside it.
+
+    Parameters
+    ----------
+    assumptions : Assumptions
+        What stands in for the uncertainties that the files do not state.
 
     Raises
     ------
@@ -124,14 +155,22 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
     chosen, poses = posed[kept], all_poses.of(kept)
 
     pixels = observations.pixels[chosen]
-    geometry = fit_geometry(
-        camera,
-        pen,
-        pixels,
-        fit_joint(camera, pen, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam),
+    start = fit_joint(
+        camera, pen, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam
     )
-    joint = geometry.joint
-    _require_fit(joint.sigma)
+    _require_fit(start.sigma)
+    adjusted = _adjust(camera, pen, pixels, start, assumptions)
+    bundle, fitted = adjusted.bundle, adjusted.bundle.state
+    fitted_camera = fitted.rig.cameras[0]
+    joint = joint_at(
+        fitted_camera,
+        fitted.pen,
+        pixels,
+        fitted.rotations,
+        fitted.tip_pen,
+        fitted.cone_rig,
+        bundle.used[:, 0],
+    )
     reasons[chosen[~joint.used.any(axis=1)]] = Reason.MISFIT
     paper_poses = fit_paper_poses(
         camera, pen, pixels, poses.rotations, poses.translations
@@ -140,13 +179,19 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
 
     n_images, n_leds = observations.pixels.shape[:2]
     tips_cam = np.full((n_images, 3), np.nan)
-    tips_cam[posed] = all_poses.rotations @ joint.tip_pen + all_poses.translations
+    refined = fit_poses(
+        fitted_camera,
+        fitted.pen,
+        observations.pixels[posed],
+        all_poses.rotations,
+        all_poses.translations,
+    )
+    tips_cam[posed] = refined.rotations @ joint.tip_pen + refined.translations
     rms = np.full(n_images, np.nan)
-    rms[posed] = all_poses.rms
+    rms[posed] = refined.rms
     rms[chosen] = joint.image_rms
     leds_used = np.zeros((n_images, n_leds), dtype=bool)
     leds_used[chosen] = joint.used
-    corrected = replace(pen, leds=pen.leds + geometry.corrections)
     return Calibration(
         observations=observations,
         reasons=tuple(reasons),
@@ -154,16 +199,50 @@ def calibrate(camera: Camera, pen: Pen, observations: Observations) -> Calibrati
         tips_cam=tips_cam,
         rms=rms,
         leds_used=leds_used,
-        geometry=geometry,
+        joint=joint,
+        bundle=bundle,
+        priors=adjusted.priors,
+        contradictions=adjusted.contradictions,
         two_stage=two_stage,
         two_stage_covariance=propagated_covariance(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
-        budget=combine(camera, corrected, pixels, geometry),
+        budget=combine(bundle, joint, adjusted.priors, adjusted.correlation),
         halves=compare_halves(joint),
-        leds=measure_leds(camera, pen, pixels, geometry),
+        leds=measure_leds(fitted_camera, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Adjusted:
+    bundle: Bundle
+    priors: Priors
+    contradictions: tuple[Contradiction, ...]
+    correlation: Correlation
+
+
+def _adjust(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    start: JointFit,
+    assumptions: Assumptions,
+) -> _Adjusted:
+    """Adjust all that the files may have wrong; let go what the images contradict."""
+    rig = rig_of(camera)
+    state = State(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
+    priors = priors_of(rig, pen, assumptions)
+    lean, seen = lean_forms(start.rotations), pixels[:, None]
+    bundle = fit_bundle(seen, state, priors, lean)
+    contradictions, freed = find_contradictions(rig, bundle, priors)
+    if contradictions:
+        bundle = fit_bundle(seen, state, freed, lean)
+    correlation = measure_correlation(bundle, seen)
+    if correlation.factor > RELATED:
+        bundle = fit_bundle(seen, state, freed, lean, correlation.factor)
+        correlation = measure_correlation(bundle, seen)
+    return _Adjusted(bundle, freed, contradictions, correlation)
 
 
 def _smeared(observations: Observations) -> BoolArray:

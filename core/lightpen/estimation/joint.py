@@ -139,6 +139,30 @@ def fit_joint(
     return _fit_from(state, used)
 
 
+def joint_at(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    tip_pen: FloatArray,
+    cone_cam: FloatArray,
+    used: BoolArray,
+) -> JointFit:
+    """Return what a joint fit is at a solution that was found otherwise.
+
+    Parameters
+    ----------
+    pixels : (N, L, 2) array
+        px; NaN where an LED was not seen.
+    rotations, tip_pen, cone_cam : (N, 3, 3), (3,) and (3,) array
+        The solution.
+    used : (N, L) array of bool
+        LEDs that count.
+    """
+    state = ContactModel(camera, pen, pixels).at(rotations, tip_pen, cone_cam)
+    return _fit_from(state, used)
+
+
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """The model around one state.

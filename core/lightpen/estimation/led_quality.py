@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.estimation.geometry import GeometryFit
-from lightpen.estimation.joint import ContactModel
+from lightpen.estimation.joint import ContactModel, JointFit
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 
@@ -43,18 +42,19 @@ class LedQuality:
 
 
 def measure_leds(
-    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
+    camera: Camera, pen: Pen, pixels: FloatArray, joint: JointFit
 ) -> LedQuality:
     """Measure how each LED fits.
 
     Parameters
     ----------
+    camera : Camera
+        As the joint fit has it.
     pen : Pen
         As the file gives it.
     pixels : (N, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     """
-    joint = geometry.joint
     seen = np.isfinite(pixels[..., 0])
     n_used = joint.used.sum(axis=0)
     counted = np.where(joint.used, 1.0, 0.0) / np.maximum(n_used, 1)
@@ -63,7 +63,7 @@ def measure_leds(
     mean = np.einsum("nl,nli->li", counted, residuals)
     rms = np.sqrt(np.sum(counted * squares, axis=0))
     none = n_used == 0
-    displacement, sigma = _displacements(camera, pen, pixels, geometry)
+    displacement, sigma = _displacements(camera, pen, pixels, joint)
     length = np.linalg.norm(displacement, axis=1)
     limit = np.maximum(STANDS_OUT * np.nanmedian(length), DISPLACED)
     displaced = np.flatnonzero((length > limit) & (length > SIGNIFICANT * sigma)) + 1
@@ -78,14 +78,13 @@ def measure_leds(
 
 
 def _displacements(
-    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
+    camera: Camera, pen: Pen, pixels: FloatArray, joint: JointFit
 ) -> tuple[FloatArray, FloatArray]:
     """Return where each LED sits by the poses of all, and its standard deviation, mm.
 
     An LED that was mostly left out is judged by all its images; its scatter then says
     whether it is displaced or only badly seen.
     """
-    joint = geometry.joint
     model = ContactModel(camera, pen, pixels)
     state = model.at(joint.rotations, joint.tip_pen, joint.cone_cam)
     by_led = state.jacobian[..., 6:9] @ joint.rotations[:, None]

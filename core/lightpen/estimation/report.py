@@ -12,6 +12,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
+from lightpen.estimation.contradictions import COEFFICIENTS
 from lightpen.estimation.pivot import PivotFit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import judge
@@ -109,6 +110,7 @@ def calibration_record(
         "verdict": _verdict(calibration, limits),
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
+        "adjusted": _adjusted(calibration),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
             "expanded_uncertainty_mm": calibration.budget.weakest_uncertainty,
@@ -173,7 +175,8 @@ def json_bytes(record: Mapping[str, Any]) -> bytes:
 def warnings_of(calibration: Calibration) -> list[Sentence]:
     """Return what the user should look into, one sentence or two each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
-    warnings = [
+    warnings = [each.sentence for each in calibration.contradictions]
+    warnings += [
         sentence(
             "warning.led-unseen",
             "LED {led} was found in no image. A finger may cover it, it may be off, or "
@@ -198,7 +201,7 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
                 "warning.large-residuals",
                 "The residuals are large: {sigma:.2f} px, {usual} px or less is usual. "
                 "Check that the camera file is of this camera, lens and focus, and the "
-                "pen file of this pen: the uncertainty does not cover a wrong file.",
+                "pen file of this pen.",
                 sigma=sigma,
                 usual=USUAL_SIGMA,
             )
@@ -261,16 +264,52 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
         return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
 
     return {
-        "noise_mm": std(budget.noise),
+        "shares": [
+            {
+                "name": share.name.value,
+                "standard_uncertainty_mm": share.standard_uncertainty,
+                "weakest_expanded_uncertainty_mm": budget.weakest_share(share),
+                "assumed": share.assumed,
+            }
+            for share in budget.shares
+        ],
+        "independent_noise_mm": std(budget.independent_noise),
         "blocks_mm": std(budget.blocks),
         "block_ratio": budget.block_ratio,
         "correlation_factor": budget.correlation_factor,
         "lag1_autocorrelation": budget.autocorrelation,
-        "led_geometry_mm": std(budget.leds),
-        "camera_mm": std(budget.camera),
-        "led_sigma_mm": calibration.geometry.led_sigma,
+        "led_sigma_mm": calibration.led_sigma,
         "halves_difference_mm": calibration.halves.difference,
         "halves_expanded_uncertainty_mm": calibration.halves.expanded_uncertainty,
+    }
+
+
+def _adjusted(calibration: Calibration) -> dict[str, Any]:
+    """Return what the images made of the files."""
+    fitted = calibration.bundle.state
+    camera, place = fitted.rig.cameras[0], calibration.bundle.columns.cameras[0]
+    deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
+    names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
+    return {
+        "intrinsics": {
+            name: {"value": value, "standard_uncertainty": deviation}
+            for name, value, deviation in zip(
+                names, camera.intrinsics, deviations, strict=False
+            )
+        },
+        "disc_diameter_mm": fitted.pen.diameter,
+        "contradictions": [
+            {
+                "what": str(each.what),
+                "unit": each.unit,
+                "stated": each.stated,
+                "stated_expanded_uncertainty": each.stated_uncertainty,
+                "wanted": each.wanted,
+                "wanted_expanded_uncertainty": each.wanted_uncertainty,
+                "standard_deviations": each.deviations,
+            }
+            for each in calibration.contradictions
+        ],
     }
 
 
@@ -286,7 +325,9 @@ def _coverage(calibration: Calibration) -> dict[str, Any]:
         "turn_deg": np.degrees([coverage.turns.min(), coverage.turns.max()]),
         "spread_deg": np.degrees(coverage.spread),
         "spread_axes_pen": coverage.axes,
-        "predicted_bound_mm": np.sqrt(np.diag(calibration.budget.noise)[:3]),
+        "predicted_bound_mm": np.sqrt(
+            np.diag(calibration.budget.independent_noise)[:3]
+        ),
     }
 
 
@@ -301,7 +342,7 @@ def _leds(calibration: Calibration) -> list[dict[str, Any]]:
             "mean_px": leds.mean[j],
             "displacement_mm": leds.displacement[j],
             "displaced": j + 1 in leds.displaced,
-            "correction_mm": calibration.geometry.corrections[j],
+            "correction_mm": calibration.bundle.led_corrections[j],
         }
         for j in range(len(leds.rms))
     ]

@@ -88,11 +88,6 @@ def _image_lines(calibration: Calibration) -> list[str]:
 def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     budget, halves = calibration.budget, calibration.halves
     joint = calibration.joint
-    parts = {
-        "noise": budget.correlation_factor * budget.noise,
-        "LED geometry": budget.leds,
-        "camera": budget.camera,
-    }
     tilt = np.degrees(calibration.coverage.tilts)
     lines = [
         f"Residuals    {joint.rms:.4f} px rms, tip of single images "
@@ -103,13 +98,15 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
         _numbers("  U (k = 2)", halves.expanded_uncertainty),
     ]
     lines += [
-        _numbers(f"U from {name}", COVERAGE_FACTOR * np.sqrt(np.diag(part)[:3]))
-        for name, part in parts.items()
-        if np.any(part)
+        _numbers(
+            f"U from {share.name}" + (", assumed" if share.assumed else ""),
+            COVERAGE_FACTOR * share.standard_uncertainty,
+        )
+        for share in budget.shares
     ]
     lines.append(
         f"Repeatability between blocks of images: {np.sqrt(budget.block_ratio):.2f} "
-        f"times that of independent noise, lag-1 autocorrelation "
+        f"times that of independent noise, autocorrelation "
         f"{budget.autocorrelation:.2f}"
     )
     lines.append(
@@ -118,9 +115,9 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     )
     if calibration.coverage.missing:
         lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
-    if calibration.geometry.led_sigma > 0:
+    if calibration.led_sigma > 0:
         lines.append(
-            f"LED file     off by {calibration.geometry.led_sigma:.4f} mm (standard "
+            f"LED file     off by {calibration.led_sigma:.4f} mm (standard "
             "deviation of a coordinate), corrected as far as the images tell"
         )
     return lines

@@ -1,12 +1,10 @@
 """What the tip is worth: covariance, repeatability between blocks, halves, weakness.
 
-The joint fit states the covariance that independent image noise leaves. Real residuals
-hang together from image to image. Two figures tell by how much that raises the
-covariance: the scatter between blocks of consecutive images (cluster-robust, [1]_), and
-the lag-1 autocorrelation rho of the images' scores, which makes the variance of a mean
-(1 + rho) / (1 - rho) times larger. The larger one counts, where it is significant. LED
-geometry and the camera's own calibration add their parts, as the GUM [2]_ combines
-independent components.
+The bundle adjustment states the covariance that noise and every prior leave, as the GUM
+[2]_ combines independent components. Real residuals hang together from image to image:
+their autocorrelation (`lightpen.estimation.correlation`) and the scatter between blocks
+of consecutive images (cluster-robust, [1]_) tell by how much that raises the share of
+noise; the larger one counts, where it is significant.
 
 References
 ----------
@@ -15,68 +13,96 @@ References
 .. [2] JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 5.1, 6.2.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.geometry import GeometryFit
-from lightpen.estimation.joint import ContactModel, JointFit, reduce
-from lightpen.model.camera import Camera
-from lightpen.model.pen import Pen
+from lightpen.estimation.bundle import Z_99, Bundle
+from lightpen.estimation.correlation import Correlation
+from lightpen.estimation.joint import JointFit
+from lightpen.estimation.priors import Priors
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
-Z_99 = 2.326  # normal quantile: blocks count only beyond their own chance of 1 %
+NEGLIGIBLE = 1e-6  # mm
+
+
+class ShareName(StrEnum):
+    """What makes a tip uncertain."""
+
+    NOISE = "noise"
+    SEAT = "seat"
+    DRIFT = "drift"
+    LEDS = "led geometry"
+    SCALE = "pen scale"
+    DIAMETER = "disc diameter"
+    CAMERA = "camera"
+    EXTRINSICS = "rig"
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """One part of the uncertainty.
+
+    Attributes
+    ----------
+    covariance : (6, 6) array
+        Of (tip_pen, cone_cam), mm^2.
+    assumed : bool
+        Whether it rests on an assumption, as a file does not state it.
+    """
+
+    name: ShareName
+    covariance: FloatArray
+    assumed: bool = False
+
+    @property
+    def standard_uncertainty(self) -> FloatArray:
+        """Of the three coordinates of the tip, (3,), mm."""
+        return np.sqrt(np.maximum(np.diag(self.covariance)[:3], 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Covariance of (tip_pen, cone_cam) and what it is made of, (6, 6), mm^2.
+    """Covariance of (tip_pen, cone_cam) and what it is made of.
 
     Attributes
     ----------
-    noise : (6, 6) array
-        From image noise, independent between images.
+    shares : tuple of Share
+        They add up to the covariance; what has no part in it is left out.
+    independent_noise : (6, 6) array
+        From image noise as if it were independent between images, mm^2.
     blocks : (6, 6) array or None
-        From the scatter between blocks of consecutive images; None with too few images.
+        From the scatter between blocks of consecutive images, all but tip and cone
+        held, mm^2; None with too few images.
     block_ratio : float
         Variance between blocks over that of independent noise, 1 on average.
     autocorrelation : float
-        Lag-1 autocorrelation of what the images say of tip and cone.
+        Of the errors of one coordinate from one image to the next; 0 where not
+        significant.
     correlation_factor : float
-        What ``noise`` is multiplied by: the larger of ``block_ratio`` and
-        ``(1 + rho) / (1 - rho)``, each where significant, else 1.
-    leds : (6, 6) array
-        From the LED geometry.
-    camera : (6, 6) array
-        From the covariance of the camera's calibration; zero where not given.
+        How many times the share of noise is larger than that of independent noise.
     """
 
-    noise: FloatArray
+    shares: tuple[Share, ...]
+    independent_noise: FloatArray
     blocks: FloatArray | None
     block_ratio: float
     autocorrelation: float
     correlation_factor: float
-    leds: FloatArray
-    camera: FloatArray
 
     @property
     def covariance(self) -> FloatArray:
         """Combined covariance of (tip_pen, cone_cam), (6, 6), mm^2."""
-        return self.correlation_factor * self.noise + self.leds + self.camera
+        return np.asarray(sum(share.covariance for share in self.shares))
 
     @property
     def expanded_uncertainty(self) -> FloatArray:
         """U (k = 2) of tip_pen and cone_cam, (6,), mm."""
         return COVERAGE_FACTOR * np.sqrt(np.diag(self.covariance))
-
-    @property
-    def led_uncertainty(self) -> float:
-        """U (k = 2) of the tip by the LED geometry alone, where it is largest, mm."""
-        largest = np.linalg.eigvalsh(self.leds[:3, :3])[-1]
-        return float(COVERAGE_FACTOR * np.sqrt(max(largest, 0.0)))
 
     @property
     def weakest_direction(self) -> FloatArray:
@@ -90,6 +116,17 @@ class Budget:
         """U (k = 2) along the weakest direction, mm."""
         values = np.linalg.eigvalsh(self.covariance[:3, :3])
         return COVERAGE_FACTOR * float(np.sqrt(values[-1]))
+
+    @property
+    def largest_share(self) -> Share:
+        """The share that counts most along the weakest direction."""
+        return max(self.shares, key=self.weakest_share)
+
+    def weakest_share(self, share: Share) -> float:
+        """Return U (k = 2) of one share along the weakest direction, mm."""
+        along = self.weakest_direction
+        variance = float(along @ share.covariance[:3, :3] @ along)
+        return COVERAGE_FACTOR * float(np.sqrt(max(variance, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,33 +146,40 @@ class Halves:
 
 
 def combine(
-    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
+    bundle: Bundle, joint: JointFit, priors: Priors, correlation: Correlation
 ) -> Budget:
-    """Combine the parts of the tip's uncertainty.
-
-    Parameters
-    ----------
-    camera : Camera
-        Its covariance enters where the camera file has one.
-    pixels : (N, L, 2) array
-        Ellipse centres of the LEDs in the order of capture, px.
-    """
-    joint = geometry.joint
-    noise = joint.covariance
-    blocks, ratio, blocks_count = _block_scatter(joint, noise)
-    rho, rho_counts = _autocorrelation(joint, noise)
+    """Combine the parts of the tip's uncertainty."""
+    independent = bundle.independent_noise
+    blocks, ratio, blocks_count = _block_scatter(joint, joint.covariance)
+    raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
+    at = bundle.columns
+    one_wave, *others = at.seat
+    jitter = bundle.carried(bundle.jitter_information)
+    shares = [
+        Share(ShareName.NOISE, raised * correlation.noise),
+        Share(ShareName.SEAT, jitter + bundle.part(one_wave, *others)),
+        Share(ShareName.DRIFT, bundle.part(at.drift)),
+        Share(ShareName.LEDS, bundle.part(at.leds)),
+        Share(ShareName.SCALE, bundle.part(at.scale), priors.scale.assumed),
+        Share(ShareName.DIAMETER, bundle.part(at.diameter), priors.diameter.assumed),
+        Share(
+            ShareName.CAMERA,
+            bundle.part(*at.cameras),
+            any(camera.assumed for camera in priors.cameras),
+        ),
+    ]
+    if priors.extrinsics is not None:
+        rig = bundle.part(at.extrinsics)
+        shares.append(Share(ShareName.EXTRINSICS, rig, priors.extrinsics.assumed))
     return Budget(
-        noise=noise,
+        shares=tuple(
+            share for share in shares if share.standard_uncertainty.max() > NEGLIGIBLE
+        ),
+        independent_noise=independent,
         blocks=blocks,
         block_ratio=ratio,
-        autocorrelation=rho,
-        correlation_factor=max(
-            1.0,
-            ratio if blocks_count else 1.0,
-            (1 + rho) / (1 - rho) if rho_counts else 1.0,
-        ),
-        leds=geometry.led_covariance,
-        camera=_camera_part(camera, pen, pixels, geometry),
+        autocorrelation=correlation.coefficient,
+        correlation_factor=raised * correlation.factor,
     )
 
 
@@ -172,40 +216,7 @@ def _block_scatter(
     return blocks, ratio, ratio > _chi_square_quantile_99(n_free) / n_free
 
 
-def _autocorrelation(joint: JointFit, noise: FloatArray) -> tuple[float, bool]:
-    """Return the lag-1 autocorrelation of what images say of the tip; significance.
-
-    Six components share one coefficient; they count as half as many, as few of them
-    carry most of the information.
-    """
-    whitened = joint.gradients @ np.linalg.cholesky(noise)
-    total = float(np.sum(whitened**2))
-    lagged = float(np.sum(whitened[1:] * whitened[:-1]))
-    rho = lagged / total if total > 0 else 0.0
-    return rho, rho > Z_99 / np.sqrt(3 * len(whitened))
-
-
 def _chi_square_quantile_99(n_free: int) -> float:
     """Return the 99 % quantile of chi-square (Wilson and Hilferty, 1931)."""
     spread = 2 / (9 * n_free)
     return float(n_free * (1 - spread + Z_99 * np.sqrt(spread)) ** 3)
-
-
-def _camera_part(
-    camera: Camera, pen: Pen, pixels: FloatArray, geometry: GeometryFit
-) -> FloatArray:
-    """Carry the covariance of the intrinsics over to tip and cone."""
-    if camera.covariance is None:
-        return np.zeros((6, 6))
-    joint = geometry.joint
-    model = ContactModel(camera, pen, pixels)
-    state = model.at(joint.rotations, joint.tip_pen, joint.cone_cam)
-    points = (pen.leds - joint.tip_pen) @ np.swapaxes(joint.rotations, 1, 2)
-    points = points + joint.cone_cam
-    by_intrinsics = camera.intrinsics_jacobian(points[..., :2] / points[..., 2:])
-    weights = joint.used.astype(float)
-    sensitivity = np.empty((6, by_intrinsics.shape[-1]))
-    for k in range(sensitivity.shape[1]):
-        shifted = replace(state, residuals=by_intrinsics[..., k])
-        sensitivity[:, k] = reduce(shifted, weights).step()
-    return np.asarray(sensitivity @ camera.covariance @ sensitivity.T)

@@ -8,9 +8,11 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
 from lightpen.estimation.led_quality import DISPLACED
-from lightpen.estimation.uncertainty import Halves
+from lightpen.estimation.uncertainty import Halves, ShareName
 from lightpen.messages import (
     Code,
+    file_contradicted,
+    file_uncertain,
     halves_differ,
     led_displaced,
     leds_misfit,
@@ -30,6 +32,30 @@ MANY_DROPPED = 0.2  # of the images
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
 USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
+
+
+IMAGES_SHRINK = (ShareName.NOISE, ShareName.SEAT, ShareName.DRIFT)
+_ADVICE = {
+    ShareName.LEDS: sentence(
+        "share.leds", "the LED file. Measure the LEDs better, and state how well"
+    ),
+    ShareName.SCALE: sentence(
+        "share.scale",
+        "the scale of the LED file. State its uncertainty in the file, and measure "
+        "where the pen is used",
+    ),
+    ShareName.DIAMETER: sentence(
+        "share.diameter",
+        "the diameter of the LED discs. State it and its uncertainty in the LED file",
+    ),
+    ShareName.CAMERA: sentence(
+        "share.camera",
+        "the camera file. Calibrate the camera, and state the covariance in its file",
+    ),
+    ShareName.EXTRINSICS: sentence(
+        "share.rig", "where the cameras stand. Calibrate the rig, and state how well"
+    ),
+}
 
 
 class Grade(StrEnum):
@@ -98,6 +124,8 @@ _NEXT_STEPS = {
     Code.LEDS_OFF: NextStep.CHECK_FILES,
     Code.LED_DISPLACED: NextStep.CHECK_FILES,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
+    Code.FILE_UNCERTAIN: NextStep.CHECK_FILES,
+    Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
 }
 
 
@@ -158,11 +186,16 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     """Judge a calibration by what its tip is worth, not by its residuals alone."""
     uncertainty = calibration.budget.weakest_uncertainty
     limit = limits.max_uncertainty
-    reason = uncertain(uncertainty, limit)
-    by_leds = calibration.budget.led_uncertainty
-    led_sigma = calibration.geometry.led_sigma
-    if by_leds > limit and led_sigma > DISPLACED:  # more images hardly change it
-        reason = leds_off(led_sigma, by_leds)
+    budget = calibration.budget
+    largest = budget.largest_share
+    by_largest = budget.weakest_share(largest)
+    if largest.name in IMAGES_SHRINK:
+        reason = uncertain(uncertainty, limit)
+    elif largest.name is ShareName.LEDS and calibration.led_sigma > DISPLACED:
+        reason = leds_off(calibration.led_sigma, by_largest)
+    else:  # more images hardly change it
+        advice = _ADVICE[largest.name]
+        reason = file_uncertain(uncertainty, limit, by_largest, advice, largest.assumed)
     if uncertainty > FAR_OFF * limit:
         return Verdict(Grade.REPEAT, reason)
     differences = np.abs(calibration.halves.difference)
@@ -174,6 +207,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         usual = calibration.halves.expanded_uncertainty[worst]
         differ = halves_differ(float(differences[worst]), float(usual))
         return Verdict(Grade.CHECK, differ)
+    if calibration.contradictions:
+        worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
+        return Verdict(Grade.CHECK, file_contradicted(worst_one.sentence))
     if calibration.joint.sigma > USUAL_SIGMA:
         misfit = leds_misfit(calibration.joint.sigma, USUAL_SIGMA)
         return Verdict(Grade.CHECK, misfit)

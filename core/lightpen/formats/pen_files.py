@@ -3,25 +3,32 @@
 A table has the columns ``led,x_mm,y_mm,z_mm``, optionally ``nx,ny,nz`` (normals) and
 ``diameter_mm``. Without a header its columns stand in this order, the normals being
 optional. Units may be written as in ``x_mm``, ``x [mm]``, ``x (m)`` and ``x/inch``.
+Standard uncertainties (k = 1) are optional columns, the same number in each row:
+``led_sigma_mm`` of one LED coordinate, ``scale_sigma`` of all coordinates together
+(relative: 1e-5 is 10 um a metre) and ``diameter_sigma_mm``.
 
 A JSON file has
 
-=============== ======================================================================
+================== ===================================================================
 ``units``       of all lengths: ``mm``, ``cm``, ``m``, ``um`` or ``inch``
 ``leds``        list of ``{"led": 1, "x": 0, "y": 0, "z": -30, "normal": [0, 0, 1]}``,
                 ``normal`` being optional
 ``diameter``    of the LED discs, optional
+``led_sigma``   standard uncertainty of one LED coordinate, optional
+``scale_sigma`` of all coordinates together, relative, optional
+``diameter_sigma`` of the diameter, optional
 ``nominal_tip`` list of three coordinates, optional
 ``name``        name or serial number, optional
 ``comment``     not read
-=============== ======================================================================
+================== ===================================================================
 
 LEDs are numbered from 1, in ascending order. Normals are +z and discs 10 mm wide unless
 the file says otherwise.
 """
 
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,9 +65,18 @@ _UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in name
 _LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
 _COORDINATES = (("x",), ("y",), ("z",))
 _NORMALS = (("nx",), ("ny",), ("nz",))
-_COLUMN = r"(nx|ny|nz|x|y|z|diameter)(?:[\s_/]*[\[(]?\s*([a-zμ]+)\s*[\])]?)?"
+_COLUMN = (
+    r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
+    r"(?:[\s_/]*[\[(]?\s*([a-zμ]+)\s*[\])]?)?"
+)
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
-_FILE_KEYS = {"units", "leds", "diameter", "nominaltip", "name", "comment"}
+_FILE_KEYS = {
+    *("units", "leds", "diameter", "nominaltip", "name", "comment"),
+    *("ledsigma", "scalesigma", "diametersigma"),
+}
+_SIGMAS = ("led_sigma", "scale_sigma", "diameter_sigma")
+LARGEST_SIGMA = 10.0  # mm; and LARGEST_SCALE_SIGMA relative
+LARGEST_SCALE_SIGMA = 0.01
 
 
 def read_pen(
@@ -207,6 +223,7 @@ class _Content:
     diameter: float | None
     nominal_tip: FloatArray | None = None
     name: str = ""
+    sigmas: Mapping[str, float] = field(default_factory=dict)
 
 
 def _pen(
@@ -229,7 +246,9 @@ def _pen(
     normals = content.normals
     if normals is None:
         normals = _facing_normals(len(content.leds))
-    return Pen(content.leds, normals, diameter, nominal_tip, content.name)
+    return Pen(
+        content.leds, normals, diameter, nominal_tip, content.name, **content.sigmas
+    )
 
 
 def _flawed(path: Path, flaw: FileError) -> FileError:
@@ -289,8 +308,16 @@ def _from_table(table: Table, units: str | None) -> _Content:
     diameter = None
     if "diameter" in bare.header:
         place = bare.header.index("diameter")
-        diameter = _common_diameter(table, place) * UNITS[named[place][1] or unit]
+        diameter = _common(table, place, bare) * UNITS[named[place][1] or unit]
         _check_diameter(diameter, table.name)
+    sigmas = {}
+    for what in _SIGMAS:
+        if what in bare.header:
+            place = bare.header.index(what)
+            size = 1.0 if what == "scale_sigma" else UNITS[named[place][1] or unit]
+            sigmas[what] = _checked_sigma(
+                what, _common(table, place, bare) * size, table.name
+            )
     normals = None
     if with_normals:
         normals = np.empty((len(numbers), 3))
@@ -299,7 +326,7 @@ def _from_table(table: Table, units: str | None) -> _Content:
                 "pen-file.line", "Line {line} of {name}", line=line, name=table.name
             )
             normals[i] = _unit(numbers[i, 3:], where)
-    return _Content(numbers[:, :3] * UNITS[unit], normals, diameter)
+    return _Content(numbers[:, :3] * UNITS[unit], normals, diameter, sigmas=sigmas)
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
@@ -372,21 +399,40 @@ def _check_numbering(table: Table, column: int) -> None:
     raise table.error(row, flaw)
 
 
-def _common_diameter(table: Table, column: int) -> float:
-    diameters = table.numbers([column])[:, 0]
-    other = diameters != diameters[0]
+def _common(table: Table, column: int, bare: Table) -> float:
+    """Return the number that all rows of a column share."""
+    numbers = table.numbers([column])[:, 0]
+    other = numbers != numbers[0]
     if np.any(other):
         raise table.error(
             int(np.argmax(other)),
             sentence(
-                "pen-file.diameters-differ",
-                "the diameter is {diameter:g} where the first LED has {first:g}. "
-                "All LEDs of a pen must be equally wide.",
-                diameter=diameters[other][0],
-                first=diameters[0],
+                "pen-file.column-differs",
+                "the {what} is {value:g} where the first LED has {first:g}. It must be "
+                "the same for all LEDs of a pen.",
+                what=bare.header[column],
+                value=numbers[other][0],
+                first=numbers[0],
             ),
         )
-    return float(diameters[0])
+    return float(numbers[0])
+
+
+def _checked_sigma(what: str, sigma: float, name: str) -> float:
+    most = LARGEST_SCALE_SIGMA if what == "scale_sigma" else LARGEST_SIGMA
+    if not 0 < sigma <= most:
+        raise FileError(
+            sentence(
+                "pen-file.sigma",
+                "{name} has the {what} {sigma:g}. A standard uncertainty above 0 and "
+                "up to {most:g} is needed; leave it away if it is not known.",
+                name=name,
+                what=what,
+                sigma=sigma,
+                most=most,
+            )
+        )
+    return sigma
 
 
 def _check_diameter(diameter: float, name: str) -> None:
@@ -459,6 +505,16 @@ def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
         diameter=diameter,
         nominal_tip=nominal_tip,
         name=printable(entries.word("name")),
+        sigmas={
+            what: _checked_sigma(
+                what,
+                float(entries.counted(1, what)[0])
+                * (1.0 if what == "scale_sigma" else unit),
+                name,
+            )
+            for what in _SIGMAS
+            if entries.has(what)
+        },
     )
 
 
@@ -534,12 +590,25 @@ def _refuse_other_keys(entries: Entries, known: set[str], name: str | Sentence) 
             )
 
 
+def _stated_sigmas(pen: Pen) -> dict[str, float]:
+    return {
+        what: float(sigma)
+        for what in _SIGMAS
+        if (sigma := getattr(pen, what)) is not None
+    }
+
+
 def _csv_text(pen: Pen) -> str:
-    lines = ["led,x_mm,y_mm,z_mm,nx,ny,nz,diameter_mm"]
+    sigmas = _stated_sigmas(pen)
+    header = "led,x_mm,y_mm,z_mm,nx,ny,nz,diameter_mm"
+    header += "".join(
+        f",{what}" if what == "scale_sigma" else f",{what}_mm" for what in sigmas
+    )
+    lines = [header]
     for number, (led, normal) in enumerate(
         zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
     ):
-        cells = [number, *led, *normal, float(pen.diameter)]
+        cells = [number, *led, *normal, float(pen.diameter), *sigmas.values()]
         lines.append(",".join(map(repr, cells)))
     return "\n".join(lines) + "\n"
 
@@ -559,6 +628,7 @@ def _json_text(pen: Pen) -> str:
         f'"name": {json.dumps(pen.name)}',
         '"units": "mm"',
         f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
+        *(f'"{what}": {sigma!r}' for what, sigma in _stated_sigmas(pen).items()),
         f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
         f'"leds": [\n    {rows}\n  ]',
     ]

@@ -12,14 +12,16 @@ class SwingLimits:
     Attributes
     ----------
     max_uncertainty : float
-        U (k = 2) of the tip along its weakest direction, mm.
+        U (k = 2) of the tip along its weakest direction, mm. A station with a camera
+        calibrated on 24 views of a board, LEDs measured to 3 um and 100 images
+        reaches 0.008.
     min_per_field : int
         Images in each field of the dial.
     spacing : float
         Angle by which a kept posture differs from all others, rad.
     """
 
-    max_uncertainty: float = 0.005
+    max_uncertainty: float = 0.01
     min_images: int = 60
     max_images: int = 300
     min_per_field: int = 2

@@ -72,6 +72,12 @@ class Pen:
         Where the design puts the centre of the probe tip, mm.
     name : str
         Name or serial number, empty if unknown.
+    led_sigma : float or None
+        Standard uncertainty of one LED coordinate, mm; None if not stated.
+    scale_sigma : float or None
+        Standard uncertainty common to all coordinates, relative; None if not stated.
+    diameter_sigma : float or None
+        Standard uncertainty of the diameter, mm; None if not stated.
     """
 
     leds: FloatArray
@@ -79,6 +85,9 @@ class Pen:
     diameter: float = DISC_DIAMETER
     nominal_tip: FloatArray | None = None
     name: str = ""
+    led_sigma: float | None = None
+    scale_sigma: float | None = None
+    diameter_sigma: float | None = None
 
     @property
     def n_leds(self) -> int:

@@ -7,7 +7,7 @@ nothing.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
@@ -178,11 +178,9 @@ def _all_residuals(
     shows_pen = np.isfinite(observations.translations[:, 0])
     others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):
-        leds = source.pen.leds + calibration.geometry.corrections
+        fitted = calibration.bundle.state
         model = ContactModel(
-            source.camera,
-            replace(source.pen, leds=leds),
-            observations.pixels[others],
+            fitted.rig.cameras[0], fitted.pen, observations.pixels[others]
         )
         residuals[others] = _turned_to_fit(
             model, observations.rotations[others], joint.tip_pen, joint.cone_cam

@@ -110,7 +110,11 @@ def plan_scene(scene: Scene) -> ScenePlan:
     swing = slip_tip(swing, hit["slipped"], rng.uniform(*SLIP, scene.n_images), rng)
     geometry = _stream(scene, _GEOMETRY)
     measured = perturbed_pen(scene.pen, scene.led_noise, geometry)
-    measured_pen = replace(measured, leds=np.round(measured.leds, LED_DECIMALS))
+    measured_pen = replace(
+        measured,
+        leds=np.round(measured.leds, LED_DECIMALS),
+        led_sigma=scene.led_noise or None,
+    )
     gains = led_gains(scene)
     image_plans = []
     for index in range(scene.n_images):

@@ -57,6 +57,10 @@ class Swing:
         return slipped
 
 
+SCALE_SIGMA = 5e-6  # of a coordinate measuring machine
+DIAMETER_SIGMA = 0.02  # mm, of a turned disc
+
+
 def paper_camera(binning: int = 1) -> Camera:
     """Return the paper's camera: 5 megapixels, 4638 px focal length.
 
@@ -74,7 +78,19 @@ def paper_camera(binning: int = 1) -> Camera:
         cx=(1219.6 - shift) / binning,
         cy=(1031.3 - shift) / binning,
         distortion=np.array([-0.082, 0.105, 0.0003, -0.0002, 0.0]),
+        covariance=_board_covariance(binning),
     )
+
+
+def _board_covariance(binning: int) -> FloatArray:
+    """Return what 24 views of a chessboard leave open of the paper's camera, (9, 9)."""
+    deviations = np.array([0.52, 0.51, 0.66, 0.58, 3.7e-4, 3.9e-3, 3.3e-5, 3.9e-5, 0.0])
+    deviations[:4] /= binning
+    correlations = np.eye(9)
+    # fx and fy, k1 and k2, cy and p1, cx and p2
+    for i, j, value in ((0, 1, 0.99), (4, 5, -0.91), (3, 6, 0.8), (2, 7, 0.9)):
+        correlations[i, j] = correlations[j, i] = value
+    return np.outer(deviations, deviations) * correlations
 
 
 def paper_pen() -> Pen:
@@ -98,6 +114,8 @@ def flat_pen(name: str, leds: Sequence[tuple[float, float, float]]) -> Pen:
         normals=np.tile([0.0, 0.0, 1.0], (len(leds), 1)),
         nominal_tip=np.array([0.0, -90.0, -25.0]),
         name=name,
+        scale_sigma=SCALE_SIGMA,
+        diameter_sigma=DIAMETER_SIGMA,
     )
 
 

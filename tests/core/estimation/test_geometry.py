@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lightpen.estimation.geometry import GeometryFit, fit_geometry
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.geometry import GeometryFit, fit_geometry
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import fit_rigid

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lightpen.estimation.geometry import fit_geometry
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.geometry import fit_geometry
 from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.led_quality import LedQuality, measure_leds
 from lightpen.model.pen import Pen

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lightpen.estimation.geometry import GeometryFit
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.geometry import GeometryFit
 from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.uncertainty import combine, compare_halves
 from lightpen.simulator.swings import (

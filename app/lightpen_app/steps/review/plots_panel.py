@@ -11,6 +11,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.report import result_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.record.solving import Solution
+from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.number_table import Figures, NumberTable
@@ -189,11 +190,10 @@ class UncertaintyPanel(PlotsPanel):
     def _show_budget(self, solution: Solution) -> None:
         budget = solution.calibration.budget
         parts = {
-            self.tr("noise"): budget.correlation_factor * budget.noise,
-            self.tr("LEDs"): budget.leds,
-            self.tr("camera"): budget.camera,
-            self.tr("all"): budget.covariance,
+            share_text(share.name) + (" *" if share.assumed else ""): share.covariance
+            for share in budget.shares
         }
+        parts[self.tr("all")] = budget.covariance
         expanded = np.array([_expanded(part) for part in parts.values()]) * MICROMETRES
         self._budget.set_data(list(parts), *expanded.T)
         weakest = self.tr("Weakest direction ({0}): U = {1} \xb5m.").format(
@@ -201,8 +201,8 @@ class UncertaintyPanel(PlotsPanel):
             _digits(budget.weakest_uncertainty * MICROMETRES),
         )
         texts = [weakest]
-        if not budget.camera.any():
-            texts.append(self.tr("The intrinsics file tells no uncertainty."))
+        if any(share.assumed for share in budget.shares):
+            texts.append(self.tr("* assumed: the file tells no uncertainty."))
         if budget.correlation_factor > 1:
             text = self.tr(
                 "Images hang together: their noise counts {0} times (variance)."

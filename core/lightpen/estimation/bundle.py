@@ -1,0 +1,321 @@
+"""Bundle adjustment with priors: the tip, and whatever else the images depend on.
+
+Beside tip, cone and rotations the fit holds the intrinsics of each camera, its place
+in the rig, the LEDs, the pen's scale and the diameter of its discs, each with a
+prior: what its file says, with the uncertainty that the file states or that is
+assumed in its place. So the images put right what the files have wrong as far as they
+can, and the covariance holds what they cannot. Errors of the LEDs, of the seat as it
+follows the pen's lean and of a drift have a standard deviation that the images
+themselves tell (`lightpen.estimation.variance_components`).
+
+The rotations are eliminated image by image [1]_; a change of priors costs no new look
+at the images then. The tip is given in the frame in which the file's LEDs fit the
+true ones best: moves of the pen as a whole are no errors of its LEDs.
+
+References
+----------
+.. [1] B. Triggs et al., "Bundle adjustment - a modern synthesis", LNCS 1883 (2000)
+   298-372, section 6.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
+from lightpen.errors import CalibrationError
+from lightpen.estimation.linearised import (
+    N_CONE,
+    N_TURN,
+    Eliminated,
+    State,
+    View,
+    eliminate,
+    views_at,
+)
+from lightpen.estimation.priors import Priors
+from lightpen.estimation.unknowns import (
+    FORMS,
+    NONE,
+    Columns,
+    Components,
+    Unknowns,
+    inverse,
+    led_basis,
+)
+from lightpen.estimation.variance_components import find_jitter
+from lightpen.sentences import sentence
+
+LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
+MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
+CONVERGED = 1e-5  # mm
+FINDING_PASSES = 2  # in which standard deviations are found; then they stand
+MAX_PASSES = 20
+Z_99 = 2.326  # normal quantile
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """Everything that the images of a swing were fitted by.
+
+    Attributes
+    ----------
+    state : State
+        With the cameras and the pen as the images and the files together have them.
+    values : (p,) array
+        Deviations from the files; tip and cone are 0.
+    columns : Columns
+        Of ``values`` and of every matrix.
+    residuals : (N, C, L, 2) array
+        Observed minus modelled centres, px, the seat included; NaN where not seen.
+    used : (N, C, L) array of bool
+    sigma : float
+        Noise of one image coordinate, px.
+    information : (p, p) array
+        Of the images, rotations eliminated.
+    prior_information : (p, p) array
+    jitter_information : (p, p) array
+        How much of ``information`` the jitter of the seat makes uncertain.
+    weight_sigma : float
+        By which LEDs were weighed, px: ``sigma``, and more where it hangs together.
+    covariance : (p, p) array
+        Inverse of both informations together, images taken as independent.
+    """
+
+    unknowns: Unknowns
+    state: State
+    values: FloatArray
+    columns: Columns
+    components: Components
+    residuals: FloatArray
+    used: BoolArray
+    sigma: float
+    information: FloatArray
+    prior_information: FloatArray
+    jitter_information: FloatArray
+    weight_sigma: float
+    covariance: FloatArray
+
+    @property
+    def led_corrections(self) -> FloatArray:
+        """What the LEDs of the file are off by, beside the scale, (L, 3), mm."""
+        basis = led_basis(self.state.pen.leds)
+        return np.asarray((basis @ self.values[self.columns.leds]).reshape(-1, 3))
+
+    def part(self, *kinds: slice) -> FloatArray:
+        """Return what the priors of some unknowns leave in tip and cone, (6, 6)."""
+        own = np.zeros_like(self.covariance)
+        for at in kinds:
+            own[at, at] = self.prior_information[at, at]
+        return self.carried(own)
+
+    def carried(self, information: FloatArray) -> FloatArray:
+        """Return the covariance of tip and cone by errors of that information, (6, 6).
+
+        The information (p, p) is a part of that of images and priors together.
+        """
+        both = self.covariance[:6]
+        return np.asarray(both @ information @ both.T)
+
+    @property
+    def independent_noise(self) -> FloatArray:
+        """Covariance of tip and cone from noise, independent between images, (6, 6)."""
+        noise = self.carried(self.information - self.jitter_information)
+        return noise * (self.sigma / self.weight_sigma) ** 2
+
+
+def fit_bundle(
+    pixels: FloatArray,
+    start: State,
+    priors: Priors,
+    lean: FloatArray,
+    inflation: float = 1.0,
+) -> Bundle:
+    """Fit tip, cone and all that the files may have wrong to the LED centres.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    start : State
+        With cameras and pen as their files have them.
+    lean : (N, F) array
+        Forms in which the seat may follow the pen's lean, each of mean square 1.
+    inflation : float
+        How many times the variance of the noise counts beside the priors, as it does
+        not average out.
+
+    Raises
+    ------
+    CalibrationError
+        The iteration does not settle.
+    """
+    unknowns = Unknowns.of(start, priors, lean)
+    at = unknowns.columns
+    state, taken_up = start, np.zeros(unknowns.number)
+    views = views_at(state, pixels)
+    residuals = _stacked(views)
+    used = gated(residuals)
+    sigma = _robust_sigma(residuals)
+    components = Components(NONE, (NONE,) * len(FORMS), NONE, None)
+    for n_pass in range(MAX_PASSES):
+        weight_sigma = sigma * float(np.sqrt(inflation))
+        eliminated = eliminate(views, used, weight_sigma, components.jitter)
+        information, gradient = unknowns.system(eliminated)
+        right = gradient + information @ taken_up
+        finding = 0 < n_pass <= FINDING_PASSES
+        if finding:
+            components = unknowns.found(information, right, components)
+        prior = unknowns.prior_information(components)
+        covariance = inverse(information + prior)
+        values = covariance @ right
+        step, shifts = unknowns.step(values - taken_up)
+        unknown = _follow(eliminated, step, shifts)
+        residuals = _left_over(views, step, shifts, unknown)
+        n_fitted = float(np.sum(covariance * information)) + _n_eliminated(
+            eliminated, components.jitter, used
+        )
+        squares = np.where(used[..., None], residuals, 0.0) ** 2
+        n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
+        sigma = max(sigma_of(squares.sum(), n_free), NOISE_FLOOR)
+        if finding:
+            alone = (
+                eliminated
+                if components.jitter is None
+                else eliminate(views, used, weight_sigma)
+            )
+            jitter = _jitter(unknowns, alone, used, step, shifts, covariance)
+            components = components._replace(jitter=jitter)
+        if n_pass in (1, FINDING_PASSES):
+            used = gated(residuals)
+        moved = np.abs((values - taken_up)[:6]).max()
+        state = unknowns.moved(start, state, values, unknown[:, :N_TURN])
+        taken_up = values.copy()
+        for kind in (at.tip, at.cone, *at.seat, at.drift):  # the state has no place for
+            taken_up[kind] = 0.0
+        views = views_at(state, pixels)
+        if n_pass > FINDING_PASSES and moved < CONVERGED:
+            jitter_information = np.zeros_like(information)
+            if components.jitter is not None:
+                seat = unknowns.sensitivity(eliminated.turn_by_step[:, N_TURN:])
+                known = np.linalg.inv(components.jitter)
+                jitter_information = np.einsum(
+                    "nip,ij,njq->pq", seat, known, seat, optimize=True
+                )
+            return Bundle(
+                unknowns=unknowns,
+                state=state,
+                values=values,
+                columns=at,
+                components=components,
+                residuals=residuals,
+                used=used,
+                sigma=sigma,
+                information=information,
+                prior_information=prior,
+                jitter_information=jitter_information,
+                weight_sigma=weight_sigma,
+                covariance=covariance,
+            )
+    raise CalibrationError(
+        sentence(
+            "joint.not-settled",
+            "The joint fit did not settle in {n_steps} steps. The images may not be "
+            "of this pen and camera: check both files.",
+            n_steps=MAX_PASSES,
+        )
+    )
+
+
+def gated(residuals: FloatArray) -> BoolArray:
+    """Return which LEDs are near enough to count, (N, C, L), of residuals in px."""
+    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
+    near = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * _robust_sigma(residuals)
+    enough = near.sum(axis=(1, 2), keepdims=True) >= MIN_TURN_LEDS
+    return np.asarray(near & enough)
+
+
+def sigma_of(squares: float, n_free: float) -> float:
+    """Return a standard deviation from a sum of squares and its degrees of freedom."""
+    return float(np.sqrt(squares / n_free))
+
+
+def _stacked(views: tuple[View, ...]) -> FloatArray:
+    return np.stack([view.residuals for view in views], axis=1)
+
+
+def _robust_sigma(residuals: FloatArray) -> float:
+    return robust_sigma(residuals.reshape(len(residuals), -1, 2), N_TURN)
+
+
+def _follow(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArray:
+    """Return the step of each image's own unknowns, (N, q)."""
+    by_cone = each.turn_by_step[..., :N_CONE]
+    return np.asarray(
+        each.turn + each.turn_by_step @ step + np.einsum("nqk,nk->nq", by_cone, shifts)
+    )
+
+
+def _left_over(
+    views: tuple[View, ...], step: FloatArray, shifts: FloatArray, unknown: FloatArray
+) -> FloatArray:
+    """Return the residuals after a step, (N, C, L, 2), the jitter being an error."""
+    n_leds = views[0].residuals.shape[1]
+    by_led = step[-3 * n_leds :].reshape(n_leds, 3)
+    by_diameter = step[-3 * n_leds - 1]
+    cone = step[:N_CONE] + shifts
+    if unknown.shape[1] > N_TURN:
+        cone = cone + unknown[:, N_TURN:]
+    row, left = N_CONE, []
+    for view in views:
+        own = step[row : row + view.own.shape[-1]]
+        row += len(own)
+        left.append(
+            view.residuals
+            - np.einsum("nlik,nk->nli", view.turn, unknown[:, :N_TURN])
+            - np.einsum("nlik,nk->nli", view.cone, cone)
+            - view.own @ own
+            - view.diameter * by_diameter
+            - np.einsum("nlik,lk->nli", view.led, by_led)
+        )
+    return np.stack(left, axis=1)
+
+
+def _n_eliminated(
+    each: Eliminated, jitter: FloatArray | None, used: BoolArray
+) -> float:
+    """Return how many unknowns the eliminated ones count for."""
+    n_images = int(used.any(axis=(1, 2)).sum())
+    if jitter is None:
+        return float(N_TURN * n_images)
+    known = np.linalg.inv(jitter)
+    left = each.left[:, N_TURN:, N_TURN:]
+    freedom = N_CONE - np.einsum("nij,ji->n", left, known)
+    return float(N_TURN * n_images + freedom.sum())
+
+
+def _jitter(
+    unknowns: Unknowns,
+    each: Eliminated,
+    used: BoolArray,
+    step: FloatArray,
+    shifts: FloatArray,
+    covariance: FloatArray,
+) -> FloatArray | None:
+    """Return the covariance of the seat from image to image, if there is any.
+
+    ``each`` is eliminated without any jitter.
+    """
+    seen = used.any(axis=(1, 2))
+    rows = each.cone_rows[seen]
+    own = rows[..., :N_CONE]
+    right = each.cone_right - each.cone_rows @ step
+    right = right[seen] - np.einsum("nij,nj->ni", own, shifts[seen])
+    noise = np.linalg.inv(own)
+    excess = np.einsum("ni,nij,nj->", right, noise, right)
+    if excess < N_CONE * len(own) + Z_99 * np.sqrt(2 * N_CONE * len(own)):
+        return None
+    spread = unknowns.sensitivity(each.cone_rows)[seen]
+    leverage = noise @ spread @ covariance @ np.swapaxes(spread, 1, 2) @ noise
+    return find_jitter(own, right, leverage)

@@ -1,0 +1,119 @@
+"""How large the errors of one kind are, as the images themselves tell.
+
+Errors of one kind (of the LEDs, of the seat, of a drift) are taken as normal with one
+standard deviation, found by restricted maximum likelihood (empirical Bayes [1]_): the
+errors themselves, and all that the images leave open beside them, are integrated out.
+
+References
+----------
+.. [1] D. A. Harville, "Maximum likelihood approaches to variance component estimation
+   and to related problems", J. American Statistical Association 72 (1977) 320-338.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+
+SIGNIFICANT = 10.83  # chi-square, 1 degree of freedom, at 0.001
+LIKELY = 2.71  # the same at 0.1: enough to be counted in the uncertainty
+SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
+SEEN = 1e-9  # of the largest eigenvalue; what is less is not seen at all
+MAX_PASSES = 60
+SETTLED = 1e-2  # relative, of a standard deviation
+MATRIX_SIGNIFICANT = 22.46  # chi-square, 6 degrees of freedom, at 0.001
+
+
+class Component(NamedTuple):
+    """The likeliest standard deviation of some errors.
+
+    Attributes
+    ----------
+    sigma : float
+        mm.
+    gain : float
+        Twice the logarithm of how much likelier it is than none, or than what a file
+        states.
+    """
+
+    sigma: float
+    gain: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether chance alone hardly makes it."""
+        return self.gain > SIGNIFICANT
+
+
+def find_component(S: FloatArray, right: FloatArray, stated: float = 0.0) -> Component:
+    """Find the likeliest standard deviation of k unknowns.
+
+    In the eigenvectors of S the right sides are independent and normal, with variance
+    ``value^2 sigma^2 + value``.
+
+    Parameters
+    ----------
+    S : (k, k) array
+        Their information, all other unknowns eliminated, 1/mm^2.
+    right : (k,) array
+        Right side that belongs to it, 1/mm.
+    stated : float
+        Standard deviation beside which it is judged, mm.
+    """
+    values, vectors = np.linalg.eigh(S)
+    seen = values > SEEN * max(values[-1], 1e-300)
+    values, projected = values[seen], (vectors.T @ right)[seen]
+    sigmas = np.concatenate([[stated], SCALES])
+    excess = values * sigmas[:, None] ** 2 + 1
+    costs = np.sum(np.log(excess) + projected**2 / (values * excess), axis=1)
+    best = int(np.argmin(costs))
+    return Component(float(sigmas[best]), float(costs[0] - costs[best]))
+
+
+def find_jitter(
+    information: FloatArray, right: FloatArray, leverage: FloatArray
+) -> FloatArray | None:
+    """Find the covariance of a vector that is another in each image.
+
+    Parameters
+    ----------
+    information : (N, 3, 3) array
+        What each image says of its own vector, 1/mm^2.
+    right : (N, 3) array
+        Right side that belongs to it, 1/mm.
+    leverage : (N, 3, 3) array
+        Covariance that the unknowns common to all images leave in the vector that
+        each image alone would give, mm^2.
+
+    Returns
+    -------
+    (3, 3) array or None
+        mm^2; None where it is not significant.
+
+    Notes
+    -----
+    Expectation-maximisation.
+    """
+    noise = np.linalg.inv(information)
+    alone = np.einsum("nij,nj->ni", noise, right)
+    excess = np.einsum("ni,nj->nij", alone, alone) + leverage
+
+    def cost(jitter: FloatArray) -> float:
+        total = noise + jitter
+        misfit = np.einsum("nij,nji->", np.linalg.inv(total), excess)
+        return float(np.linalg.slogdet(total)[1].sum() + misfit)
+
+    jitter = np.diag(np.maximum(np.mean(alone**2, axis=0) / 4, 1e-10))
+    for _ in range(MAX_PASSES):
+        share = jitter @ np.linalg.inv(noise + jitter)
+        left = jitter - share @ jitter
+        moved = share @ excess @ np.swapaxes(share, 1, 2)
+        before, jitter = jitter, np.mean(moved + left, axis=0)
+        jitter = 0.5 * (jitter + jitter.T)
+        change = np.abs(np.diag(jitter) / np.diag(before) - 1)
+        if change.max() < SETTLED:
+            break
+    if cost(np.zeros((3, 3))) - cost(jitter) < MATRIX_SIGNIFICANT:
+        return None
+    return np.asarray(jitter)

@@ -1,0 +1,51 @@
+"""What is assumed of camera and pen where their files say nothing of it."""
+
+from dataclasses import dataclass, fields
+from math import isfinite
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Standard uncertainties that stand in for what a file leaves out.
+
+    Those of the camera are what a lens that was calibrated once, and mounted and
+    focused again since, was seen to be off by; that of the scale holds 20 ppm of a
+    measuring machine and 1 K of an aluminium pen (23 ppm).
+
+    Attributes
+    ----------
+    focal_length : float
+        Relative.
+    aspect : float
+        Of fy / fx.
+    principal_point : float
+        Of cx and of cy, px.
+    k1, k2, tangential : float
+        Of the distortion coefficients; ``tangential`` of p1 and of p2.
+    scale : float
+        Of all LED coordinates of a pen together, relative.
+    diameter : float
+        Of the LED discs, relative.
+    rotation, translation : float
+        Of a camera in its rig about and along each axis, rad and mm.
+    """
+
+    focal_length: float = 0.005
+    aspect: float = 0.0003
+    principal_point: float = 5.0
+    k1: float = 0.02
+    k2: float = 0.1
+    tangential: float = 0.0003
+    scale: float = 3e-5
+    diameter: float = 0.02
+    rotation: float = 0.02
+    translation: float = 20.0
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if not (isfinite(value) and value >= 0):
+                raise ValueError(f"`{item.name}` must be 0 or more, got {value}.")
+
+
+USUAL = Assumptions()
