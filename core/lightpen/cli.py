@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import wraps
 from importlib.metadata import version
 from io import TextIOWrapper
@@ -39,6 +39,7 @@ from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import (
     is_record,
@@ -53,6 +54,7 @@ from lightpen.sentences import Sentence, sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
+LARGEST_SHARE = 0.1
 MAX_NAMED = 3  # images; of more the first is named
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # What to type about what the core says, by its codes.
@@ -156,6 +158,20 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--camera", type=Path, metavar="FILE")
     parser.add_argument("--pen", type=Path, metavar="FILE")
     _add_pen_options(parser)
+    parser.add_argument(
+        "--camera-sigma",
+        type=_share,
+        metavar="SHARE",
+        help="standard uncertainty of the focal length, such as 0.5%%, where the camera "
+        "file states no uncertainty; that of the rest of the camera goes with it",
+    )
+    parser.add_argument(
+        "--scale-sigma",
+        type=_share,
+        metavar="SHARE",
+        help="standard uncertainty of the pen's scale, such as 30e-6, where the pen "
+        "file states none",
+    )
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
         "--nominal-tip", type=_finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
@@ -207,6 +223,25 @@ def _finite(text: str) -> float:
     if not math.isfinite(number):
         raise argparse.ArgumentTypeError(f"{text} is not a number.")
     return number
+
+
+def _share(text: str) -> float:
+    """Return a part of one, which may be given in per cent."""
+    number = _finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    if not 0 < number <= LARGEST_SHARE:
+        raise argparse.ArgumentTypeError(
+            f"{text} is not a share above 0 and up to {LARGEST_SHARE:.0%}."
+        )
+    return number
+
+
+def _assumptions(options: argparse.Namespace) -> Assumptions:
+    assumed = USUAL
+    if options.camera_sigma is not None:
+        assumed = with_focal_length(assumed, options.camera_sigma)
+    if options.scale_sigma is not None:
+        assumed = replace(assumed, scale=options.scale_sigma)
+    return assumed
 
 
 def _add_pivot(parser: argparse.ArgumentParser) -> None:
@@ -311,6 +346,8 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         "--units": options.units,
         "--led-diameter": options.led_diameter,
         "--nominal-tip": options.nominal_tip,
+        "--camera-sigma": options.camera_sigma,
+        "--scale-sigma": options.scale_sigma,
     }
     given = [name for name, value in own.items() if value is not None]
     if given:
@@ -406,7 +443,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
     return _Calibrated(
-        calibrate(camera, pen, observations),
+        calibrate(camera, pen, observations, _assumptions(options)),
         pen.nominal_tip,
         SwingLimits(),
         lambda: Inputs(

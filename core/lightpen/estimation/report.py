@@ -175,7 +175,10 @@ def json_bytes(record: Mapping[str, Any]) -> bytes:
 def warnings_of(calibration: Calibration) -> list[Sentence]:
     """Return what the user should look into, one sentence or two each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
-    warnings = [each.sentence for each in calibration.contradictions]
+    warnings = [
+        *(each.sentence for each in calibration.contradictions),
+        *_seat_warnings(calibration),
+    ]
     warnings += [
         sentence(
             "warning.led-unseen",
@@ -204,6 +207,57 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
                 "pen file of this pen.",
                 sigma=sigma,
                 usual=USUAL_SIGMA,
+            )
+        )
+    return warnings
+
+
+def _seat_warnings(calibration: Calibration) -> list[Sentence]:
+    """Return what is told of a tip that did not rest where the model has it."""
+    bundle, found = calibration.bundle, calibration.bundle.components
+    warnings = []
+    if found.jitter is not None:
+        warnings.append(
+            sentence(
+                "warning.seat-jitter",
+                "The tip did not come to rest in the same place: it moved by "
+                "{distance:.4f} mm (standard deviation) from image to image. Clean tip "
+                "and cone, look for wear, and press the tip in. It is in the "
+                "uncertainty.",
+                distance=float(np.sqrt(np.trace(found.jitter))),
+            )
+        )
+    if any(form.is_significant for form in found.seat):
+        warnings.append(
+            sentence(
+                "warning.seat-form",
+                "The tip moved in its seat as the pen leant, by some {distance:.4f} "
+                "mm. Tip or cone may be out of round, worn or dirty. It is in the "
+                "uncertainty.",
+                distance=max(form.sigma for form in found.seat),
+            )
+        )
+    if found.drift.is_significant:
+        moved = float(np.linalg.norm(bundle.values[bundle.columns.drift]))
+        warnings.append(
+            sentence(
+                "warning.drift",
+                "The cone moved by {distance:.4f} mm against the camera during the "
+                "swing. Clamp both, let the camera warm up, and repeat. It is in the "
+                "uncertainty.",
+                distance=moved,
+            )
+        )
+    stated = calibration.priors.led_sigma
+    if stated is not None and found.leds.is_significant:
+        warnings.append(
+            sentence(
+                "warning.led-file-contradicted",
+                "The images contradict the LED file: its coordinates are off by "
+                "{found:.4f} mm (standard deviation), the file states {stated:.4f} mm. "
+                "Measure the pen again, or check that the file is of this pen.",
+                found=found.leds.sigma,
+                stated=stated,
             )
         )
     return warnings
@@ -289,14 +343,23 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
     fitted = calibration.bundle.state
     camera, place = fitted.rig.cameras[0], calibration.bundle.columns.cameras[0]
     deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
+    prior = calibration.priors.cameras[0]
+    before = np.sqrt(np.diag(prior.covariance))
     names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
     return {
         "intrinsics": {
-            name: {"value": value, "standard_uncertainty": deviation}
-            for name, value, deviation in zip(
-                names, camera.intrinsics, deviations, strict=False
+            name: {
+                "value": value,
+                "standard_uncertainty": deviation,
+                "standard_uncertainty_before": known,
+            }
+            for name, value, deviation, known in zip(
+                names, camera.intrinsics, deviations, before, strict=False
             )
         },
+        "intrinsics_uncertainty_assumed": prior.assumed,
+        "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
+        "scale_uncertainty_assumed": calibration.priors.scale.assumed,
         "disc_diameter_mm": fitted.pen.diameter,
         "contradictions": [
             {

@@ -27,7 +27,7 @@ from lightpen.estimation.priors import Priors
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
-NEGLIGIBLE = 1e-6  # mm
+NEGLIGIBLE = 1e-5  # mm, of a standard uncertainty
 
 
 class ShareName(StrEnum):

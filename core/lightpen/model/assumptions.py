@@ -1,6 +1,6 @@
 """What is assumed of camera and pen where their files say nothing of it."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import isfinite
 
 
@@ -49,3 +49,15 @@ class Assumptions:
 
 
 USUAL = Assumptions()
+
+
+def with_focal_length(assumptions: Assumptions, sigma: float) -> Assumptions:
+    """Return other assumptions of the focal length, relative, and all else of a camera.
+
+    A camera that is known better in one respect is so in all, as a rule.
+    """
+    times = sigma / assumptions.focal_length
+    names = ("focal_length", "aspect", "principal_point", "k1", "k2", "tangential")
+    return replace(
+        assumptions, **{name: times * getattr(assumptions, name) for name in names}
+    )
