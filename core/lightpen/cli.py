@@ -162,8 +162,8 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         "--camera-sigma",
         type=_share,
         metavar="SHARE",
-        help="standard uncertainty of the focal length, such as 0.5%%, where the camera "
-        "file states no uncertainty; that of the rest of the camera goes with it",
+        help="standard uncertainty of the focal length, such as 0.5%%, where the "
+        "camera file states none; that of the rest of the camera goes with it",
     )
     parser.add_argument(
         "--scale-sigma",
