@@ -14,7 +14,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle import Bundle, fit_bundle
 from lightpen.estimation.contradictions import Contradiction, find_contradictions
-from lightpen.estimation.correlation import Correlation, measure_correlation
+from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.joint import JointFit, fit_joint, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
 from lightpen.estimation.linearised import State

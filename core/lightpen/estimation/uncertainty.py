@@ -2,7 +2,7 @@
 
 The bundle adjustment states the covariance that noise and every prior leave, as the GUM
 [2]_ combines independent components. Real residuals hang together from image to image:
-their autocorrelation (`lightpen.estimation.correlation`) and the scatter between blocks
+their autocorrelation (`lightpen.estimation.noise_correlation`) and the scatter between blocks
 of consecutive images (cluster-robust, [1]_) tell by how much that raises the share of
 noise; the larger one counts, where it is significant.
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Z_99, Bundle
-from lightpen.estimation.correlation import Correlation
+from lightpen.estimation.noise_correlation import Correlation
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.priors import Priors
 

@@ -10,6 +10,7 @@ from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
+from lightpen.estimation.reach import ENDLESS, Reach, reach_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
@@ -44,6 +45,13 @@ class KeptImages:
         Tip and cone by the best fit there is.
     joint : JointFit or None
         The joint fit, as soon as the postures allow one.
+    reach : Reach or None
+        What the images say beside the files, with the joint fit.
+    uncertainty : float
+        U (k = 2) of the tip along its weakest direction, what the files leave open
+        included, mm; infinite at first.
+    floor : float
+        What more images cannot bring it below, mm.
     """
 
     numbers: IntArray
@@ -55,6 +63,9 @@ class KeptImages:
     sigmas: FloatArray
     seat: Seat | None = None
     joint: JointFit | None = None
+    reach: Reach | None = None
+    uncertainty: float = float("inf")
+    floor: float = 0.0
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -65,14 +76,6 @@ class KeptImages:
         if self.joint is not None:
             return max(self.joint.sigma, NO_NOISE)
         return max(float(np.median(self.sigmas)), NO_NOISE) if len(self) else NO_NOISE
-
-    @property
-    def uncertainty(self) -> float:
-        """U (k = 2) of the tip along its weakest direction, mm; infinite at first."""
-        if self.joint is None:
-            return float("inf")
-        variance = np.linalg.eigvalsh(self.joint.covariance[:3, :3])[-1]
-        return COVERAGE_FACTOR * float(np.sqrt(variance))
 
     @property
     def misfits(self) -> FloatArray:
@@ -158,7 +161,8 @@ def keep(
     if kept.joint is None:
         return _refit(camera, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
-    return _refit(camera, pen, replace(longer, seat=kept.seat), starts)
+    longer = replace(longer, seat=kept.seat, reach=kept.reach)
+    return _refit(camera, pen, longer, starts)
 
 
 def _leave_out(
@@ -177,6 +181,7 @@ def _leave_out(
         cofactors=kept.cofactors[stay],
         sigmas=kept.sigmas[stay],
         joint=None,
+        reach=None,
     )
     return _refit(camera, pen, rest, starts[stay]) if len(rest) else rest
 
@@ -185,7 +190,7 @@ def _refit(
     camera: Camera, pen: Pen, kept: KeptImages, starts: FloatArray
 ) -> KeptImages:
     """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
-    kept = replace(kept, joint=None)
+    kept = replace(kept, joint=None, uncertainty=float("inf"), floor=0.0)
     fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
     seat = kept.seat
     if seat is None or not fixed:
@@ -198,7 +203,22 @@ def _refit(
     except CalibrationError:  # an image too bad to settle; the next ones may help
         return replace(kept, seat=seat)
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
-    return replace(kept, seat=fitted, joint=joint)
+    reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
+    sigma = max(joint.sigma, NO_NOISE)
+    return replace(
+        kept,
+        seat=fitted,
+        joint=joint,
+        reach=reach,
+        uncertainty=_weakest(reach.covariance(camera, pen, sigma)),
+        floor=_weakest(reach.covariance(camera, pen, sigma, ENDLESS)),
+    )
+
+
+def _weakest(covariance: FloatArray) -> float:
+    """Return U (k = 2) of the tip along its weakest direction, mm."""
+    variance = np.linalg.eigvalsh(covariance[:3, :3])[-1]
+    return COVERAGE_FACTOR * float(np.sqrt(variance))
 
 
 def distance_unit(kept: KeptImages) -> float:

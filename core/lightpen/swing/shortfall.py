@@ -51,7 +51,8 @@ class Shortfall:
     n_images : int
         Images missing in all, at the least.
     n_for_uncertainty : int
-        Images that the uncertainty still needs, estimated; 0 if it suffices.
+        Images that the uncertainty still needs, estimated; 0 if it suffices, or if
+        what the files leave open is too much for any number of images.
     n_more : int
         Images that will still be taken, estimated: no more than the limit allows.
     """
@@ -80,15 +81,22 @@ def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
     if seat is not None:
         wanted[~visible_fields(_outlook(setup, state, seat))] = 0
     fields = np.maximum(wanted - state.counts, 0)
-    excess = (state.kept.uncertainty / limits.max_uncertainty) ** 2 - 1
-    n_for_uncertainty = 0
-    if excess > 0:  # the variance goes with one over the number of images
-        bounded = min(excess * max(state.n_kept, 1), limits.max_images)
-        n_for_uncertainty = max(ceil(bounded), 1)
+    n_for_uncertainty = _n_for_uncertainty(state, limits)
     n_images = max(limits.min_images - state.n_kept, int(fields.sum()), 0)
     n_allowed = max(limits.max_images - state.n_kept, 0)
     n_more = min(max(n_images, n_for_uncertainty), n_allowed)
     return Shortfall(wanted, fields, n_images, n_for_uncertainty, n_more)
+
+
+def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
+    """Return how many images would bring U to its limit; 0 where none can."""
+    limit, floor = limits.max_uncertainty, state.kept.floor
+    if state.kept.uncertainty <= limit or floor >= limit:
+        return 0
+    # All but the floor goes with one over the number of images.
+    excess = (state.kept.uncertainty**2 - limit**2) / (limit**2 - floor**2)
+    bounded = min(excess * max(state.n_kept, 1), limits.max_images)
+    return max(ceil(bounded), 1)
 
 
 def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
