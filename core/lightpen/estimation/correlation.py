@@ -90,8 +90,7 @@ def _fit_spectrum(
     n_free = n_kept - (n_columns - 1) / 3
     whitened = _products(equations, 1 / spectrum)
     by_unknowns, by_residuals = whitened[:, :-1], whitened[:, :-1, :, -1]
-    S = whitened[:, -1, :, -1]
-    S = _covariance(S, n_free)
+    S = _covariance(whitened[:, -1, :, -1], n_free)
     for _ in range(N_ROUNDS):
         W = np.linalg.inv(S)
         H = np.einsum("kilj,kl->ij", by_unknowns[..., :-1], W)
@@ -141,7 +140,7 @@ def _spectra(n_kept: int, n_poses: int) -> FloatArray:
 
 
 def _cosines(series: FloatArray) -> FloatArray:
-    """Return the orthonormal discrete cosine transform (DCT-II) along the first axis."""
+    """Return the orthonormal cosine transform (DCT-II) along the first axis."""
     n = len(series)
     mirrored = np.fft.rfft(np.concatenate([series, series[::-1]]), axis=0)[:n]
     turned = np.exp(-0.5j * np.pi / n * np.arange(n)) / np.sqrt(2 * n)

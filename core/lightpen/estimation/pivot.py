@@ -72,6 +72,7 @@ def fit_pivot(
     covariances: FloatArray | None = None,
     *,
     robust: bool = True,
+    candidates: BoolArray | None = None,
 ) -> PivotFit:
     """Fit tip and pivot to poses by linear least squares.
 
@@ -87,6 +88,8 @@ def fit_pivot(
         Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
     robust : bool
         Leave out poses that do not agree with the pivot of the others.
+    candidates : (N,) array of bool, optional
+        Poses that may be used; all unless given.
 
     Raises
     ------
@@ -102,13 +105,16 @@ def fit_pivot(
     """
     require_poses(rotations)
     equations = _Equations(rotations, translations, covariances)
-    everything = np.ones(len(rotations), dtype=bool)
+    if candidates is None:
+        candidates = np.ones(len(rotations), dtype=bool)
     if not robust:
-        return equations.fit(everything, everything)
-    used = equations.gate(_best_sample(equations), everything)
+        return equations.fit(candidates, candidates)
+    used = candidates & equations.gate(
+        _best_sample(equations.of(candidates)), candidates
+    )
     for _ in range(MAX_PASSES):
         require_poses(rotations[used])
-        gated = equations.gate(equations.solve_weighted(used), used)
+        gated = candidates & equations.gate(equations.solve_weighted(used), used)
         if np.array_equal(gated, used):
             break
         used = gated
@@ -123,6 +129,13 @@ class _Equations:
     rotations: FloatArray
     translations: FloatArray
     covariances: FloatArray | None
+
+    def of(self, chosen: BoolArray) -> "_Equations":
+        """Return the equations of the chosen poses."""
+        covariances = None if self.covariances is None else self.covariances[chosen]
+        return _Equations(
+            self.rotations[chosen], self.translations[chosen], covariances
+        )
 
     def fit(self, used: BoolArray, gated: BoolArray) -> PivotFit:
         """Solve over the used poses."""
@@ -230,7 +243,7 @@ def in_deviations(residuals: FloatArray, covariances: FloatArray) -> FloatArray:
     ----------
     residuals : (N, 3) array
         mm.
-    covariances : (N, 3, 3) array
+    covariances : (N, 3, 3) array or (3, 3) array
         mm^2.
     """
     whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]

@@ -32,10 +32,10 @@ MAX_UNDECIDED = 0.1  # of the poses; more, and the groups are two sides of one
 SIGNIFICANT = (
     60.0  # chi-square, 6 degrees of freedom: the split was chosen by residuals
 )
-DIFFERENT = 16.3  # chi-square, 3 degrees of freedom, at 0.1 %
 MAX_ROUNDS = 30
+SINGULAR = 1e-12  # of the trace; sides of too similar poses give any finite answer
 MAX_LOOKED_AT = 500  # poses, to begin with
-TINY = 1e-18  # mm^2
+EXACT = 1e-6  # mm; what is closer is the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +45,11 @@ class PoseGroups:
     Attributes
     ----------
     group : (N,) array
-        1 for the larger group, 2 for the other, 0 for poses of neither.
+        1 for the larger group, or the one that begins first, 2 for the other, 0 for poses of neither.
     tips_pen, pivots_cam : (2, 3) array
         Of both groups, mm.
     has_two_tips : bool
-        Whether the tips differ; else only the pivots do.
+        Whether it is the tip that differs most plainly; else it is the pivot.
     """
 
     group: IntArray
@@ -116,6 +116,12 @@ class _Equations:
         """Return by how much each equation misses, (N, 3), mm."""
         return self.A @ solution - self.b
 
+    def own_residuals(self, labels: IntArray, solutions: FloatArray) -> FloatArray:
+        """Return the residuals of the poses of groups 1 and 2, each by its own."""
+        by_first, by_second = (self.residuals(solution) for solution in solutions)
+        own = np.where((labels == 1)[:, None], by_first, by_second)
+        return np.asarray(own[labels > 0])
+
     def make_groups(self, labels: IntArray) -> bool:
         """Return whether each group fixes a tip and is more than a few outliers."""
         least = max(MIN_POSES, LEAST_SHARE * len(labels))
@@ -135,21 +141,16 @@ def _split_by_agreement(
     R, t = equations.rotations[some], translations[some]
     first = agreeing_solution(R, t, FIRST_SHARE)
     distances = np.linalg.norm(equations.residuals(first)[some], axis=1)
-    unit = max(float(np.quantile(distances, FIRST_SHARE)) / NEAR, TINY)
+    unit = max(float(np.quantile(distances, FIRST_SHARE)) / NEAR, EXACT)
     rest = distances > APART * unit
     if rest.sum() < max(MIN_POSES, LEAST_SHARE * len(some)):
         return None
     second = agreeing_solution(R[rest], t[rest], SECOND_SHARE)
-    labels = np.zeros(n_poses, dtype=int)
-    S = unit**2 * np.eye(3)
+    labels = np.zeros(n_poses, dtype=np.int64)
+    S = np.diag(np.full(3, unit**2))
     for _ in range(MAX_ROUNDS):
         misses = np.array([equations.residuals(x) for x in (first, second)])
-        apart = np.array(
-            [
-                in_deviations(each, np.broadcast_to(S, (n_poses, 3, 3)))
-                for each in misses
-            ]
-        )
+        apart = np.array([in_deviations(each, S) for each in misses])
         nearest = np.argmin(apart, axis=0)
         changed = np.where(apart.min(axis=0) < WITHIN, nearest + 1, 0)
         if not equations.make_groups(changed):
@@ -158,10 +159,8 @@ def _split_by_agreement(
             break
         labels = changed
         first, second = (equations.solve(labels == name) for name in (1, 2))
-        own = np.where(
-            (labels == 1)[:, None], *(equations.residuals(x) for x in (first, second))
-        )[labels > 0]
-        S = own.T @ own / len(own) + TINY * np.eye(3)
+        own = equations.own_residuals(labels, np.array([first, second]))
+        S = np.asarray(own.T @ own / len(own) + EXACT**2 * np.eye(3))
     undecided = np.abs(apart[0] ** 2 - apart[1] ** 2) / 2 < UNDECIDED
     if np.mean(undecided[labels > 0]) > MAX_UNDECIDED:
         return None
@@ -179,7 +178,7 @@ def _split_by_time(equations: _Equations, used: BoolArray) -> IntArray | None:
     H = np.cumsum(np.einsum("nki,nkj->nij", A, A), axis=0)
     g = np.cumsum(np.einsum("nki,nk->ni", A, b), axis=0)
     ends = np.arange(least - 1, len(order) - least)
-    ridge = TINY * np.trace(H[-1]) * np.eye(6)
+    ridge = SINGULAR * np.trace(H[-1]) * np.eye(6)
     explained = np.zeros(len(ends))
     for sums, moments in ((H[ends], g[ends]), (H[-1] - H[ends], g[-1] - g[ends])):
         solutions = np.linalg.solve(sums + ridge, moments[..., None])[..., 0]
@@ -191,7 +190,9 @@ def _split_by_time(equations: _Equations, used: BoolArray) -> IntArray | None:
 
 def _judged(equations: _Equations, labels: IntArray) -> PoseGroups | None:
     """Return the groups, the larger one first, if their solutions differ."""
-    if np.sum(labels == 2) > np.sum(labels == 1):
+    sizes = [int(np.sum(labels == name)) for name in (1, 2)]
+    begins = [int(np.argmax(labels == name)) for name in (1, 2)]
+    if (-sizes[1], begins[1]) < (-sizes[0], begins[0]):
         labels = np.array([0, 2, 1])[labels]
     members = labels > 0
     of_group = np.array([labels == name for name in (1, 2)])
@@ -203,20 +204,21 @@ def _judged(equations: _Equations, labels: IntArray) -> PoseGroups | None:
         ],
         axis=2,
     )
-    residuals = np.where(
-        of_group[0][:, None], *(equations.residuals(x) for x in solutions)
-    )[members]
-    covariance = correlated_covariance(design, residuals)
+    covariance = correlated_covariance(
+        design, equations.own_residuals(labels, solutions)
+    )
     between = np.hstack([-np.eye(6), np.eye(6)])
     difference = solutions[1] - solutions[0]
     uncertainty = between @ covariance @ between.T
-    if _chi_square(difference, uncertainty) < SIGNIFICANT:
+    alike = np.abs(difference).max() < EXACT
+    if alike or _chi_square(difference, uncertainty) < SIGNIFICANT:
         return None
     return PoseGroups(
         group=labels,
         tips_pen=solutions[:, :3],
         pivots_cam=solutions[:, 3:],
-        has_two_tips=_chi_square(difference[:3], uncertainty[:3, :3]) > DIFFERENT,
+        has_two_tips=_chi_square(difference[:3], uncertainty[:3, :3])
+        > _chi_square(difference[3:], uncertainty[3:, 3:]),
     )
 
 

@@ -4,9 +4,10 @@ Poses in another convention are rotations and translations, too, and may even fi
 badly. Only the scatter tells: each usual mistake is undone in turn, and one that brings
 the poses much closer to a common tip is what happened.
 
-Inverted poses are the exception. They fit as well, since ``R tip + t = pivot`` also reads
-``R^T pivot - R^T t = tip``: tip and pivot change places. Only a tip farther from its pen
-than from the camera gives them away, which may be true: that is told, not refused.
+Inverted poses are the exception. They fit as well, since ``R tip + t = pivot`` also
+reads ``R^T pivot - R^T t = tip``: tip and pivot change places. Only a tip farther from
+its pen than from the camera gives them away, which may be true: that is told, not
+refused.
 """
 
 from collections.abc import Callable
@@ -28,7 +29,7 @@ AGREEING = 0.5  # of the poses, at least
 FEW = 20  # poses, of which half would agree with anything
 AGREEING_OF_FEW = 0.9
 MAX_LOOKED_AT = 200  # poses; a convention is that of all of them
-SHORT = 10.0  # mm; no tracked pen is that close to its tracker in every pose
+SHORT = 10.0  # mm; no tracked pen is that close to its tracker in most poses
 LONG = 10_000.0  # mm; no pen is that long
 MAX_SCATTER = 20.0  # mm; no tip rests so badly
 USUAL_SCATTER = 5.0  # mm; more is no noise if the poses move by little more
@@ -56,15 +57,15 @@ def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> No
     CalibrationError
         Says what they look like, and what is needed.
     """
-    longest = float(np.linalg.norm(translations, axis=1).max())
-    if longest < SHORT:
+    typical = float(np.median(np.linalg.norm(translations, axis=1)))
+    if typical < SHORT:
         raise CalibrationError(
             sentence(
                 "poses.in-metres",
-                "The longest translation is {longest:.3f} mm, so they are metres by "
-                "the look of them. Millimetres are needed: multiply tx, ty and tz by "
-                "1000.",
-                longest=longest,
+                "The translations look like metres: as millimetres they are only "
+                "{typical:.3f} mm long (median). Millimetres are needed: multiply tx, "
+                "ty and tz by 1000.",
+                typical=typical,
             )
         )
     chosen = np.unique(
@@ -75,7 +76,7 @@ def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> No
     undone = [_scatter(*mistake.undo(R, t)) for mistake in _MISTAKES]
     likeliest = int(np.argmin(undone))
     closer = undone[likeliest] < MUCH_CLOSER * as_read
-    if closer and as_read > ROUNDING * longest:
+    if closer and as_read > ROUNDING * typical:
         raise CalibrationError(_MISTAKES[likeliest].said(as_read, undone[likeliest]))
     _require_tip(R, t, as_read)
 
