@@ -32,7 +32,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 
 SWING_SHARE = 0.99  # of what the design tells; the frequencies beyond are left out
-MIN_FREQUENCIES = 12  # fewer do not tell a spectrum
+MIN_FREQUENCIES = 30  # fewer do not tell white noise from other
 SHARES = (0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.999)  # of the noise, that is correlated
 N_LENGTHS = 10
 SHORTEST = 0.7  # poses

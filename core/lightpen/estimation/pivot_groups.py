@@ -45,7 +45,8 @@ class PoseGroups:
     Attributes
     ----------
     group : (N,) array
-        1 for the larger group, or the one that begins first, 2 for the other, 0 for poses of neither.
+        1 for the larger group, or the first of two equal ones, 2 for the other, 0 for
+        poses of neither.
     tips_pen, pivots_cam : (2, 3) array
         Of both groups, mm.
     has_two_tips : bool
@@ -109,8 +110,7 @@ class _Equations:
     def solve(self, chosen: BoolArray) -> FloatArray:
         """Return tip and pivot (6,) of the chosen poses."""
         A, b = self.A[chosen].reshape(-1, 6), self.b[chosen].ravel()
-        solution: FloatArray = np.linalg.lstsq(A, b)[0]
-        return solution
+        return np.asarray(np.linalg.lstsq(A, b)[0])
 
     def residuals(self, solution: FloatArray) -> FloatArray:
         """Return by how much each equation misses, (N, 3), mm."""
@@ -119,8 +119,8 @@ class _Equations:
     def own_residuals(self, labels: IntArray, solutions: FloatArray) -> FloatArray:
         """Return the residuals of the poses of groups 1 and 2, each by its own."""
         by_first, by_second = (self.residuals(solution) for solution in solutions)
-        own = np.where((labels == 1)[:, None], by_first, by_second)
-        return np.asarray(own[labels > 0])
+        own: FloatArray = np.where((labels == 1)[:, None], by_first, by_second)
+        return own[labels > 0]
 
     def make_groups(self, labels: IntArray) -> bool:
         """Return whether each group fixes a tip and is more than a few outliers."""
