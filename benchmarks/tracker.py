@@ -1,11 +1,13 @@
 """Poses of a tracked pointer: real ones with a published answer, drifting ones."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from benchmarks.rows import Row, numbers, without_data
+from benchmarks.workers import Workers
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.formats.observation_files import PoseTable, read_poses
@@ -29,22 +31,27 @@ QUARTERS = 4
 QUARTER_LIMIT = 2.0  # times U
 
 
-def tracker_rows(data: Path | None) -> list[Row]:
+def tracker_rows(workers: Workers, data: Path | None) -> list[Row]:
     """Return how true tip and uncertainty are of poses that a tracker measured."""
-    return [*_published_rows(data), *map(_coverage_row, CORRELATIONS)]
+    return [
+        *_published_rows(data),
+        *(_coverage_row(workers, correlation) for correlation in CORRELATIONS),
+    ]
 
 
-def _coverage_row(correlation: float) -> Row:
-    """Return how often U covers the error, on the axis where that is least and most."""
-    hits = np.zeros((N_RUNS, 3))
-    for run in range(N_RUNS):
-        rng = np.random.default_rng(run)
-        swing = swing_poses(N_POSES, rng, "operator")
-        noise = NOISE * correlated_noise(N_POSES, correlation, rng)
-        found = calibrate_pivot(swing.rotations, swing.translations + noise)
-        error = np.abs(found.fit.tip_pen - swing.tip_pen)
-        hits[run] = error < found.expanded_uncertainty[:3]
-    shares = hits.mean(axis=0)
+def _is_covered(seed: int, correlation: float) -> BoolArray:
+    """Return whether U covers the error of a calibration, per axis."""
+    rng = np.random.default_rng(seed)
+    swing = swing_poses(N_POSES, rng, "operator")
+    noise = NOISE * correlated_noise(N_POSES, correlation, rng)
+    found = calibrate_pivot(swing.rotations, swing.translations + noise)
+    error = np.abs(found.fit.tip_pen - swing.tip_pen)
+    return np.asarray(error < found.expanded_uncertainty[:3])
+
+
+def _coverage_row(workers: Workers, correlation: float) -> Row:
+    covered = workers.map(partial(_is_covered, correlation=correlation), range(N_RUNS))
+    shares = np.mean(list(covered), axis=0)
     least, most = COVERED.get(correlation, COVERED_CORRELATED)
     return Row(
         f"`pivot`, {N_POSES} poses, noise of lag-1 correlation {correlation}: "
