@@ -38,7 +38,7 @@ N_LENGTHS = 10
 SHORTEST = 0.7  # poses
 LONGEST = 0.25  # of all poses; what is slower looks the same
 PRIOR_POSES = 1.0  # that weigh for noise alike in all directions: six poses fix no S
-TINY = 1e-24  # mm^2, or of whitened equations; exact poses have no scatter
+TINY = 1e-24  # mm^2; exact poses have no scatter
 N_ROUNDS = 3  # of solution and S; they hardly depend on each other
 
 

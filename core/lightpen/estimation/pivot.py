@@ -143,9 +143,9 @@ class _Equations:
         residuals = self.residuals(solution)
         distances = self.distances(solution)
         n_free = 3 * int(used.sum()) - 6
-        variance = float(np.sum(distances[used] ** 2)) / n_free
+        variance = max(float(np.sum(distances[used] ** 2)) / n_free, TINY**2)
         if self.covariances is None:
-            distances = distances / max(np.sqrt(variance), TINY)
+            distances = distances / np.sqrt(variance)
         else:
             variance = max(variance, 1.0)
         H, _ = self.normal_equations(used[None], solution[:3])

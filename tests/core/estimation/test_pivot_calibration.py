@@ -35,6 +35,16 @@ def test_drifting_poses_leave_more_doubt_than_independent_ones() -> None:
     assert drifting.correlation_factor > 5
 
 
+def test_exact_poses_give_the_exact_tip() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+
+    found = calibrate_pivot(swing.rotations, swing.translations)
+
+    np.testing.assert_allclose(found.fit.tip_pen, swing.tip_pen, atol=1e-8)
+    assert found.expanded_uncertainty.max() < 1e-8
+    assert not found.warnings
+
+
 def test_quarters_of_a_real_tracker_agree_with_the_whole_by_their_uncertainty(
     shared_data: Path,
 ) -> None:
