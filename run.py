@@ -25,11 +25,12 @@ Usage: {run} COMMAND
   check            check style, types and the order of imports
   bench [ARGS]     measure every figure of speed and accuracy; try: {run} bench --help
   lightpen [ARGS]  run the program itself; try: {run} lightpen --help
+  lock             renew the lock files: the newest versions that pyproject.toml allows
 
 Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
-PIP = "pip>=25.1"  # the first that installs dependency groups
+PIP = "pip>=25.1"
 PARALLEL = ("--numprocesses", "auto", "--dist", "worksteal")
 CHECKS = (
     ("ruff", "check"),
@@ -37,9 +38,18 @@ CHECKS = (
     ("mypy",),
     ("lint-imports", "--no-cache"),
 )
-REQUIREMENTS = {
-    "program": ["--editable", "."],
-    "development": ["--editable", ".", "--group", "dev"],
+LOCKS = {
+    "program": ("requirements.lock",),
+    "development": ("requirements.lock", "requirements-dev.lock"),
+}
+# One lock file for all systems and all Pythons from the oldest that is supported.
+COMPILE = (
+    *("uv", "pip", "compile", "--upgrade", "--universal", "--python-version", "3.11"),
+    *("--generate-hashes", "--no-header", "--quiet"),
+)
+COMPILED = {
+    "requirements.lock": ("pyproject.toml",),
+    "requirements-dev.lock": ("--group", "dev", "--constraint", "requirements.lock"),
 }
 
 
@@ -51,8 +61,8 @@ class SetupError(Exception):
 class Environment:
     """A virtual environment that knows how far its set-up has come.
 
-    Its record file says what was installed for which Python, folder and
-    pyproject.toml, or "unfinished" while anything is being installed.
+    Its record file says what was installed for which Python, folder, pyproject.toml
+    and lock files, or "unfinished" while anything is being installed.
 
     Parameters
     ----------
@@ -74,7 +84,7 @@ class Environment:
         return str(self.folder / "bin" / name)
 
     def set_up(self, group: str) -> None:
-        """Install a group of REQUIREMENTS unless it is there and up to date."""
+        """Install a group of LOCKS unless it is there and up to date."""
         try:
             with _locked(self.root / "pyproject.toml"):
                 self._bring_up_to_date(group)
@@ -102,8 +112,10 @@ class Environment:
         return f"Python {version} ({sys.platform}) in {str(self.folder)!a}"
 
     def _project(self) -> str:
-        pyproject = (self.root / "pyproject.toml").read_bytes()
-        return f"pyproject.toml {hashlib.sha256(pyproject).hexdigest()}"
+        found = hashlib.sha256()
+        for name in ("pyproject.toml", *LOCKS["development"]):
+            found.update((self.root / name).read_bytes())
+        return f"pyproject.toml and locks {found.hexdigest()}"
 
     @property
     def _record(self) -> Path:
@@ -142,7 +154,9 @@ class Environment:
         quiet = [] if sys.stderr.isatty() else ["--quiet"]
         pip = [self.program("python"), "-m", "pip", "install", *quiet]
         self._call([*pip, PIP])
-        self._call([*pip, *REQUIREMENTS[group]])
+        locks = [word for name in LOCKS[group] for word in ("--requirement", name)]
+        self._call([*pip, "--require-hashes", *locks])
+        self._call([*pip, "--no-deps", "--editable", "."])
         self._make_source_paths_relative()
 
     def _make_source_paths_relative(self) -> None:
@@ -207,6 +221,17 @@ def check(environment: Environment) -> int:
     return status
 
 
+def lock(environment: Environment) -> int:
+    """Renew the lock files, that of the program first."""
+    for name, of in COMPILED.items():
+        program, *words = COMPILE
+        command = [environment.program(program), *words, *of, "--output-file", name]
+        status = subprocess.run(command, cwd=ROOT, check=False).returncode
+        if status != 0:
+            return status
+    return 0
+
+
 def main(arguments: Sequence[str]) -> int:
     """Do the command; return its exit status."""
     environment = Environment(ROOT)
@@ -221,6 +246,9 @@ def main(arguments: Sequence[str]) -> int:
         case ["check"]:
             environment.set_up("development")
             return check(environment)
+        case ["lock"]:
+            environment.set_up("development")
+            return lock(environment)
         case ["bench", *options]:
             environment.set_up("program")
             os.chdir(ROOT)

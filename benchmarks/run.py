@@ -41,7 +41,7 @@ SECTIONS: dict[str, Section] = {
     "bound": lambda workers, data: cramer_rao_rows(workers),
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
-    "tracker": lambda workers, data: tracker_rows(data),
+    "tracker": tracker_rows,
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),

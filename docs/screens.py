@@ -6,6 +6,7 @@ of the look, and look at each. What the wizard shows in them is simulated, with 
 seeds and without a running camera, so that they come out the same each time.
 """
 
+import gc
 import os
 import sys
 import time
@@ -134,9 +135,15 @@ class Stage:
         self.wizard.window.show()
 
     def close(self) -> None:
-        """Close the window without a question."""
+        """Close the window without a question, and leave no widget of it."""
         self._workbench.run.runner.abandon()
-        self.wizard.window.close_unasked()
+        window = self.wizard.window
+        window.close_unasked()
+        others = window.operator_view(), window.help_window()
+        for each in (*others, window, self.wizard):
+            each.deleteLater()
+        self._settle()
+        gc.collect()  # what is left of its widgets, on no other thread
 
     def set_look(self, look: Look) -> None:
         """Change language, colours and size."""

@@ -32,6 +32,14 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 """
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_power_cut() -> Iterator[None]:
+    """Nothing waits for the disk; what is killed leaves its files to the system."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.fsync", lambda descriptor: None)
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Return the folder of image sets with truth, or skip the test without it."""

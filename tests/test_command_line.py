@@ -18,7 +18,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from lightpen.arrays import FloatArray
 from lightpen.cli import main
+from lightpen.formats.observation_files import read_poses
 
 Run = Callable[..., CompletedProcess[str]]
 Record = Callable[..., dict[str, Any]]
@@ -648,6 +650,62 @@ def test_outliers_that_agree_with_each_other_do_not_win(
     shifted.write_text(text + "\n", encoding="utf-8")
     away = np.array(pivoted(lightpen, shifted)["tip_pen_mm"]) - TRACKER_TIP
     assert np.linalg.norm(away) < 1.0
+
+
+def written_poses(rotations: FloatArray, translations: FloatArray, file: Path) -> Path:
+    """Write poses as a table without header."""
+    np.savetxt(file, np.column_stack([rotations.reshape(-1, 9), translations]))
+    return file
+
+
+def test_outliers_of_a_few_standard_deviations_that_agree_are_left_out_and_named(
+    lightpen: Run, poses: Path, tmp_path: Path
+) -> None:
+    table = read_poses(poses)
+    others = np.random.default_rng(3).random(len(table.translations)) < 0.3
+    shifted = table.translations + others[:, None] * [0.0, 0.0, 12.0]
+    fields = pivoted(
+        lightpen, written_poses(table.rotations, shifted, tmp_path / "shifted.csv")
+    )
+
+    away = np.abs(np.array(fields["tip_pen_mm"]) - TRACKER_TIP)
+    assert np.all(away < fields["expanded_uncertainty_mm"])
+    group = np.array([frame["group"] for frame in fields["frames"]])
+    assert np.mean((group == 2) != others) < 0.01
+    (warning,) = fields["warnings"]
+    assert warning["code"] == "pivot.two-pivots"
+    assert warning["text"] in fields["text"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda R, t: (np.swapaxes(R, 1, 2), t), "look transposed"),
+        (lambda R, t: (R, t / 1000), "look like metres"),
+        (
+            lambda R, t: (R, np.random.default_rng(0).permutation(t)),
+            "no tip in common",
+        ),
+        (
+            lambda R, t: (R, t + (np.arange(len(t)) > 575)[:, None] * (R @ [0, 9, 0])),
+            "One: poses 1-576. The other: poses 577-1151",
+        ),
+    ],
+)
+def test_poses_that_have_no_one_tip_are_refused_with_the_reason(
+    spoil: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+    said: str,
+    lightpen: Run,
+    poses: Path,
+    tmp_path: Path,
+) -> None:
+    table = read_poses(poses)
+    spoiled = spoil(table.rotations, table.translations)
+    outcome = lightpen("pivot", written_poses(*spoiled, tmp_path / "spoiled.csv"))
+
+    assert outcome.returncode == 1
+    assert said in outcome.stderr
+    assert not outcome.stdout
 
 
 def test_the_robust_pivot_hardly_differs_where_no_pose_is_bad(

@@ -52,7 +52,8 @@ class Machine:
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Machine:
     root = tmp_path / "Müller & Söhne"
     root.mkdir()
-    (root / "pyproject.toml").write_text("[project]", encoding="utf-8")
+    for name in ("pyproject.toml", *run.LOCKS["development"]):
+        (root / name).write_text("[project]", encoding="utf-8")
     machine = Machine(root)
     monkeypatch.setattr(run.subprocess, "run", machine.run)
     return machine
@@ -82,14 +83,22 @@ def test_tests_add_to_the_environment_of_the_program(machine: Machine) -> None:
     commands = machine.commands_of_set_up("development")
 
     assert not any("-m venv" in command for command in commands)
-    assert commands[-1].endswith("--editable . --group dev")
+    assert "--requirement requirements-dev.lock" in commands[-2]
 
 
-def test_a_changed_pyproject_is_installed_into_the_same_environment(
-    machine: Machine,
+def test_all_that_is_installed_is_what_the_lock_files_hold(machine: Machine) -> None:
+    commands = machine.commands_of_set_up("program")
+
+    assert commands[-2].endswith("--require-hashes --requirement requirements.lock")
+    assert "--no-deps" in commands[-1]
+
+
+@pytest.mark.parametrize("changed", ["pyproject.toml", "requirements.lock"])
+def test_a_changed_file_is_installed_into_the_same_environment(
+    machine: Machine, changed: str
 ) -> None:
     machine.environment.set_up("program")
-    (machine.environment.root / "pyproject.toml").write_text("[x]", encoding="utf-8")
+    (machine.environment.root / changed).write_text("[x]", encoding="utf-8")
     commands = machine.commands_of_set_up("program")
 
     assert not any("-m venv" in command for command in commands)

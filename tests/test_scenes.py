@@ -19,6 +19,7 @@ Truth = Callable[[Path], dict[str, Any]]
 
 HARD_SEEDS = ("1", "2", "3", "4", "24")
 OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")
+CALIBRATED = ("eight", "fanned")  # whatever becomes of the others
 
 # Frames that tell nothing right about the tip. The simulator's flags are truth.
 USELESS = {"slipped", "blurred_away", "empty"}
@@ -311,6 +312,7 @@ def test_another_layout_gives_its_tip_or_is_refused(
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
+        assert pen not in CALIBRATED
         assert_refused(outcome, "pen|LED")
         return
     assert outcome.returncode == 0, outcome.stderr
@@ -331,16 +333,6 @@ def test_clutter_and_missing_leds_never_mislabel_another_layout(
         return
     fields = json.loads(file.read_text(encoding="utf-8"))
     assert wrong_leds(fields, truth(folder)) == []
-
-
-def test_one_other_layout_at_least_is_calibrated(scene: Scene, lightpen: Run) -> None:
-    statuses = {
-        pen: calibrate_set(
-            lightpen, scene("--pen", pen, "--images", "40", "--seed", "1")
-        ).returncode
-        for pen in ("eight", "fanned")
-    }
-    assert statuses == {"eight": 0, "fanned": 0}
 
 
 def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> None:

@@ -24,7 +24,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers, observe_images
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.report import (
     METHODS,
     calibration_record,
@@ -484,15 +484,15 @@ def _simulate(options: argparse.Namespace) -> None:
 def _pivot(options: argparse.Namespace) -> None:
     _require_other_file(options.json, options.poses)
     poses = read_poses(options.poses)
-    fit = fit_pivot(
+    calibration = calibrate_pivot(
         poses.rotations,
         poses.translations,
         poses.covariances,
         robust=not options.least_squares,
     )
-    print(pivot_text(fit))
+    print(pivot_text(calibration))
     if options.json is not None:
-        record = pivot_record(fit, hashed(options.poses), options.least_squares)
+        record = pivot_record(calibration, hashed(options.poses), options.least_squares)
         write_whole(options.json, json_bytes(record))
 
 

@@ -43,7 +43,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.theme import DARK, apply_theme, load_fonts, style_sheet
+from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
@@ -88,8 +88,7 @@ def dressed(qapp: QApplication) -> QApplication:
 def look(dressed: QApplication) -> Iterator[None]:
     """Every test begins dark and in English."""
     before = QLocale()
-    if dressed.styleSheet() != style_sheet(DARK):
-        apply_theme(dressed, DARK)
+    apply_theme(dressed, DARK)
     yield
     for switch in dressed.findChildren(LanguageSwitch):
         switch.remove()

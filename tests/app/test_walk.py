@@ -4,6 +4,7 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from lightpen.arrays import FloatArray
 from lightpen.live.sources import Surroundings
+from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import open_record
 from lightpen.record.results import Result
 from lightpen.record.unfinished import find_unfinished
@@ -227,10 +229,14 @@ def test_a_recorded_swing_gives_its_tip(
 
 
 def test_in_chinese_no_english_word_is_left(
-    settings: Settings, open_wizard: "OpenWizard"
+    settings: Settings, open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # By its uncertainty alone, as in the other walks all fields of the dial are filled.
+    short = partial(SwingLimits, min_per_field=0)
+    monkeypatch.setattr("lightpen_app.work.workbench.SwingLimits", short)
     settings.set_preferences(Preferences(language=Language.CHINESE))
-    settings.set_station("2\u53f7", Station("\u738b", "4", "10", "1", min_images=20))
+    station = Station("\u738b", "4", "10", "1", max_uncertainty=0.02, min_images=20)
+    settings.set_station("2\u53f7", station)
     settings.set_last_station("2\u53f7")
     walker = open_wizard()
     left: dict[str, set[str]] = {}
@@ -241,9 +247,12 @@ def test_in_chinese_no_english_word_is_left(
         left.setdefault(key, set()).update(found)
 
     def read_and_go_on() -> None:
-        walker.until(walker.main_button().isEnabled)
+        button = walker.main_button()
+        walker.until(button.isEnabled)
         read()
-        walker.click_on(walker.main_button())
+        before = button.text()
+        walker.click_on(button)
+        walker.until(lambda: button.text() != before)
 
     for _ in ("start", "camera", "leds"):
         read_and_go_on()

@@ -44,7 +44,7 @@ class PivotFit:
     pivot_cam : (3,) array
         Point the tip rested on, in the camera frame, mm.
     covariance : (6, 6) array
-        Of (tip_pen, pivot_cam), mm^2.
+        Of (tip_pen, pivot_cam), mm^2, by noise that is independent from pose to pose.
     residuals : (N, 3) array
         Where each pose puts the tip, minus ``pivot_cam``, camera frame, mm.
     distances : (N,) array
@@ -72,6 +72,7 @@ def fit_pivot(
     covariances: FloatArray | None = None,
     *,
     robust: bool = True,
+    candidates: BoolArray | None = None,
 ) -> PivotFit:
     """Fit tip and pivot to poses by linear least squares.
 
@@ -87,6 +88,8 @@ def fit_pivot(
         Of each pose's (theta, dt) in rad and mm, see `lightpen.detection.pose`.
     robust : bool
         Leave out poses that do not agree with the pivot of the others.
+    candidates : (N,) array of bool, optional
+        Poses that may be used; all unless given.
 
     Raises
     ------
@@ -100,17 +103,18 @@ def fit_pivot(
     .. [2] P. J. Rousseeuw, "Least median of squares regression", J. American
        Statistical Association 79 (1984) 871-880.
     """
-    _require_number(len(rotations))
-    require_spread(rotations)
+    require_poses(rotations)
     equations = _Equations(rotations, translations, covariances)
-    everything = np.ones(len(rotations), dtype=bool)
+    if candidates is None:
+        candidates = np.ones(len(rotations), dtype=bool)
     if not robust:
-        return equations.fit(everything, everything)
-    used = equations.gate(_best_sample(equations), everything)
+        return equations.fit(candidates, candidates)
+    used = candidates & equations.gate(
+        _best_sample(equations.of(candidates)), candidates
+    )
     for _ in range(MAX_PASSES):
-        _require_number(int(used.sum()))
-        require_spread(rotations[used])
-        gated = equations.gate(equations.solve_weighted(used), used)
+        require_poses(rotations[used])
+        gated = candidates & equations.gate(equations.solve_weighted(used), used)
         if np.array_equal(gated, used):
             break
         used = gated
@@ -126,15 +130,22 @@ class _Equations:
     translations: FloatArray
     covariances: FloatArray | None
 
+    def of(self, chosen: BoolArray) -> "_Equations":
+        """Return the equations of the chosen poses."""
+        covariances = None if self.covariances is None else self.covariances[chosen]
+        return _Equations(
+            self.rotations[chosen], self.translations[chosen], covariances
+        )
+
     def fit(self, used: BoolArray, gated: BoolArray) -> PivotFit:
         """Solve over the used poses."""
         solution = self.solve_weighted(used)
         residuals = self.residuals(solution)
         distances = self.distances(solution)
         n_free = 3 * int(used.sum()) - 6
-        variance = float(np.sum(distances[used] ** 2)) / n_free
+        variance = max(float(np.sum(distances[used] ** 2)) / n_free, TINY**2)
         if self.covariances is None:
-            distances = distances / max(np.sqrt(variance), TINY)
+            distances = distances / np.sqrt(variance)
         else:
             variance = max(variance, 1.0)
         H, _ = self.normal_equations(used[None], solution[:3])
@@ -232,7 +243,7 @@ def in_deviations(residuals: FloatArray, covariances: FloatArray) -> FloatArray:
     ----------
     residuals : (N, 3) array
         mm.
-    covariances : (N, 3, 3) array
+    covariances : (N, 3, 3) array or (3, 3) array
         mm^2.
     """
     whitened = np.linalg.solve(covariances, residuals[..., None])[..., 0]
@@ -262,8 +273,39 @@ def tip_covariances(
     return result
 
 
-def _best_sample(equations: _Equations) -> FloatArray:
-    """Return the solution of the sample whose median distance is least."""
+def agreeing_solution(
+    rotations: FloatArray, translations: FloatArray, share: float
+) -> FloatArray:
+    """Return tip and pivot (6,), mm, on which a share of the poses agrees best.
+
+    All poses weigh the same: least trimmed squares by concentration [1]_.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses cam_from_pen, mm.
+
+    References
+    ----------
+    .. [1] P. J. Rousseeuw, K. Van Driessen, "Computing LTS regression for large data
+       sets", Data Mining and Knowledge Discovery 12 (2006) 29-45.
+    """
+    equations = _Equations(rotations, translations, None)
+    n_kept = int(np.ceil(share * len(rotations)))
+    solution = _best_sample(equations, share)
+    for _ in range(MAX_PASSES):
+        nearest = np.argsort(equations.distances(solution))[:n_kept]
+        kept = np.zeros(len(rotations), dtype=bool)
+        kept[nearest] = True
+        concentrated = equations.solve(kept[None])[0]
+        if np.array_equal(concentrated, solution):
+            break
+        solution = concentrated
+    return solution
+
+
+def _best_sample(equations: _Equations, share: float = 0.5) -> FloatArray:
+    """Return the solution of the sample to which a share of the poses is nearest."""
     n_poses = len(equations.rotations)
     rng = default_rng(0)  # the same poses give the same tip
     size = SAMPLE_SIZE if n_poses > FEW else int(np.ceil(SHARE_OF_FEW * n_poses))
@@ -273,11 +315,19 @@ def _best_sample(equations: _Equations) -> FloatArray:
     solutions = equations.solve(members)
     tips = np.einsum("nij,sj->sni", equations.rotations, solutions[:, :3])
     residuals = tips + equations.translations - solutions[:, None, 3:]
-    medians = np.median(np.linalg.norm(residuals, axis=2), axis=1)
-    return np.asarray(solutions[np.argmin(medians)])
+    reached = np.quantile(np.linalg.norm(residuals, axis=2), share, axis=1)
+    return np.asarray(solutions[np.argmin(reached)])
 
 
-def _require_number(n_poses: int) -> None:
+def require_poses(rotations: FloatArray) -> None:
+    """Refuse rotations (N, 3, 3) that are too few or turn too little to fix the tip.
+
+    Raises
+    ------
+    CalibrationError
+        Says what is missing.
+    """
+    n_poses = len(rotations)
     if n_poses < MIN_POSES:
         raise CalibrationError(
             sentence(
@@ -288,6 +338,7 @@ def _require_number(n_poses: int) -> None:
                 needed=MIN_POSES,
             )
         )
+    require_spread(rotations)
 
 
 def _require_steadiness(fit: PivotFit) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
 from lightpen.estimation.contradictions import COEFFICIENTS
-from lightpen.estimation.pivot import PivotFit
+from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
@@ -128,27 +128,46 @@ def calibration_record(
 
 
 def pivot_record(
-    fit: PivotFit, poses: InputFile, least_squares: bool
+    calibration: PivotCalibration, poses: InputFile, least_squares: bool
 ) -> dict[str, Any]:
     """Return the record of a pivot calibration; README.md documents its entries."""
-    uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(fit.covariance))
+    fit, groups = calibration.fit, calibration.groups
+    uncertainty = calibration.expanded_uncertainty
+    group = np.ones(len(fit.used), dtype=int) if groups is None else groups.group
     record = {
         "program": _program(),
         "created": datetime.now().astimezone().isoformat(timespec="seconds"),
         "method": "least squares" if least_squares else "robust",
         "tip_pen_mm": fit.tip_pen,
         "pivot_cam_mm": fit.pivot_cam,
-        "covariance": fit.covariance,
+        "covariance": calibration.covariance,
         "expanded_uncertainty_mm": uncertainty[:3],
         "pivot_expanded_uncertainty_mm": uncertainty[3:],
         "coverage_factor": COVERAGE_FACTOR,
+        "uncertainty": {
+            "covers": str(COVERED),
+            "leaves_out": str(NOT_COVERED),
+            "independent_noise": fit.covariance,
+            "correlation_factor": calibration.correlation_factor,
+        },
         "rms_mm": fit.rms,
+        "warnings": calibration.warnings,
         "poses": {"total": len(fit.used), "used": int(fit.used.sum())},
         "inputs": {"poses": _input(poses)},
         "frames": [
-            {"pose": i + 1, "used": used, "residual_mm": residual}
-            for i, (used, residual) in enumerate(
-                zip(fit.used.tolist(), fit.residuals.tolist(), strict=True)
+            {
+                "pose": i + 1,
+                "used": used,
+                "group": name or None,
+                "residual_mm": residual,
+            }
+            for i, (used, name, residual) in enumerate(
+                zip(
+                    fit.used.tolist(),
+                    group.tolist(),
+                    fit.residuals.tolist(),
+                    strict=True,
+                )
             )
         ],
     }

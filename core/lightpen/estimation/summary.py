@@ -4,7 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
-from lightpen.estimation.pivot import PivotFit
+from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.report import (
     METHODS,
     MethodResult,
@@ -50,9 +50,11 @@ def calibration_text(
     return "\n".join(lines)
 
 
-def pivot_text(fit: PivotFit) -> str:
+def pivot_text(calibration: PivotCalibration) -> str:
     """Return a pivot calibration as text for the screen."""
-    uncertainty = COVERAGE_FACTOR * np.sqrt(np.diag(fit.covariance))
+    fit, uncertainty = calibration.fit, calibration.expanded_uncertainty
+    factor = np.sqrt(calibration.correlation_factor)
+    warnings = map(str, calibration.warnings)
     return "\n".join(
         [
             _heading("Tip in the frame of the poses, mm", "xyz"),
@@ -65,6 +67,10 @@ def pivot_text(fit: PivotFit) -> str:
             "",
             f"Poses        {fit.used.sum()} of {len(fit.used)} used",
             f"Residuals    {fit.rms:.3f} mm rms an axis",
+            f"Correlation  U is {factor:.1f} times that of independent noise",
+            f"U covers     {COVERED}",
+            f"  leaves out {NOT_COVERED}",
+            *(["", *warnings] if calibration.warnings else []),
         ]
     )
 

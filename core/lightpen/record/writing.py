@@ -10,12 +10,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, strerror, sync_folder, write_whole
+from lightpen.formats.images import encode_png
 from lightpen.record.lock import lock_journal, unlock_journal
 from lightpen.record.reading import (
     FORMAT,
@@ -238,20 +238,6 @@ def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
             writer.put_back(back)
         for reason in sorted({taken_out[number] for number in out}):
             writer.take_out([n for n in out if taken_out[n] == reason], reason)
-
-
-def encode_png(image: Image) -> bytes:
-    """Return a grey image as PNG, made for dark images: runs of equal values.
-
-    No row is predicted from the last, which costs time and gains nothing on noise.
-    """
-    options = [
-        *(cv2.IMWRITE_PNG_COMPRESSION, 1),
-        *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
-    ]
-    if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.12 and later
-        options += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
-    return cv2.imencode(".png", image, options)[1].tobytes()
 
 
 def _own_journal(folder: Path, length: int) -> FileIO:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import cv2
 import numpy as np
 
-from lightpen.arrays import FloatArray, Image
+from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.files import strerror, write_whole
+from lightpen.formats.images import encode_png
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
@@ -81,7 +81,7 @@ def write_scene(
     with ThreadPoolExecutor(N_THREADS) as pool:
         encoded = _in_order(
             pool,
-            lambda image_plan: _png(render_plan(scene, image_plan)),
+            lambda image_plan: encode_png(render_plan(scene, image_plan)),
             plan.image_plans,
         )
         for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
@@ -206,11 +206,6 @@ def _in_order(
     finally:
         for future in ahead:
             future.cancel()
-
-
-def _png(image: Image) -> bytes:
-    _, data = cv2.imencode(".png", image)
-    return data.tobytes()
 
 
 def _pen_truth(plan: ScenePlan) -> Json:

@@ -236,6 +236,23 @@ def slip_tip(
     )
 
 
+def correlated_noise(
+    n_frames: int, correlation: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return noise (F, 3) of unit variance that hangs together from frame to frame.
+
+    Parameters
+    ----------
+    correlation : float
+        Of neighbouring frames; that of others falls off by its powers.
+    """
+    noise = rng.standard_normal((n_frames, 3))
+    fresh = np.sqrt(1 - correlation**2)
+    for i in range(1, n_frames):
+        noise[i] = correlation * noise[i - 1] + fresh * noise[i]
+    return noise
+
+
 def simulate_centers(
     camera: Camera,
     pen: Pen,

@@ -2235,12 +2235,20 @@
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
     </message>
     <message>
+        <source>All of them were taken, so the tip lies between both.</source>
+        <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
+    </message>
+    <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
         <translation>另一个程序正在写入 {folder} 中的摆动。请在那里继续，或关闭该程序后重试。</translation>
     </message>
     <message>
         <source>Another program uses the simulated camera {serial}. Close that program, or wait a few seconds.</source>
         <translation>另一个程序正在使用模拟相机 {serial}。请关闭该程序，或稍等几秒。</translation>
+    </message>
+    <message>
+        <source>Calibrate each of both from a file of its own.</source>
+        <translation>请将两组分别存为文件，各自校准。</translation>
     </message>
     <message>
         <source>Capture more images.</source>
@@ -2667,6 +2675,14 @@
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
     </message>
     <message>
+        <source>The poses are of two tips, {distance:.2f} mm apart in the pen, as if the tip had been exchanged or had slipped in its holder. One: poses {first}. The other: poses {second}. {consequence}</source>
+        <translation>这些位姿属于两个测头，在光笔上相距 {distance:.2f} mm，似乎测头被更换过，或在夹持处松动移位。一组：位姿 {first}。另一组：位姿 {second}。{consequence}</translation>
+    </message>
+    <message>
+        <source>The poses have no tip in common: the best one scatters by {scatter:.0f} mm, while the poses themselves are {movement:.0f} mm apart. Check that they are of one pen that was swung on its tip, as cam_from_pen, and that rotations and translations belong together.</source>
+        <translation>这些位姿没有共同的测头：最佳结果的散布为 {scatter:.0f} mm，而位姿本身彼此相距 {movement:.0f} mm。请检查：位姿是否来自同一支绕测头摆动的光笔，是否以 cam_from_pen 给出，旋转与平移是否对应。</translation>
+    </message>
+    <message>
         <source>The program made a mistake of its own and looks at no more images. Open the camera again.</source>
         <translation>程序自身出错，不再查看图像。请重新打开相机。</translation>
     </message>
@@ -2699,8 +2715,20 @@
         <translation>结果 {file} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请使用该版本，或移走该文件后不用它继续。</translation>
     </message>
     <message>
+        <source>The rotations look as if they were made of quaternions read in the wrong order (w x y z or x y z w): as they are read the poses scatter by {as_read:.3g} mm about one tip, in the other order by {undone:.3g} mm. Convert them again with the scalar in its place.</source>
+        <translation>旋转似乎由四元数按错误的顺序（w x y z 或 x y z w）换算而来：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，改用另一顺序则为 {undone:.3g} mm。请将标量放在正确的位置后重新换算。</translation>
+    </message>
+    <message>
+        <source>The rotations look transposed: as they are read the poses scatter by {as_read:.3g} mm about one tip, transposed by {undone:.3g} mm. Give r11 to r33 row by row, and both rotation and translation of cam_from_pen.</source>
+        <translation>旋转矩阵似乎被转置：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，转置后为 {undone:.3g} mm。请按行给出 r11 至 r33，且旋转与平移均为 cam_from_pen。</translation>
+    </message>
+    <message>
         <source>The settings cannot be saved: {file} cannot be written. Make sure that its folder is yours to write and that the disk is not full.</source>
         <translation>设置无法保存：无法写入 {file}。请确认您有该文件夹的写入权限，且磁盘未满。</translation>
+    </message>
+    <message>
+        <source>The sign of t{axis} looks wrong: as they are read the poses scatter by {as_read:.3g} mm about one tip, with the other sign by {undone:.3g} mm. Give rotations and translations in the same right-handed frame.</source>
+        <translation>t{axis} 的符号似乎有误：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，改变符号后为 {undone:.3g} mm。请在同一右手坐标系中给出旋转和平移。</translation>
     </message>
     <message>
         <source>The simulated camera has no pixel format {wanted}; it has {offered}. Choose one of these.</source>
@@ -2743,8 +2771,28 @@
         <translation>正在计算测头。可以放下光笔。</translation>
     </message>
     <message>
+        <source>The tip is that of the first, which are more.</source>
+        <translation>所得测头属于位姿较多的前一组。</translation>
+    </message>
+    <message>
+        <source>The tip rested on two points, {distance:.2f} mm apart, as if cone or tracker had moved. On one: poses {first}. On the other: poses {second}. {consequence}</source>
+        <translation>测头曾停在两个点上，相距 {distance:.2f} mm，似乎锥孔或跟踪仪移动过。一个点：位姿 {first}。另一个点：位姿 {second}。{consequence}</translation>
+    </message>
+    <message>
         <source>The tip rests in the cone. Keep it pressed in.</source>
         <translation>测头已在锥孔中。请保持压紧。</translation>
+    </message>
+    <message>
+        <source>The tip would be {length:.0f} m from the origin of the pen. Millimetres are needed: check the units of tx, ty and tz.</source>
+        <translation>测头距光笔原点竟有 {length:.0f} m。长度需以毫米为单位：请检查 tx、ty、tz 的单位。</translation>
+    </message>
+    <message>
+        <source>The tip would be {tip:.0f} mm from the origin of the pen, farther than the pivot from that of the camera ({pivot:.0f} mm). Inverted poses give this: if they are pen_from_cam, tip and pivot have to change places.</source>
+        <translation>测头距光笔原点 {tip:.0f} mm，比支点距相机原点（{pivot:.0f} mm）更远。位姿求逆后正是如此：如果给出的是 pen_from_cam，则测头与支点应互换。</translation>
+    </message>
+    <message>
+        <source>The translations look like metres: as millimetres they are only {typical:.3f} mm long (median). Millimetres are needed: multiply tx, ty and tz by 1000.</source>
+        <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
     </message>
     <message>
         <source>The video {path} cannot be opened, or holds no frames. Check that it plays, or save its frames as images.</source>
@@ -3015,6 +3063,10 @@
         <translation>光笔的 {axis} 轴</translation>
     </message>
     <message>
+        <source>the scatter of the poses, and that it hangs together from pose to pose</source>
+        <translation>位姿的散布，以及相邻位姿之间的相关性</translation>
+    </message>
+    <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
         <translation>平移超过 {most:g} m。请检查单位：需要毫米。</translation>
     </message>
@@ -3065,6 +3117,10 @@
     <message>
         <source>unreadable</source>
         <translation>无法读取</translation>
+    </message>
+    <message>
+        <source>what stays the same in all poses: the scale of the tracker and of the pen, a tip that is worn or does not seat</source>
+        <translation>在所有位姿中保持不变的误差：跟踪仪和光笔的尺度、测头磨损或未就位</translation>
     </message>
     <message>
         <source>wrong size</source>
@@ -3157,6 +3213,10 @@
     <message>
         <source>{n_images} {reason}</source>
         <translation>{reason} {n_images} 幅</translation>
+    </message>
+    <message>
+        <source>{n_left_out} of {n_poses} poses agree with no common tip and were left out: {poses}. Look for what disturbed the tracking.</source>
+        <translation>{n_poses} 个位姿中有 {n_left_out} 个与共同的测头不符，已剔除：{poses}。请查找干扰跟踪的原因。</translation>
     </message>
     <message>
         <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>

@@ -15,9 +15,9 @@ from typing_extensions import override
 from lightpen.cameras.protocol import CameraSettings, Frame
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import Connection
+from lightpen.formats.images import encode_png
 from lightpen.live.sources import Surroundings
 from lightpen.record.reading import open_record
-from lightpen.record.writing import encode_png
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
 from lightpen.swing.preparation import Preparation

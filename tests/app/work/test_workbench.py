@@ -13,11 +13,11 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.formats.camera_files import read_camera
+from lightpen.formats.images import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
-from lightpen.record.writing import encode_png
 from lightpen.swing.preparation import Lack, Preparation, SourceChoice, SourceKind
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.workbench import SAMPLES, Workbench

@@ -10,7 +10,7 @@ import pytest
 
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.report import (
     calibration_record,
     json_bytes,
@@ -230,9 +230,9 @@ def test_large_residuals_are_warned_of() -> None:
 def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     swing = swing_poses(30, np.random.default_rng(1))
     noise = 0.1 * np.random.default_rng(2).standard_normal((30, 3))
-    fit = fit_pivot(swing.rotations, swing.translations + noise)
+    calibration = calibrate_pivot(swing.rotations, swing.translations + noise)
 
-    found = json.loads(json_bytes(pivot_record(fit, FILE, least_squares=False)))
+    found = json.loads(json_bytes(pivot_record(calibration, FILE, least_squares=False)))
 
     np.testing.assert_allclose(found["tip_pen_mm"], swing.tip_pen, atol=0.5)
     uncertainty = 2 * np.sqrt(np.diag(found["covariance"]))
@@ -240,4 +240,9 @@ def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     np.testing.assert_allclose(found["pivot_expanded_uncertainty_mm"], uncertainty[3:])
     assert found["poses"] == {"total": 30, "used": 30}
     assert len(found["frames"]) == 30
-    assert "30 of 30 used" in pivot_text(fit)
+    assert {frame["group"] for frame in found["frames"]} == {1}
+    assert found["warnings"] == []
+    text = pivot_text(calibration)
+    assert "30 of 30 used" in text
+    assert found["uncertainty"]["covers"] in text
+    assert found["uncertainty"]["leaves_out"] in text

@@ -12,7 +12,7 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.images import decode_image, find_images, read_image
+from lightpen.formats.images import decode_image, encode_png, find_images, read_image
 
 RNG = np.random.default_rng(0)
 GREY = RNG.integers(0, 255, (48, 64), dtype=np.uint8)
@@ -55,6 +55,13 @@ def test_a_pattern_gives_the_matching_images(folder: Path) -> None:
     source = find_images(str(folder / "frame_1*.png"))
 
     assert source.names == ("frame_1.png", "frame_10.png")
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_images_are_stored_without_loss(kind: type[np.uint8]) -> None:
+    rng = np.random.default_rng(1)
+    image = rng.integers(0, np.iinfo(kind).max, (33, 47), dtype=kind)
+    np.testing.assert_array_equal(decode_image(encode_png(image), "image"), image)
 
 
 def test_sixteen_bits_are_kept() -> None:

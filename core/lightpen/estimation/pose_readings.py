@@ -1,0 +1,207 @@
+"""Whether poses were written as they are read: frames, order of numbers, units.
+
+Poses in another convention are rotations and translations, too, and may even fit a tip
+badly. Only the scatter tells: each usual mistake is undone in turn, and one that brings
+the poses much closer to a common tip is what happened.
+
+Inverted poses are the exception. They fit as well, since ``R tip + t = pivot`` also
+reads ``R^T pivot - R^T t = tip``: tip and pivot change places. Only a tip farther from
+its pen than from the camera gives them away, which may be true: that is told, not
+refused.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot import agreeing_solution, contact_residuals
+from lightpen.sentences import Sentence, sentence
+
+Poses: TypeAlias = tuple[FloatArray, FloatArray]
+
+MUCH_CLOSER = 0.6  # of the scatter as read
+ROUNDING = 1e-6  # of the length of the translations: exact poses scatter by it
+AGREEING = 0.5  # of the poses, at least
+FEW = 20  # poses, of which half would agree with anything
+AGREEING_OF_FEW = 0.9
+MAX_LOOKED_AT = 200  # poses; a convention is that of all of them
+SHORT = 10.0  # mm; no tracked pen is that close to its tracker in most poses
+LONG = 10_000.0  # mm; no pen is that long
+MAX_SCATTER = 20.0  # mm; no tip rests so badly
+USUAL_SCATTER = 5.0  # mm; more is no noise if the poses move by little more
+MAX_SHARE = 0.4  # of the movement of the poses, that a tip leaves over
+
+
+@dataclass(frozen=True)
+class _Mistake:
+    """A usual mistake: how it is undone, and what is said of it."""
+
+    undo: Callable[[FloatArray, FloatArray], Poses]
+    said: Callable[[float, float], Sentence]
+
+
+def require_usual_reading(rotations: FloatArray, translations: FloatArray) -> None:
+    """Refuse poses in another convention or unit, and poses that have no tip.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Poses as they were read, cam_from_pen, mm.
+
+    Raises
+    ------
+    CalibrationError
+        Says what they look like, and what is needed.
+    """
+    typical = float(np.median(np.linalg.norm(translations, axis=1)))
+    if typical < SHORT:
+        raise CalibrationError(
+            sentence(
+                "poses.in-metres",
+                "The translations look like metres: as millimetres they are only "
+                "{typical:.3f} mm long (median). Millimetres are needed: multiply tx, "
+                "ty and tz by 1000.",
+                typical=typical,
+            )
+        )
+    chosen = np.unique(
+        np.linspace(0, len(rotations) - 1, MAX_LOOKED_AT).round().astype(int)
+    )
+    R, t = rotations[chosen], translations[chosen]
+    as_read = _scatter(R, t)
+    undone = [_scatter(*mistake.undo(R, t)) for mistake in _MISTAKES]
+    likeliest = int(np.argmin(undone))
+    closer = undone[likeliest] < MUCH_CLOSER * as_read
+    if closer and as_read > ROUNDING * typical:
+        raise CalibrationError(_MISTAKES[likeliest].said(as_read, undone[likeliest]))
+    _require_tip(R, t, as_read)
+
+
+def is_likely_inverted(tip_pen: FloatArray, pivot_cam: FloatArray) -> bool:
+    """Return whether a tip is farther from its pen than from the camera."""
+    return bool(np.linalg.norm(tip_pen) > np.linalg.norm(pivot_cam))
+
+
+def _require_tip(R: FloatArray, t: FloatArray, scatter: float) -> None:
+    length = float(np.linalg.norm(_solution(R, t)[:3]))
+    if length > LONG:
+        raise CalibrationError(
+            sentence(
+                "poses.in-micrometres",
+                "The tip would be {length:.0f} m from the origin of the pen. "
+                "Millimetres are needed: check the units of tx, ty and tz.",
+                length=length / 1000,
+            )
+        )
+    movement = float(np.median(np.linalg.norm(t - np.median(t, axis=0), axis=1)))
+    unexplained = scatter > USUAL_SCATTER and scatter > MAX_SHARE * movement
+    if scatter > MAX_SCATTER or unexplained:
+        raise CalibrationError(
+            sentence(
+                "poses.no-tip",
+                "The poses have no tip in common: the best one scatters by "
+                "{scatter:.0f} mm, while the poses themselves are {movement:.0f} mm "
+                "apart. Check that they are of one pen that was swung on its tip, as "
+                "cam_from_pen, and that rotations and translations belong together.",
+                scatter=scatter,
+                movement=movement,
+            )
+        )
+
+
+def _scatter(rotations: FloatArray, translations: FloatArray) -> float:
+    """Return the median distance of the poses' tips from their pivot, mm."""
+    solution = _solution(rotations, translations)
+    residuals = contact_residuals(rotations, translations, solution[:3], solution[3:])
+    return float(np.median(np.linalg.norm(residuals, axis=1)))
+
+
+def _solution(rotations: FloatArray, translations: FloatArray) -> FloatArray:
+    share = AGREEING_OF_FEW if len(rotations) <= FEW else AGREEING
+    return agreeing_solution(rotations, translations, share)
+
+
+def _transposed(rotations: FloatArray) -> FloatArray:
+    return np.swapaxes(rotations, 1, 2)
+
+
+def _with_scalar_moved(rotations: FloatArray, places: int) -> FloatArray:
+    """Return rotations whose quaternions had their scalar at the wrong end."""
+    return _rotations(np.roll(_quaternions(rotations), places, axis=1))
+
+
+def _quaternions(rotations: FloatArray) -> FloatArray:
+    """Return unit quaternions (N, 4), the scalar first, of either sign."""
+    R = rotations
+    # 4 q q^T, of which the longest row gives q without loss of digits.
+    outer = np.empty((len(R), 4, 4))
+    trace = np.trace(R, axis1=1, axis2=2)
+    outer[:, 0, 0] = 1 + trace
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        outer[:, i + 1, i + 1] = 1 - trace + 2 * R[:, i, i]
+        outer[:, 0, i + 1] = outer[:, i + 1, 0] = R[:, k, j] - R[:, j, k]
+        outer[:, j + 1, k + 1] = outer[:, k + 1, j + 1] = R[:, j, k] + R[:, k, j]
+    largest = np.argmax(np.diagonal(outer, axis1=1, axis2=2), axis=1)
+    rows = outer[np.arange(len(R)), largest]
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+
+
+def _rotations(quaternions: FloatArray) -> FloatArray:
+    """Return the rotations (N, 3, 3) of unit quaternions (N, 4), the scalar first."""
+    w, x, y, z = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _flipped(axis: int) -> _Mistake:
+    return _Mistake(
+        lambda R, t: (R, t * np.where(np.arange(3) == axis, -1.0, 1.0)),
+        lambda as_read, undone: sentence(
+            "poses.flipped",
+            "The sign of t{axis} looks wrong: as they are read the poses scatter by "
+            "{as_read:.3g} mm about one tip, with the other sign by {undone:.3g} mm. "
+            "Give rotations and translations in the same right-handed frame.",
+            axis="xyz"[axis],
+            as_read=as_read,
+            undone=undone,
+        ),
+    )
+
+
+def _said_of_quaternions(as_read: float, undone: float) -> Sentence:
+    return sentence(
+        "poses.quaternion-order",
+        "The rotations look as if they were made of quaternions read in the wrong "
+        "order (w x y z or x y z w): as they are read the poses scatter by "
+        "{as_read:.3g} mm about one tip, in the other order by {undone:.3g} mm. "
+        "Convert them again with the scalar in its place.",
+        as_read=as_read,
+        undone=undone,
+    )
+
+
+_MISTAKES = (
+    _Mistake(
+        lambda R, t: (_transposed(R), t),
+        lambda as_read, undone: sentence(
+            "poses.transposed",
+            "The rotations look transposed: as they are read the poses scatter by "
+            "{as_read:.3g} mm about one tip, transposed by {undone:.3g} mm. Give r11 "
+            "to r33 row by row, and both rotation and translation of cam_from_pen.",
+            as_read=as_read,
+            undone=undone,
+        ),
+    ),
+    _Mistake(lambda R, t: (_with_scalar_moved(R, 1), t), _said_of_quaternions),
+    _Mistake(lambda R, t: (_with_scalar_moved(R, -1), t), _said_of_quaternions),
+    *(_flipped(axis) for axis in range(3)),
+)

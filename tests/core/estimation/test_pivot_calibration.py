@@ -1,0 +1,120 @@
+"""A pivot calibration tells what the poses leave in doubt."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.pivot_calibration import calibrate_pivot
+from lightpen.formats.observation_files import read_poses
+from lightpen.simulator.swings import correlated_noise, swing_poses
+
+N_POSES = 200
+
+
+def poses(correlation: float = 0.0, seed: int = 0) -> tuple[FloatArray, FloatArray]:
+    """Return poses of an operator's swing with noise of 0.3 mm."""
+    rng = np.random.default_rng(seed)
+    swing = swing_poses(N_POSES, rng, "operator")
+    noise = 0.3 * correlated_noise(N_POSES, correlation, rng)
+    return swing.rotations, swing.translations + noise
+
+
+def with_other_pivot(others: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Return poses of which some rest 5 mm beside."""
+    R, t = poses()
+    return R, t + others[:, None] * [5.0, 0.0, 0.0]
+
+
+def test_drifting_poses_leave_more_doubt_than_independent_ones() -> None:
+    white, drifting = calibrate_pivot(*poses()), calibrate_pivot(*poses(0.95))
+
+    assert white.correlation_factor == pytest.approx(1.0, abs=0.5)
+    assert drifting.correlation_factor > 5
+
+
+def test_exact_poses_give_the_exact_tip() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+
+    found = calibrate_pivot(swing.rotations, swing.translations)
+
+    np.testing.assert_allclose(found.fit.tip_pen, swing.tip_pen, atol=1e-8)
+    assert found.expanded_uncertainty.max() < 1e-8
+    assert not found.warnings
+
+
+def test_quarters_of_a_real_tracker_agree_with_the_whole_by_their_uncertainty(
+    shared_data: Path,
+) -> None:
+    table = read_poses(shared_data / "pivot-poses" / "optical-tracker.csv")
+    R, t = table.rotations, table.translations
+    whole = calibrate_pivot(R, t).fit.tip_pen
+    for part in np.array_split(np.arange(len(R)), 4):
+        quarter = calibrate_pivot(R[part], t[part])
+        away = np.abs(quarter.fit.tip_pen - whole)
+        assert np.all(away < 2 * quarter.expanded_uncertainty[:3])
+        assert quarter.groups is None
+
+
+def test_a_minority_elsewhere_is_left_out_and_named() -> None:
+    others = np.arange(N_POSES) >= 150
+    found = calibrate_pivot(*with_other_pivot(others))
+
+    assert not found.fit.used[others].any()
+    assert found.fit.used[~others].all()
+    (warning,) = found.warnings
+    assert "On one: poses 1-150. On the other: poses 151-200." in str(warning)
+
+
+def test_all_poses_alike_are_taken_with_a_warning() -> None:
+    others = np.arange(N_POSES) >= 100
+    found = calibrate_pivot(*with_other_pivot(others), robust=False)
+
+    assert found.fit.used.all()
+    (warning,) = found.warnings
+    assert "the tip lies between both" in str(warning)
+
+
+def test_two_equal_groups_are_refused_with_all_their_poses() -> None:
+    others = np.arange(N_POSES) % 2 == 1
+    with pytest.raises(CalibrationError, match="rested on two points") as caught:
+        calibrate_pivot(*with_other_pivot(others))
+
+    assert ", 195, 197, 199." in str(caught.value)
+    assert "..." not in str(caught.value)
+
+
+def test_scattered_outliers_are_named() -> None:
+    R, t = poses()
+    rng = np.random.default_rng(1)
+    t[10:40] += rng.uniform(20, 200, (30, 3)) * rng.choice([-1.0, 1.0], (30, 3))
+
+    (warning,) = calibrate_pivot(R, t).warnings
+
+    assert "30 of 200 poses agree with no common tip" in str(warning)
+    assert "11-40" in str(warning)
+
+
+def test_inverted_poses_are_told() -> None:
+    R, t = poses()
+    inverse = np.swapaxes(R, 1, 2)
+
+    (warning,) = calibrate_pivot(inverse, -np.einsum("nij,nj->ni", inverse, t)).warnings
+
+    assert "Inverted poses give this" in str(warning)
+
+
+def test_stated_covariances_are_a_floor_to_the_uncertainty() -> None:
+    R, t = poses()
+    covariances = np.zeros((N_POSES, 6, 6))
+    covariances[:, :3, :3] = 1e-12 * np.eye(3)
+    covariances[:, 3:, 3:] = 0.3**2 * np.eye(3)
+
+    honest = calibrate_pivot(R, t, covariances)
+    cautious = calibrate_pivot(R, t, 100 * covariances)
+
+    ratio = cautious.expanded_uncertainty / honest.expanded_uncertainty
+    # Those of the honest one are raised a little by what its scatter leaves open.
+    assert np.all((ratio > 7) & (ratio < 11))
