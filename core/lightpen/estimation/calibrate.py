@@ -14,10 +14,10 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.bundle import Bundle, fit_bundle
 from lightpen.estimation.contradictions import Contradiction, find_contradictions
-from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.joint import JointFit, fit_joint, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
 from lightpen.estimation.linearised import State
+from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.priors import Priors, priors_of
 from lightpen.estimation.two_stage import (

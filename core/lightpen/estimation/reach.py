@@ -13,6 +13,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import State, eliminate, views_at
 from lightpen.estimation.priors import priors_of
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.unknowns import FORMS, NONE, Components, Unknowns, inverse
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
@@ -41,28 +42,32 @@ class Reach:
     n_images: int
     n_whole: int
 
-    def covariance(
-        self, camera: Camera, pen: Pen, sigma: float, times: float = 1.0
-    ) -> FloatArray:
-        """Return the covariance of tip and cone, (6, 6), mm^2.
+    def uncertainties(
+        self, camera: Camera, pen: Pen, sigma: float
+    ) -> tuple[float, float]:
+        """Return U (k = 2) of the tip along its weakest direction, mm, and its floor.
+
+        The floor is what more images of this kind cannot bring it below.
 
         Parameters
         ----------
         sigma : float
             Noise of one image coordinate, px.
-        times : float
-            So many times as many images.
         """
         rig = rig_of(camera)
         state = State(rig, pen, np.zeros(3), np.zeros(3), np.empty((0, 3, 3)))
-        priors = priors_of(rig, pen, USUAL)
-        unknowns = Unknowns.of(state, priors, np.empty((0, sum(FORMS))))
+        lean = np.empty((0, sum(FORMS)))
+        unknowns = Unknowns.of(state, priors_of(rig, pen, USUAL), lean)
+        none = Components(NONE, (NONE,) * len(FORMS), NONE, None)
         mixing = unknowns.mixing
         n = mixing.shape[1]
-        known = mixing.T @ self.information @ mixing * (times / sigma**2)
-        none = Components(NONE, (NONE,) * len(FORMS), NONE, None)
         prior = unknowns.prior_information(none)[:n, :n]
-        return np.asarray(inverse(known + prior)[:6, :6])
+        known = mixing.T @ self.information @ mixing / sigma**2
+        now, at_last = (
+            float(np.linalg.eigvalsh(inverse(times * known + prior)[:3, :3])[-1])
+            for times in (1.0, ENDLESS)
+        )
+        return COVERAGE_FACTOR * np.sqrt(now), COVERAGE_FACTOR * np.sqrt(at_last)
 
 
 def reach_of(

@@ -20,8 +20,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Z_99, Bundle
-from lightpen.estimation.noise_correlation import Correlation
 from lightpen.estimation.joint import JointFit
+from lightpen.estimation.noise_correlation import Correlation
 from lightpen.estimation.priors import Priors
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty

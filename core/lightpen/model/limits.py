@@ -13,8 +13,8 @@ class SwingLimits:
     ----------
     max_uncertainty : float
         U (k = 2) of the tip along its weakest direction, mm. A station with a camera
-        calibrated on 24 views of a board, LEDs measured to 3 um and 100 images
-        reaches 0.008.
+        calibrated on 24 views of a board, LEDs measured to 2 um and 100 images with
+        0.03 px of noise reaches it.
     min_per_field : int
         Images in each field of the dial.
     spacing : float

@@ -10,8 +10,7 @@ from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
-from lightpen.estimation.reach import ENDLESS, Reach, reach_of
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.reach import Reach, reach_of
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
@@ -204,21 +203,15 @@ def _refit(
         return replace(kept, seat=seat)
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
-    sigma = max(joint.sigma, NO_NOISE)
+    uncertainty, floor = reach.uncertainties(camera, pen, max(joint.sigma, NO_NOISE))
     return replace(
         kept,
         seat=fitted,
         joint=joint,
         reach=reach,
-        uncertainty=_weakest(reach.covariance(camera, pen, sigma)),
-        floor=_weakest(reach.covariance(camera, pen, sigma, ENDLESS)),
+        uncertainty=uncertainty,
+        floor=floor,
     )
-
-
-def _weakest(covariance: FloatArray) -> float:
-    """Return U (k = 2) of the tip along its weakest direction, mm."""
-    variance = np.linalg.eigvalsh(covariance[:3, :3])[-1]
-    return COVERAGE_FACTOR * float(np.sqrt(variance))
 
 
 def distance_unit(kept: KeptImages) -> float:

@@ -63,6 +63,10 @@ from lightpen.swing.state import (
 PERIOD = 0.1  # s, twice the usual one: what is decided takes longer than either
 
 
+# With these files any U can be reached.
+EXACT_PEN = replace(paper_pen(), scale_sigma=1e-9, diameter_sigma=1e-6)
+
+
 class Station:
     """A simulated operator before a camera of which only the LED centres are used."""
 
@@ -504,7 +508,7 @@ def test_finishing_early_says_what_is_missing() -> None:
     bare = np.flatnonzero((station.state.counts[1:] < 2).any(axis=0))
     said = missing(station.setup, station.state)
     assert too_few_images(station.state.n_kept, 60) in said
-    assert uncertain(station.state.kept.uncertainty, 0.005) in said
+    assert uncertain(station.state.kept.uncertainty, 0.01) in said
     assert too_little_tilt(n_images, bare.tolist()) in said
 
     transition = finish(station.state)
@@ -514,7 +518,7 @@ def test_finishing_early_says_what_is_missing() -> None:
 
 def test_the_ceiling_ends_a_swing_that_is_not_good_enough() -> None:
     limits = SwingLimits(max_uncertainty=1e-4, max_images=70)
-    station = Station(limits=limits)
+    station = Station(limits=limits, pen=EXACT_PEN)
     station.operator.seat()
     station.run(120.0, until=Phase.SOLVING)
     assert station.state.n_kept == 70

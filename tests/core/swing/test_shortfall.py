@@ -37,6 +37,10 @@ from lightpen.swing.state import (
 CAMERA, PEN = paper_camera(), paper_pen()
 
 
+# With these files any U can be reached.
+EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6)
+
+
 def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
     """Return a swing that has kept these postures."""
     pixels = simulate_centers(
@@ -44,7 +48,7 @@ def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
         np.random.default_rng(1),
     )
     kept = kept_before(
-        *(CAMERA, PEN, np.arange(len(swing)), pixels),
+        *(setup.camera, setup.pen, np.arange(len(swing)), pixels),
         *(swing.rotations, swing.translations),
     )
     return replace(start_swing(setup), kept=kept)
@@ -62,7 +66,8 @@ def to_the_right(n: int) -> Swing:
 
 
 def test_the_estimate_of_images_to_come_holds() -> None:
-    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.005))
+    limits = SwingLimits(max_uncertainty=0.005)
+    setup = SwingSetup(CAMERA, EXACT_PEN, limits)
     swing = swing_poses(400, np.random.default_rng(0))
     early = swing_poses(60, np.random.default_rng(0))
     n_needed = 60 + measure_shortfall(setup, state_of(setup, early)).n_for_uncertainty
@@ -75,8 +80,18 @@ def test_no_more_images_are_announced_than_the_limit_allows() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
     for max_images, n_more in ((70, 10), (60, 0), (50, 0)):
         limits = SwingLimits(max_uncertainty=1e-4, max_images=max_images)
-        setup = SwingSetup(CAMERA, PEN, limits)
+        setup = SwingSetup(CAMERA, EXACT_PEN, limits)
         assert measure_shortfall(setup, state_of(setup, swing)).n_more == n_more
+
+
+def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    vague = replace(PEN, scale_sigma=1e-3)
+    setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
+    state = state_of(setup, swing)
+
+    assert state.kept.floor > 0.02
+    assert measure_shortfall(setup, state).n_for_uncertainty == 0
 
 
 def test_fields_that_the_camera_cannot_see_are_not_asked_for() -> None:
