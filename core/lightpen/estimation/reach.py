@@ -6,6 +6,7 @@ leave open belongs to the uncertainty all the same: it is that of the bundle adj
 """
 
 from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class Reach:
             float(np.linalg.eigvalsh(inverse(times * known + prior)[:3, :3])[-1])
             for times in (1.0, ENDLESS)
         )
-        return COVERAGE_FACTOR * np.sqrt(now), COVERAGE_FACTOR * np.sqrt(at_last)
+        return COVERAGE_FACTOR * sqrt(now), COVERAGE_FACTOR * sqrt(at_last)
 
 
 def reach_of(

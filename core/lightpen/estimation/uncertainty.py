@@ -2,9 +2,9 @@
 
 The bundle adjustment states the covariance that noise and every prior leave, as the GUM
 [2]_ combines independent components. Real residuals hang together from image to image:
-their autocorrelation (`lightpen.estimation.noise_correlation`) and the scatter between blocks
-of consecutive images (cluster-robust, [1]_) tell by how much that raises the share of
-noise; the larger one counts, where it is significant.
+their autocorrelation (`lightpen.estimation.noise_correlation`) and the scatter between
+blocks of consecutive images (cluster-robust, [1]_) tell by how much that raises the
+share of noise; the larger one counts, where it is significant.
 
 References
 ----------

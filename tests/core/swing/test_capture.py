@@ -163,12 +163,10 @@ def test_the_record_gives_the_same_tip_to_the_last_digit(wizard: Wizard) -> None
     for record in records:
         record.pop("created")
     assert records[0] == records[1]
-    # What was shown during the swing is that tip, but for the LED geometry and the
-    # order in which the iterations came to it.
+    # What was shown during the swing is that tip, but for what the files have wrong.
     assert wizard.state.kept.seat is not None
-    np.testing.assert_allclose(
-        wizard.state.kept.seat.tip_pen, first.joint.tip_pen, atol=1e-3
-    )
+    change = np.abs(wizard.state.kept.seat.tip_pen - first.joint.tip_pen)
+    assert (change < first.budget.expanded_uncertainty[:3]).all()
     assert np.abs(first.joint.tip_pen - PAPER_TIP).max() < 0.02
 
 
