@@ -2146,16 +2146,8 @@
         <translation>远离相机</translation>
     </message>
     <message>
-        <source>noise</source>
-        <translation>噪声</translation>
-    </message>
-    <message>
-        <source>LEDs</source>
-        <translation>LED</translation>
-    </message>
-    <message>
-        <source>camera</source>
-        <translation>相机</translation>
+        <source>* assumed: the file tells no uncertainty.</source>
+        <translation>* 假定值：文件未给出不确定度。</translation>
     </message>
     <message>
         <source>all</source>
@@ -2164,10 +2156,6 @@
     <message>
         <source>Weakest direction ({0}): U = {1} µm.</source>
         <translation>最弱方向 ({0})：U = {1} µm。</translation>
-    </message>
-    <message>
-        <source>The intrinsics file tells no uncertainty.</source>
-        <translation>内参文件未给出不确定度。</translation>
     </message>
     <message>
         <source>Images hang together: their noise counts {0} times (variance).</source>
@@ -2587,6 +2575,10 @@
         <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
     </message>
     <message>
+        <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
+        <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm。请将两者夹紧，待相机预热后重做。该影响已计入不确定度。</translation>
+    </message>
+    <message>
         <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
         <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
     </message>
@@ -2621,6 +2613,14 @@
     <message>
         <source>The folder {folder} is not empty. Choose another for this swing; nothing is overwritten.</source>
         <translation>文件夹 {folder} 不是空的。请为本次摆动选择其他文件夹；不会覆盖任何内容。</translation>
+    </message>
+    <message>
+        <source>The images contradict the LED file: its coordinates are off by {found:.4f} mm (standard deviation), the file states {stated:.4f} mm. Measure the pen again, or check that the file is of this pen.</source>
+        <translation>图像与 LED 文件不符：其坐标偏差为 {found:.4f} mm（标准差），文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
+    </message>
+    <message>
+        <source>The images contradict the camera file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与内参文件不符：按图像，{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
     </message>
     <message>
         <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
@@ -2699,8 +2699,12 @@
         <translation>录制的图像为 {found}，而不是 {wanted}。请选择 {found}。</translation>
     </message>
     <message>
-        <source>The residuals are large: {sigma:.2f} px, {usual} px or less is usual. Check that the camera file is of this camera, lens and focus, and the pen file of this pen: the uncertainty does not cover a wrong file.</source>
-        <translation>残差很大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于这台相机、镜头和对焦，LED 文件是否属于这支光笔：不确定度不包含用错文件的影响。</translation>
+        <source>The residuals are large: {sigma:.2f} px, {usual} px or less is usual. Check that the camera file is of this camera, lens and focus, and the pen file of this pen.</source>
+        <translation>残差过大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于此相机、镜头和对焦，LED 文件是否属于此光笔。</translation>
+    </message>
+    <message>
+        <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
+        <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
@@ -2763,6 +2767,10 @@
         <translation>摆动已暂停。</translation>
     </message>
     <message>
+        <source>The tip did not come to rest in the same place: it moved by {distance:.4f} mm (standard deviation) from image to image. Clean tip and cone, look for wear, and press the tip in. It is in the uncertainty.</source>
+        <translation>测头没有停在同一位置：各图像之间移动 {distance:.4f} mm（标准差）。请清洁测头和锥孔，检查磨损，并将测头压入。该影响已计入不确定度。</translation>
+    </message>
+    <message>
         <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped.</source>
         <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
     </message>
@@ -2773,6 +2781,10 @@
     <message>
         <source>The tip is that of the first, which are more.</source>
         <translation>所得测头属于位姿较多的前一组。</translation>
+    </message>
+    <message>
+        <source>The tip moved in its seat as the pen leant, by some {distance:.4f} mm. Tip or cone may be out of round, worn or dirty. It is in the uncertainty.</source>
+        <translation>测头随光笔倾斜在锥孔中移动约 {distance:.4f} mm。测头或锥孔可能不圆、磨损或有污物。该影响已计入不确定度。</translation>
     </message>
     <message>
         <source>The tip rested on two points, {distance:.2f} mm apart, as if cone or tracker had moved. On one: poses {first}. On the other: poses {second}. {consequence}</source>
@@ -2871,6 +2883,14 @@
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。请以不同姿态继续采集。</translation>
     </message>
     <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. {share:.4f} mm of it comes from {advice}. More images hardly help.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 来自{advice}。增加图像几乎没有帮助。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. {share:.4f} mm of it is assumed, for {advice}. More images hardly help.</source>
+        <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm，限值 {limit:.4f} mm。其中 {share:.4f} mm 为假定值，来自{advice}。增加图像几乎没有帮助。</translation>
+    </message>
+    <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm.</source>
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
     </message>
@@ -2923,12 +2943,20 @@
         <translation>内参文件</translation>
     </message>
     <message>
+        <source>distortion coefficient {name}</source>
+        <translation>畸变系数 {name}</translation>
+    </message>
+    <message>
         <source>exposure</source>
         <translation>曝光</translation>
     </message>
     <message>
         <source>file of LED centres</source>
         <translation>LED 中心文件</translation>
+    </message>
+    <message>
+        <source>focal length</source>
+        <translation>焦距</translation>
     </message>
     <message>
         <source>folder</source>
@@ -2991,12 +3019,24 @@
         <translation>位姿</translation>
     </message>
     <message>
+        <source>principal point cx</source>
+        <translation>主点 cx</translation>
+    </message>
+    <message>
+        <source>principal point cy</source>
+        <translation>主点 cy</translation>
+    </message>
+    <message>
         <source>r11 to r33 are a mirrored rotation (determinant -1). Give the poses in right-handed frames.</source>
         <translation>r11 至 r33 是镜像旋转（行列式为 -1）。请用右手坐标系给出位姿。</translation>
     </message>
     <message>
         <source>r11 to r33 are not a rotation: their rows must have the length 1 and be at right angles to each other. Check the order of the columns.</source>
         <translation>r11 至 r33 不是旋转矩阵：各行长度必须为 1 且相互垂直。请检查列的顺序。</translation>
+    </message>
+    <message>
+        <source>ratio fy / fx of the focal lengths</source>
+        <translation>焦距之比 fy / fx</translation>
     </message>
     <message>
         <source>record&apos;s header</source>
@@ -3019,16 +3059,20 @@
         <translation>已剔除</translation>
     </message>
     <message>
+        <source>the LED file. Measure the LEDs better, and state how well</source>
+        <translation>LED 文件。请更精确地测量 LED，并给出其不确定度</translation>
+    </message>
+    <message>
         <source>the LEDs of a pen</source>
         <translation>光笔的 LED</translation>
     </message>
     <message>
-        <source>the covariance c11 to c66 leaves a direction without any uncertainty, which no measurement does. Correct or remove these columns.</source>
-        <translation>协方差 c11 至 c66 使某个方向没有不确定度，这在测量中不可能。请改正或删除这些列。</translation>
+        <source>the camera file. Calibrate the camera, and state the covariance in its file</source>
+        <translation>内参文件。请标定相机，并在文件中给出协方差</translation>
     </message>
     <message>
-        <source>the diameter is {diameter:g} where the first LED has {first:g}. All LEDs of a pen must be equally wide.</source>
-        <translation>直径为 {diameter:g}，而第一个 LED 为 {first:g}。同一支光笔的 LED 必须一样大。</translation>
+        <source>the covariance c11 to c66 leaves a direction without any uncertainty, which no measurement does. Correct or remove these columns.</source>
+        <translation>协方差 c11 至 c66 使某个方向没有不确定度，这在测量中不可能。请改正或删除这些列。</translation>
     </message>
     <message>
         <source>the direction ({x:.2f}, {y:.2f}, {z:.2f}) of the pen</source>
@@ -3063,12 +3107,20 @@
         <translation>光笔的 {axis} 轴</translation>
     </message>
     <message>
+        <source>the scale of the LED file. State its uncertainty in the file, and measure where the pen is used</source>
+        <translation>LED 文件的尺度。请在文件中给出其不确定度，并在使用光笔的环境中测量</translation>
+    </message>
+    <message>
         <source>the scatter of the poses, and that it hangs together from pose to pose</source>
         <translation>位姿的散布，以及相邻位姿之间的相关性</translation>
     </message>
     <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
         <translation>平移超过 {most:g} m。请检查单位：需要毫米。</translation>
+    </message>
+    <message>
+        <source>the {what} is {value:g} where the first LED has {first:g}. It must be the same for all LEDs of a pen.</source>
+        <translation>{what} 为 {value:g}，而第一个 LED 为 {first:g}。同一光笔的所有 LED 必须相同。</translation>
     </message>
     <message>
         <source>there is a file of that name already. Try again.</source>
@@ -3121,6 +3173,10 @@
     <message>
         <source>what stays the same in all poses: the scale of the tracker and of the pen, a tip that is worn or does not seat</source>
         <translation>在所有位姿中保持不变的误差：跟踪仪和光笔的尺度、测头磨损或未就位</translation>
+    </message>
+    <message>
+        <source>where the cameras stand. Calibrate the rig, and state how well</source>
+        <translation>各相机的位置。请标定相机组，并给出其不确定度</translation>
     </message>
     <message>
         <source>wrong size</source>
@@ -3337,6 +3393,10 @@
     <message>
         <source>{name} has the units {unit}, which are not known here. Use one of {known}.</source>
         <translation>{name} 的单位 {unit} 不受支持。请使用 {known} 之一。</translation>
+    </message>
+    <message>
+        <source>{name} has the {what} {sigma:g}. A standard uncertainty above 0 and up to {most:g} is needed; leave it away if it is not known.</source>
+        <translation>{name} 的 {what} 为 {sigma:g}。标准不确定度必须大于 0 且不超过 {most:g}；未知时请省略。</translation>
     </message>
     <message>
         <source>{name} has {bits} bits, the first image is {first}. Replay only images of one camera together.</source>
@@ -3598,12 +3658,52 @@
         <translation>LED 位置不符</translation>
     </message>
     <message>
+        <source>Files not certain enough</source>
+        <translation>文件不够精确</translation>
+    </message>
+    <message>
+        <source>File does not fit</source>
+        <translation>文件不符</translation>
+    </message>
+    <message>
         <source>No tip found</source>
         <translation>未求得测头</translation>
     </message>
     <message>
         <source>Good</source>
         <translation>良好</translation>
+    </message>
+    <message>
+        <source>noise</source>
+        <translation>噪声</translation>
+    </message>
+    <message>
+        <source>seat</source>
+        <translation>就位</translation>
+    </message>
+    <message>
+        <source>drift</source>
+        <translation>漂移</translation>
+    </message>
+    <message>
+        <source>LEDs</source>
+        <translation>LED</translation>
+    </message>
+    <message>
+        <source>scale</source>
+        <translation>尺度</translation>
+    </message>
+    <message>
+        <source>discs</source>
+        <translation>圆面</translation>
+    </message>
+    <message>
+        <source>camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>rig</source>
+        <translation>相机组</translation>
     </message>
     <message>
         <source>Enter the name of the station.</source>
