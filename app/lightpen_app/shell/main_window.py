@@ -283,7 +283,8 @@ class MainWindow(Rearranged, QMainWindow):
     def _make_actions(self) -> None:
         """Make the actions whose keys work wherever the focus is."""
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
-        self._operator_action = QAction(self, checkable=True)
+        self._operator_action = QAction(self)
+        self._operator_action.setCheckable(True)
         self._operator_action.setShortcut(Qt.Key.Key_F11)
         self._operator_action.toggled.connect(self._on_operator_toggled)
         self._action(Qt.Key.Key_F10, self._show_options)
