@@ -56,7 +56,7 @@ def environment_of(
     def environment(name: str) -> dict[str, str]:
         code = name if name == "C" else f"{name}.UTF-8"
         if name != "C" and shutil.which("localedef"):
-            words = ["localedef", "-i", name, "-f", "UTF-8", folder / code]
+            words = ["localedef", "-i", name, "-f", "UTF-8", str(folder / code)]
             subprocess.run(words, check=False, capture_output=True)
         here = {"LC_ALL": code, "LANG": code, "LOCPATH": str(folder)}
         return here | {"LANGUAGE": "", "QT_QPA_PLATFORM": "offscreen"}

@@ -13,8 +13,9 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, HEADER, JOURNAL, open_record
+from lightpen.record.reading import DISCARDED, HEADER, open_record
 from lightpen.record.unfinished import (
     discard_damaged,
     discard_swing,
@@ -96,7 +97,7 @@ def test_images_taken_out_after_the_verdict_do_not(
     with recorded(preparation, tmp_path / "a", 3) as writer:
         writer.conclude("check")
         writer.take_out([1], "taken out")
-        writer.put_back([1])
+        writer.set_taken_out({})
 
     assert names_found(tmp_path) == []
 
