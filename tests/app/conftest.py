@@ -108,7 +108,7 @@ def frame_rate(monkeypatch: pytest.MonkeyPatch) -> float:
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
-    return Settings(tmp_path / "config" / "lightpen.ini")
+    return Settings(tmp_path / "config" / "lightpen.json")
 
 
 class HastyClock(SkippingClock):

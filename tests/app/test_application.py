@@ -96,7 +96,7 @@ def test_settings_that_cannot_be_saved_are_told_and_stop_nothing(
     qtbot: QtBot, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("not a folder")
-    wizard = open_wizard(qtbot, Settings(tmp_path / "file" / "lightpen.ini"))
+    wizard = open_wizard(qtbot, Settings(tmp_path / "file" / "lightpen.json"))
 
     wizard.window.preferences_changed.emit(Preferences(muted=True))
 
@@ -138,7 +138,7 @@ def test_a_first_start_needs_no_folder(
     if folder_exists:
         folder.mkdir()
 
-    wizard = open_wizard(qtbot, Settings(folder / "lightpen.ini"))
+    wizard = open_wizard(qtbot, Settings(folder / "lightpen.json"))
 
     assert wizard.window.isVisible()
     wizard.setParent(None)

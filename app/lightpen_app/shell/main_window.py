@@ -1,7 +1,6 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -22,7 +21,6 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.errors import FileError
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import (
     GRID,
@@ -258,8 +256,6 @@ class MainWindow(Rearranged, QMainWindow):
         self.page().left()
         for page in self._pages:
             page.shut_down()
-        with suppress(FileError):  # nobody is left to tell; it was told at the choice
-            self._settings.sync()
         self.closing.emit()
         super().closeEvent(event)
 

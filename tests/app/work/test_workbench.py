@@ -165,7 +165,7 @@ def test_without_a_station_nothing_is_remembered(stage: Stage) -> None:
 def test_a_first_start_has_the_files_of_the_simulated_pen(
     tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    settings = Settings(tmp_path / "new" / "lightpen.ini")
+    settings = Settings(tmp_path / "new" / "lightpen.json")
     first = Workbench(settings, tmp_path / "new data", workbench.around)
     first.start()
     qtbot.waitUntil(lambda: not first.is_reading)
