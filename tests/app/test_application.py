@@ -86,6 +86,7 @@ def test_choices_take_effect_at_once_and_are_remembered(
 
     assert wizard.window.windowTitle().endswith("\u5149\u7b14\u6d4b\u5934\u6821\u51c6")
     assert colors_of(wizard.window.palette()) is LIGHT
+    assert settings.await_saved(120.0)
     again = open_wizard(qtbot, Settings(settings.file))
     assert again.window.windowTitle() == wizard.window.windowTitle()
     for each in (wizard, again):
@@ -100,7 +101,9 @@ def test_settings_that_cannot_be_saved_are_told_and_stop_nothing(
 
     wizard.window.preferences_changed.emit(Preferences(muted=True))
 
-    assert any("cannot be saved" in each for each in wizard.window.words())
+    qtbot.waitUntil(
+        lambda: any("cannot be saved" in each for each in wizard.window.words())
+    )
     wizard.setParent(None)
 
 

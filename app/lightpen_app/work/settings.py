@@ -8,7 +8,7 @@ window.
 import math
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from threading import Condition, Thread
+from threading import Lock, Thread
 from typing import Any, TypeVar
 
 import platformdirs
@@ -107,7 +107,8 @@ class Settings(QObject):
         self._trouble = loaded.trouble
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
-        self._written = Condition()
+        self._lock = Lock()
+        self._thread: Thread | None = None
 
     @property
     def file(self) -> Path:
@@ -166,8 +167,11 @@ class Settings(QObject):
 
     def await_saved(self, timeout_s: float) -> bool:
         """Wait until all is on the disk, and return whether nothing waits for it."""
-        with self._written:
-            return self._written.wait_for(lambda: not self._is_writing, timeout_s)
+        thread = self._thread
+        if thread is not None:
+            thread.join(timeout_s)
+        with self._lock:
+            return not self._is_writing
 
     def _save(self, section: str, entries: dict[str, Any]) -> None:
         """Remember entries; those that are as they were need not be written."""
@@ -175,12 +179,13 @@ class Settings(QObject):
         new = {n: e for n, e in entries.items() if n not in known or known[n] != e}
         changes = {(section, name): entry for name, entry in new.items()}
         self._content = merged(self._content, changes)
-        with self._written:
+        with self._lock:
             self._changes.update(changes)
             if self._is_writing or not self._changes:
                 return
             self._is_writing = True
-        Thread(target=self._write, name="settings", daemon=True).start()
+        self._thread = Thread(target=self._write, name="settings", daemon=True)
+        self._thread.start()
 
     def _write(self) -> None:
         """Write until nothing new is left; what cannot be written waits for more."""
@@ -195,12 +200,11 @@ class Settings(QObject):
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
         """Return what is to be written next; nothing if only the old is left."""
-        with self._written:
+        with self._lock:
             is_new = bool(self._changes)
             changes = unwritten | self._changes
             self._changes = {} if is_new else changes
             self._is_writing = is_new
-            self._written.notify_all()
             return changes if is_new else {}
 
 

@@ -24,6 +24,7 @@ from lightpen.formats.files import (
     write_whole,
 )
 from lightpen.formats.own_json import DamagedError, parse_json
+from lightpen.formats.part_files import sweep_parts
 from lightpen.sentences import Sentence, sentence
 
 WHAT = sentence("file.settings", "settings file")
@@ -44,6 +45,7 @@ class Loaded:
 
 def load(file: Path) -> Loaded:
     """Return the settings of a file; of version 0.1 if there is none yet."""
+    sweep_parts(file.parent)
     if not file.exists():
         return Loaded(_of_version_0_1(file.with_suffix(".ini")))
     try:

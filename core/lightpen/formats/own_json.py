@@ -19,7 +19,8 @@ CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they a
 FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that can be told in any time zone
 
 Moment: TypeAlias = Annotated[datetime, Meta(tz=True)]
-Vector: TypeAlias = tuple[float, float, float]
+Length: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7)]  # mm or px
+Vector: TypeAlias = tuple[Length, Length, Length]
 Digest: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 T = TypeVar("T")

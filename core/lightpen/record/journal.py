@@ -17,6 +17,8 @@ from lightpen.formats.files import MEGABYTE, printable, read_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
+    Length,
+    Vector,
     has_checksum,
     parse_json,
     with_checksum,
@@ -28,7 +30,6 @@ LIMIT = 64 * MEGABYTE
 TAIL = 16_384  # bytes of a journal that hold its last few lines
 ZEROS = b"\0\0"  # of one zero a flipped bit may be the cause
 
-Length: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7)]  # px or mm
 Entry: TypeAlias = Annotated[float, Meta(ge=-1.001, le=1.001)]  # of a rotation
 Number: TypeAlias = Annotated[int, Meta(ge=1, le=10**9)]
 Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]
@@ -44,7 +45,7 @@ class ImageLine(Struct, tag_field="kind", tag="image"):
     device_time_ns: int | None
     pixels: tuple[tuple[Length, Length] | None, ...]
     rotation: tuple[Row, Row, Row]
-    translation: tuple[Length, Length, Length]
+    translation: Vector
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):

@@ -30,9 +30,10 @@ def _sweep_record(folder: Path) -> None:
     with suppress(FileNotFoundError):
         if ends_in_verdict(folder):
             return
+    is_fresh = time.time() - folder.stat().st_mtime < OLDEST
     sweep_parts(folder)
     sweep_parts(folder / IMAGES)
-    if _has_never_begun(folder):
+    if not is_fresh and _has_never_begun(folder):
         for path in folder.iterdir():
             path.rmdir() if path.name == IMAGES else path.unlink()
         folder.rmdir()
@@ -43,8 +44,6 @@ def _has_never_begun(folder: Path) -> bool:
     names = {path.name for path in folder.iterdir()}
     others = {name for name in names if not name.startswith(("camera.", "pen."))}
     if HEADER in names or not others <= {JOURNAL, IMAGES}:
-        return False
-    if time.time() - folder.stat().st_mtime < OLDEST:
         return False
     if IMAGES in names and any((folder / IMAGES).iterdir()):
         return False

@@ -44,6 +44,7 @@ from lightpen.formats.images import (
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
+    Length,
     Moment,
     Vector,
     has_checksum,
@@ -157,7 +158,7 @@ class HeaderEntries(Struct):
     camera_file: FileEntry
     pen_file: FileEntry
     units: str | None
-    led_diameter_mm: float | None
+    led_diameter_mm: Length | None
     nominal_tip_mm: Vector | None
     mask_px: tuple[Vector, ...]
     settings: dict[str, Plain]
@@ -441,13 +442,7 @@ def _read_header(folder: Path) -> HeaderEntries:
             raise DamagedError("There is no checksum.")
         return parse_json(data, HeaderEntries)
     except DamagedError as error:
-        raise FileError(
-            sentence(
-                "record.damaged",
-                "{path} is damaged. Restore it from a copy.",
-                path=printable(str(path)),
-            )
-        ) from error
+        raise damaged_file(path) from error
 
 
 def _header(folder: Path, entries: HeaderEntries) -> Header:
@@ -467,6 +462,17 @@ def _header(folder: Path, entries: HeaderEntries) -> Header:
         nominal_tip=None if tip is None else np.array(tip, dtype=np.float64),
         mask=np.array(entries.mask_px, dtype=np.float64).reshape(-1, 3),
         settings=entries.settings,
+    )
+
+
+def damaged_file(path: Path) -> FileError:
+    """Return the error of a file of a record, other than an image or a copy."""
+    return FileError(
+        sentence(
+            "record.damaged",
+            "{path} is damaged. Restore it from a copy.",
+            path=printable(str(path)),
+        )
     )
 
 

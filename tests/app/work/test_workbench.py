@@ -247,6 +247,7 @@ def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
     stage.choose(names=OTHER)
 
     assert stage.workbench.preparation.names == OTHER
+    stage.qtbot.waitUntil(lambda: bool(stage.sentences))
     assert "The settings cannot be saved" in stage.sentences[0]
 
 

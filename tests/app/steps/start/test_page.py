@@ -298,6 +298,7 @@ def test_all_of_it_is_remembered_for_the_station(
     start.type_into("Images at most", "250")
     start.type_into("Images at least", "80")
 
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), Path("unused"))
     again.choose_station("Hall 2")
 
@@ -323,6 +324,7 @@ def test_any_name_will_do(
 
     names = Names(name, name, name, name, name, 10.0)
     assert workbench.preparation.names == names
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
     assert again.stations() == tuple(sorted(("Hall 2", name)))
     again.start()
@@ -385,6 +387,7 @@ def test_a_new_station_takes_over_the_present_choices(
     assert workbench.preparation.names == replace(before.names, station="Hall 3")
     assert workbench.preparation.pen_file is before.pen_file
     assert workbench.stations() == ("Hall 2", "Hall 3")
+    assert settings.await_saved(120.0)
     assert Settings(settings.file).last_station() == "Hall 3"
 
 
@@ -446,6 +449,7 @@ def test_the_station_survives_a_change_of_preferences(
 ) -> None:
     settings.set_preferences(Preferences(muted=True))
 
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
     again.start()
 
