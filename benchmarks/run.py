@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
 
-Figures on the image sets need LIGHTPEN_DATA. Takes some fifteen minutes on two cores,
+Figures on the image sets need LIGHTPEN_DATA. Takes some twenty minutes on two cores,
 ten of them for the section `soak`; nothing else should run meanwhile. Exit status 1 if
 a limit is missed.
 """

@@ -93,7 +93,8 @@ class Workbench(QObject):
         """Take over what was chosen last, and open the camera."""
         if self._settings.trouble is not None:
             self._on_settings_troubled(self._settings.trouble)
-        Job(lambda _: sweep_leftovers(self._folder), self).start()
+        folder = self._folder  # a job that knew its parent would outlive it
+        Job(lambda _: sweep_leftovers(folder), self).start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
         if self._reading is None:
