@@ -242,6 +242,7 @@ def test_sample_files_that_cannot_be_written_are_told(
 def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
     stage: Stage,
 ) -> None:
+    assert stage.settings.await_saved(120.0)
     shutil.rmtree(stage.settings.file.parent)
     stage.settings.file.parent.write_text("not a folder")
     stage.choose(names=OTHER)
