@@ -145,7 +145,7 @@ def main() -> int:
     """Run, print the figures, and return the exit status."""
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(Path(folder) / "lightpen.ini")
+        settings = Settings(Path(folder) / "lightpen.json")
         settings.set_preferences(Preferences(muted=True))
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.resize(1920, 1080)

@@ -24,7 +24,7 @@ def main() -> int:
 
     application = make_application(sys.argv[:1])
     with tempfile.TemporaryDirectory() as folder:
-        settings = Settings(Path(folder) / "lightpen.ini")
+        settings = Settings(Path(folder) / "lightpen.json")
         wizard = Wizard(application, make_pages, settings, Path(folder))
         wizard.window.show()
         wizard.workbench.start()

@@ -38,7 +38,7 @@ def main() -> int:
     """Swing until this process is killed."""
     folder = Path(sys.argv[1])
     application = QCoreApplication(sys.argv[:1])
-    workbench = Workbench(Settings(folder / "lightpen.ini"), folder)
+    workbench = Workbench(Settings(folder / "lightpen.json"), folder)
     run = workbench.run
 
     def tell(event: SwingEvent) -> None:

@@ -114,7 +114,7 @@ class Stage:
         self._scene = Scene(n_images=N_SHOWN)
         self._looked_at: dict[int, Shown] = {}
         self._image_plans = plan_scene(self._scene).image_plans
-        settings = Settings(DATA / "lightpen.ini")
+        settings = Settings(DATA / "lightpen.json")
         settings.set_preferences(Preferences())
         FolderArchive(DATA).store(_earlier_result())
         around = Surroundings(self._scene, SkippingClock(), lambda: NOW)

@@ -6,7 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from functools import cache
 from hashlib import sha256
@@ -104,6 +104,23 @@ def script() -> Callable[..., CompletedProcess[str]]:
         )
 
     return run
+
+
+@pytest.fixture(scope="session")
+def rewrite_header() -> Callable[..., None]:
+    """Return a function that gives a record's header other entries or settings."""
+    from lightpen.formats.own_json import with_checksum
+
+    def rewrite(
+        folder: Path, settings: Mapping[str, object] | None = None, **entries: object
+    ) -> None:
+        path = folder / "header.json"
+        header = json.loads(path.read_bytes())
+        del header["checksum"]
+        header["settings"].update(settings or {})
+        path.write_bytes(with_checksum(json.dumps(header | entries).encode()))
+
+    return rewrite
 
 
 MakeOnce = Callable[[str, Callable[[Path], object]], Path]

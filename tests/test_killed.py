@@ -68,7 +68,7 @@ def tell(*words):
 def swing(folder):
     application = QCoreApplication([])
     around = Surroundings(Scene(camera=paper_camera(binning=4)), HastyClock())
-    workbench = Workbench(Settings(folder / "lightpen.ini"), folder, around)
+    workbench = Workbench(Settings(folder / "lightpen.json"), folder, around)
     files = sample_files(around, folder / "samples")
     workbench.set_preparation(
         replace(

@@ -13,13 +13,8 @@ import pytest
 from lightpen.detection.observations import observe_images
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.files import sha256
-from lightpen.record.reading import (
-    HEADER,
-    JOURNAL,
-    image_name,
-    open_record,
-    source,
-)
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import HEADER, image_name, open_record, source
 from lightpen.record.solving import solve_record
 from lightpen.record.writing import note_taken_out
 
@@ -320,15 +315,16 @@ def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> 
     assert f"swing 1 is not a whole one: it lacks {name}. Restore" in outcome.stderr
 
 
-def test_a_record_of_a_later_version_is_refused(lightpen: Run, folder: Path) -> None:
-    header = json.loads((folder / HEADER).read_text("utf-8"))
-    (folder / HEADER).write_text(json.dumps(header | {"format": 2}), "utf-8")
+def test_a_record_of_a_later_version_is_refused(
+    lightpen: Run, folder: Path, rewrite_header: Callable[..., None]
+) -> None:
+    rewrite_header(folder, format=3)
     outcome = lightpen("calibrate", folder)
 
     assert outcome.returncode == 2
     assert outcome.stderr.endswith(
-        "header.json was written by a later version of the program (format 2; this "
-        "version reads 1). Open the record with that version.\n"
+        "header.json was written by a later version of the program (format 3; this "
+        "version reads up to 2). Open the record with that version.\n"
     )
 
 

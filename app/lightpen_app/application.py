@@ -19,7 +19,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen.cameras.clock import MachineClock, SkippingClock
-from lightpen.errors import LightpenError, UsageError
+from lightpen.errors import UsageError
 from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
@@ -27,7 +27,6 @@ from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
-from lightpen_app.look.sentences import worded
 from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
@@ -91,10 +90,7 @@ class Wizard(QObject):
 
     def _on_preferences_changed(self, preferences: Preferences) -> None:
         before, self._preferences = self._preferences, preferences
-        try:
-            self._settings.set_preferences(preferences)
-        except LightpenError as error:
-            self.window.show_notice(worded(error.sentence))
+        self._settings.set_preferences(preferences)
         self._sounds.muted = preferences.muted
         if preferences.language is not before.language:
             self._languages.set_language(preferences.language)
@@ -158,7 +154,7 @@ def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
         EndSignals(application) as signals,
         TemporaryDirectory(prefix="lightpen-demo-") as folder,
     ):
-        settings = Settings(Path(folder) / "lightpen.ini")
+        settings = Settings(Path(folder) / "lightpen.json")
         users = Settings(settings_file()).preferences()
         settings.set_preferences(users)
         wizard = Wizard(application, make_pages, settings, Path(folder), around)

@@ -21,6 +21,10 @@ class FileError(LightpenError):
     """A file cannot be read or written, or does not hold what is needed."""
 
 
+class NameTakenError(FileError):
+    """A file that was to be new exists."""
+
+
 class UsageError(LightpenError):
     """The request contradicts itself or lacks something."""
 

@@ -107,8 +107,10 @@ def frame_rate(monkeypatch: pytest.MonkeyPatch) -> float:
 
 
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    return Settings(tmp_path / "config" / "lightpen.ini")
+def settings(tmp_path: Path) -> Iterator[Settings]:
+    settings = Settings(tmp_path / "config" / "lightpen.json")
+    yield settings
+    assert settings.await_saved(120.0)
 
 
 class HastyClock(SkippingClock):

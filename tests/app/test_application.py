@@ -86,6 +86,7 @@ def test_choices_take_effect_at_once_and_are_remembered(
 
     assert wizard.window.windowTitle().endswith("\u5149\u7b14\u6d4b\u5934\u6821\u51c6")
     assert colors_of(wizard.window.palette()) is LIGHT
+    assert settings.await_saved(120.0)
     again = open_wizard(qtbot, Settings(settings.file))
     assert again.window.windowTitle() == wizard.window.windowTitle()
     for each in (wizard, again):
@@ -96,11 +97,13 @@ def test_settings_that_cannot_be_saved_are_told_and_stop_nothing(
     qtbot: QtBot, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("not a folder")
-    wizard = open_wizard(qtbot, Settings(tmp_path / "file" / "lightpen.ini"))
+    wizard = open_wizard(qtbot, Settings(tmp_path / "file" / "lightpen.json"))
 
     wizard.window.preferences_changed.emit(Preferences(muted=True))
 
-    assert any("cannot be saved" in each for each in wizard.window.words())
+    qtbot.waitUntil(
+        lambda: any("cannot be saved" in each for each in wizard.window.words())
+    )
     wizard.setParent(None)
 
 
@@ -138,7 +141,7 @@ def test_a_first_start_needs_no_folder(
     if folder_exists:
         folder.mkdir()
 
-    wizard = open_wizard(qtbot, Settings(folder / "lightpen.ini"))
+    wizard = open_wizard(qtbot, Settings(folder / "lightpen.json"))
 
     assert wizard.window.isVisible()
     wizard.setParent(None)

@@ -1,6 +1,5 @@
 """A swing without a window: a runner, the simulated pen, and who hears of it."""
 
-import json
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -16,7 +15,7 @@ from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
-from lightpen.record.reading import HEADER, open_record
+from lightpen.record.reading import open_record
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
 from lightpen.record.unfinished import find_unfinished
@@ -157,12 +156,6 @@ class Station:
         """Return that a record can be written to; `FileError` while it cannot."""
         with RecordWriter.resume(open_record(folder)):
             return True
-
-    def limit_uncertainty(self, folder: Path, limit: float) -> None:
-        """Have a record ask for this U at most, mm."""
-        header = json.loads((folder / HEADER).read_text("utf-8"))
-        header["settings"]["max_uncertainty_mm"] = limit
-        (folder / HEADER).write_text(json.dumps(header), "utf-8")
 
     def in_force(self) -> Result | None:
         names = self.preparation.names

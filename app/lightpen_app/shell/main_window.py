@@ -1,7 +1,6 @@
 """The window of the wizard: steps at the left, one page, one main button."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -22,7 +21,6 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.errors import FileError
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import (
     GRID,
@@ -258,8 +256,6 @@ class MainWindow(Rearranged, QMainWindow):
         self.page().left()
         for page in self._pages:
             page.shut_down()
-        with suppress(FileError):  # nobody is left to tell; it was told at the choice
-            self._settings.sync()
         self.closing.emit()
         super().closeEvent(event)
 
@@ -283,7 +279,8 @@ class MainWindow(Rearranged, QMainWindow):
     def _make_actions(self) -> None:
         """Make the actions whose keys work wherever the focus is."""
         self._help_action = self._action(Qt.Key.Key_F1, self._on_help_triggered)
-        self._operator_action = QAction(self, checkable=True)
+        self._operator_action = QAction(self)
+        self._operator_action.setCheckable(True)
         self._operator_action.setShortcut(Qt.Key.Key_F11)
         self._operator_action.toggled.connect(self._on_operator_toggled)
         self._action(Qt.Key.Key_F10, self._show_options)

@@ -1,19 +1,27 @@
-"""What a station remembers from one run to the next, in an INI file."""
+"""What a station remembers from one run to the next, in a JSON file.
+
+What is chosen is in force at once, and written by a thread of its own: neither a disk
+that does not answer nor another program that keeps the settings to itself holds the
+window.
+"""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from threading import Lock, Thread
 from typing import Any, TypeVar
 
 import platformdirs
-from PySide6.QtCore import QByteArray, QLocale, QSettings
+from PySide6.QtCore import QByteArray, QLocale, QObject, Signal
 from PySide6.QtWidgets import QWidget
 
-from lightpen.errors import FileError
+from lightpen.errors import LightpenError
+from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.model.limits import SwingLimits
-from lightpen.sentences import sentence
+from lightpen.sentences import Sentence
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
+from lightpen_app.work.settings_store import Changes, Content, load, merged, save
 
 
 @dataclass(frozen=True)
@@ -80,99 +88,129 @@ class Station:
 Group = TypeVar("Group", Preferences, Station)
 
 
-class Settings:
-    """The INI file; a value that is missing or makes no sense gives the default."""
+class Settings(QObject):
+    """What was chosen; a value that is missing or makes no sense gives the default.
 
-    def __init__(self, file: Path) -> None:
+    Signals
+    -------
+    troubled(object)
+        The `Sentence` why something is not, or not surely, remembered.
+    """
+
+    troubled = Signal(object)
+
+    def __init__(self, file: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
         self._file = file
-        self._ini = QSettings(str(file), QSettings.Format.IniFormat)
-        self._ini.setFallbacksEnabled(False)
+        loaded = load(file)
+        self._content: Content = loaded.content
+        self._trouble = loaded.trouble
+        self._changes: Changes = {}  # that wait to be written
+        self._is_writing = False
+        self._lock = Lock()
+        self._thread: Thread | None = None
 
     @property
     def file(self) -> Path:
         """Where the settings are kept."""
         return self._file
 
+    @property
+    def trouble(self) -> Sentence | None:
+        """Why they could not be read at the start."""
+        return self._trouble
+
     def preferences(self) -> Preferences:
         """Return what the user chose; at first, the language of the system."""
-        return self._read("preferences", Preferences(language=_system_language()))
+        saved = self._content.get("preferences", {})
+        return _read(saved, Preferences(language=_system_language()))
 
     def set_preferences(self, preferences: Preferences) -> None:
         """Remember what the user chose."""
-        self._write("preferences", preferences)
+        self._save("preferences", _entries(preferences))
 
     def stations(self) -> tuple[str, ...]:
         """Return the names of the stations, in alphabetical order."""
-        self._ini.beginGroup("stations")
-        names = self._ini.childGroups()
-        self._ini.endGroup()
-        return tuple(sorted(_decoded(name) for name in names))
+        return tuple(sorted(self._content.get("stations", {})))
 
     def station(self, name: str) -> Station:
         """Return what was chosen last at a station; defaults for a new one."""
-        return self._read(f"stations/{_encoded(name)}", Station())
+        return _read(self._content.get("stations", {}).get(name), Station())
 
     def set_station(self, name: str, station: Station) -> None:
         """Remember what was chosen at a station."""
         if not name:
             raise ValueError("`name` of a station must not be empty.")
-        self._write(f"stations/{_encoded(name)}", station)
+        self._save("stations", {name: _entries(station)})
 
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""
-        saved = self._ini.value("last/station")
+        saved = self._content.get("last", {}).get("station")
         return saved if isinstance(saved, str) else ""
 
     def set_last_station(self, name: str) -> None:
         """Remember which station is used."""
-        if name != self.last_station():
-            self._ini.setValue("last/station", name)
-            self.sync()
+        self._save("last", {"station": name})
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""
-        saved = self._ini.value(f"windows/{window.objectName()}")
-        return isinstance(saved, QByteArray) and window.restoreGeometry(saved)
+        saved = self._content.get("windows", {}).get(window.objectName())
+        if not isinstance(saved, str):
+            return False
+        place = QByteArray.fromBase64(saved.encode("ascii", "ignore"))
+        return window.restoreGeometry(place)
 
     def save_geometry(self, window: QWidget) -> None:
         """Remember where a window is, under its object name."""
-        self._ini.setValue(f"windows/{window.objectName()}", window.saveGeometry())
+        place = window.saveGeometry().toBase64().toStdString()
+        self._save("windows", {window.objectName(): place})
 
-    def sync(self) -> None:
-        """Write what is not yet on the disk.
+    def await_saved(self, timeout_s: float) -> bool:
+        """Wait until all is on the disk, and return whether nothing waits for it."""
+        thread = self._thread
+        if thread is not None:
+            thread.join(timeout_s)
+        with self._lock:
+            return not self._is_writing
 
-        Raises
-        ------
-        FileError
-            The file cannot be written.
-        """
-        try:
-            self._file.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise _cannot_be_saved(self._file) from error
-        self._ini.sync()
-        if self._ini.status() != QSettings.Status.NoError:
-            raise _cannot_be_saved(self._file)
+    def _save(self, section: str, entries: dict[str, Any]) -> None:
+        """Remember entries; those that are as they were need not be written."""
+        known = self._content.get(section, {})
+        new = {n: e for n, e in entries.items() if n not in known or known[n] != e}
+        changes = {(section, name): entry for name, entry in new.items()}
+        self._content = merged(self._content, changes)
+        with self._lock:
+            self._changes.update(changes)
+            if self._is_writing or not self._changes:
+                return
+            self._is_writing = True
+        self._thread = Thread(target=self._write, name="settings", daemon=True)
+        self._thread.start()
 
-    def _read(self, group: str, default: Group) -> Group:
-        values: dict[str, Any] = {}
-        for each in fields(default):
-            fallback = getattr(default, each.name)
-            saved = self._ini.value(f"{group}/{each.name}")
-            values[each.name] = _converted(saved, fallback)
-        return type(default)(**values)
+    def _write(self) -> None:
+        """Write until nothing new is left; what cannot be written waits for more."""
+        unwritten: Changes = {}
+        while changes := self._taken_changes(unwritten):
+            try:
+                trouble, unwritten = save(self._file, self._content, changes), {}
+            except LightpenError as error:
+                trouble, unwritten = error.sentence, changes
+            if trouble is not None:
+                self.troubled.emit(trouble)
 
-    def _write(self, group: str, value: Preferences | Station) -> None:
-        for each in fields(value):
-            content = getattr(value, each.name)
-            text = repr(content) if isinstance(content, float) else str(content)
-            self._ini.setValue(f"{group}/{each.name}", text)
-        self.sync()
+    def _taken_changes(self, unwritten: Changes) -> Changes:
+        """Return what is to be written next; nothing if only the old is left."""
+        with self._lock:
+            is_new = bool(self._changes)
+            changes = unwritten | self._changes
+            self._changes = {} if is_new else changes
+            self._is_writing = is_new
+            return changes if is_new else {}
 
 
 def settings_file() -> Path:
     """Return where the settings of this user belong on this system."""
-    return platformdirs.user_config_path("lightpen", appauthor=False) / "lightpen.ini"
+    return platformdirs.user_config_path("lightpen", appauthor=False) / "lightpen.json"
 
 
 def data_folder() -> Path:
@@ -180,42 +218,30 @@ def data_folder() -> Path:
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def _cannot_be_saved(file: Path) -> FileError:
-    return FileError(
-        sentence(
-            "settings.unwritable",
-            "The settings cannot be saved: {file} cannot be written. Make sure that "
-            "its folder is yours to write and that the disk is not full.",
-            file=str(file),
-        )
-    )
+def _entries(value: Preferences | Station) -> dict[str, Any]:
+    """Return the fields of a value as they are kept; no number is none."""
+    entries = {each.name: getattr(value, each.name) for each in fields(value)}
+    return {
+        name: None if isinstance(entry, float) and math.isnan(entry) else entry
+        for name, entry in entries.items()
+    }
 
 
-def _converted(saved: object, fallback: Any) -> Any:
-    """Return a saved text as the type of its default, or the default."""
-    if not isinstance(saved, str):
-        # QSettings turns a text with commas into a list.
-        return fallback
-    kind = type(fallback)
-    if kind is bool:
-        return {"True": True, "False": False}.get(saved, fallback)
-    try:
-        value = kind(saved)
-    except ValueError:
-        return fallback
-    usable = not isinstance(value, float) or math.isfinite(value)
-    return value if usable else fallback
+def _read(saved: object, default: Group) -> Group:
+    """Return a default with what was saved of it and makes sense."""
+    found: dict[str, Any] = {}
+    for each in fields(default):
+        if isinstance(saved, dict) and each.name in saved:
+            kind = type(getattr(default, each.name))
+            try:
+                value = in_shape(saved[each.name], kind, strict=False)
+            except DamagedError:
+                continue
+            if not isinstance(value, float) or math.isfinite(value):
+                found[each.name] = value
+    return replace(default, **found)
 
 
 def _system_language() -> Language:
     chinese = QLocale.system().language() == QLocale.Language.Chinese
     return Language.CHINESE if chinese else Language.ENGLISH
-
-
-def _encoded(name: str) -> str:
-    """Return a station's name without the characters that part groups."""
-    return name.replace("%", "%25").replace("/", "%2F").replace("\\", "%5C")
-
-
-def _decoded(group: str) -> str:
-    return group.replace("%5C", "\\").replace("%2F", "/").replace("%25", "%")

@@ -11,11 +11,12 @@ from PySide6.QtCore import QObject, QThreadPool, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.errors import LightpenError
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import Surroundings, camera_of, sample_files
 from lightpen.model.limits import SwingLimits
+from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
+from lightpen.sentences import Sentence
 from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
@@ -71,6 +72,7 @@ class Workbench(QObject):
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
         self.run.troubled.connect(self.troubled)
+        settings.troubled.connect(self._on_settings_troubled)
 
     @property
     def preparation(self) -> Preparation:
@@ -89,6 +91,10 @@ class Workbench(QObject):
 
     def start(self) -> None:
         """Take over what was chosen last, and open the camera."""
+        if self._settings.trouble is not None:
+            self._on_settings_troubled(self._settings.trouble)
+        folder = self._folder  # a job that knew its parent would outlive it
+        Job(lambda _: sweep_leftovers(folder), self).start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
         if self._reading is None:
@@ -167,7 +173,8 @@ class Workbench(QObject):
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
         has_closed = self.live.await_closed(max(0.0, deadline - monotonic()))
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
-        return jobs_ended and has_closed and has_ended
+        is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
+        return jobs_ended and has_closed and has_ended and is_saved
 
     def _open_files(self, station: Station) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""
@@ -258,12 +265,8 @@ class Workbench(QObject):
 
     def _remember_station(self) -> None:
         station = self._preparation.names.station
-        if not station:
-            return
-        try:
+        if station:
             self._settings.set_last_station(station)
-        except LightpenError as error:
-            self.troubled.emit(worded(error.sentence))
 
     def _remember(self) -> None:
         now = self._preparation
@@ -298,10 +301,10 @@ class Workbench(QObject):
             min_images=now.limits.min_images,
             max_images=now.limits.max_images,
         )
-        try:
-            self._settings.set_station(names.station, station)
-        except LightpenError as error:
-            self.troubled.emit(worded(error.sentence))
+        self._settings.set_station(names.station, station)
+
+    def _on_settings_troubled(self, why: Sentence) -> None:
+        self.troubled.emit(worded(why))
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

@@ -1,19 +1,20 @@
 """Files read whole within a limit, and written whole or not at all."""
 
-import contextlib
 import errno
 import os
 import re
 import stat
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Iterator
 from pathlib import Path
 
-from lightpen.errors import FileError
+from lightpen.errors import FileError, NameTakenError
+from lightpen.formats.file_locks import folder_locked
+from lightpen.formats.part_files import part_of, sweep_parts
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
 FOLDER = sentence("file.folder", "folder")
+PATIENCE = 2.0  # s for another program to give a file its name
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a sentence
 
 _CONTROL = r"[\x00-\x08\x0b\x0e-\x1f\x7f]"
@@ -157,7 +158,8 @@ def write_whole(path: Path, data: bytes) -> None:
     """Write a file whole, or leave what was there untouched.
 
     The data goes to a new file in the same folder, which takes the place of the old
-    one only when all of it is on the disk. Pipes and devices are written straight to.
+    one only when all of it is on the disk; what a write that was killed has left there
+    is removed. Pipes and devices are written straight to.
 
     Raises
     ------
@@ -188,17 +190,22 @@ def create_whole(path: Path, data: bytes) -> None:
 
     Raises
     ------
+    NameTakenError
+        The file exists.
     FileError
-        The file cannot be written, or exists; the text says why and what to do.
+        The file cannot be written; the text says why and what to do.
     """
+    sweep_parts(path.parent)
     try:
-        with _part_of(path, data) as part:
+        with part_of(path, data) as part:
             _name_anew(part, path)
         try:
             sync_folder(path.parent)
         except OSError:
             path.unlink()
             raise
+    except FileExistsError as error:
+        raise NameTakenError(_unwritten(path, error).sentence) from error
     except OSError as error:
         raise _unwritten(path, error) from error
 
@@ -345,25 +352,11 @@ def _replace(target: Path, data: bytes) -> None:
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
     if mode is not None and not os.access(target, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-    with _part_of(target, data) as part:
+    sweep_parts(target.parent)
+    with part_of(target, data) as part:
         if mode is not None:
             part.chmod(mode)
         part.replace(target)
-
-
-@contextlib.contextmanager
-def _part_of(target: Path, data: bytes) -> Iterator[Path]:
-    """Put data on the disk beside its target, until it has a name of its own."""
-    part = target.with_name(f".{os.urandom(8).hex()}.part")
-    try:
-        with part.open("xb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        yield part
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
 
 
 def _name_anew(part: Path, target: Path) -> None:
@@ -376,8 +369,14 @@ def _name_anew(part: Path, target: Path) -> None:
     except OSError as error:
         if error.errno not in _NO_LINKS:
             raise
+        _rename_anew(part, target)
+
+
+def _rename_anew(part: Path, target: Path) -> None:
+    """Do so on a disk that gives a file one name only, and one program at a time."""
+    with folder_locked(target.parent, PATIENCE):
         if target.exists():
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from error
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
         part.rename(target)
 
 

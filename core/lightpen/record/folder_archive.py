@@ -1,19 +1,18 @@
 """The archive as a folder: one file a result, beside the records of the swings.
 
-A file is written once and never changed. Its name begins with a number, one higher than
-that of any before: the order of acceptance, which no clock that was set back can turn
-round. Where its swing is recorded is written as a path from the data folder, so that
-the whole of it can be moved, or copied to another machine.
+A file is written once and never changed. Its name is a number, one higher than that of
+any before: the order of acceptance, which no clock that was set back can turn round. Of
+two programs that take the same number one gets it, and the other the next. Where its
+swing is recorded is written as a path from the data folder, so that the whole of it can
+be moved, or copied to another machine.
 """
 
 import os
-from collections.abc import Mapping
 from contextlib import suppress
-from datetime import UTC
+from itertools import count
 from pathlib import Path, PureWindowsPath
-from typing import Any
 
-from lightpen.errors import FileError
+from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.files import (
     FOLDER,
     MEGABYTE,
@@ -25,9 +24,10 @@ from lightpen.formats.files import (
     unreadable,
 )
 from lightpen.record.results import (
+    Heading,
     Result,
-    head_of,
-    parse_entries,
+    has_head,
+    parse_heading,
     parse_result,
     result_bytes,
 )
@@ -77,15 +77,17 @@ class FolderArchive:
             ) from error
         newest = self._files()[:1]
         number = 1 + (_number(newest[0]) if newest else 0)
-        stamp = f"{result.accepted.astimezone(UTC):%Y%m%dT%H%M%S.%fZ}"
         data = result_bytes(result, self._place_of(result.record))
-        create_whole(root / f"{number:06d}_{stamp}.json", data)
+        for free in count(number):
+            with suppress(NameTakenError):  # by another program, just now
+                create_whole(root / f"{free:06d}.json", data)
+                return
 
     def in_force(self, pen: str, tip: str) -> Result | None:
         """Return the last accepted result of a pen and a tip, or None."""
         for file in self._files():
-            head = _read_head(file)
-            if (head.get("pen", pen), head.get("tip", tip)) == (pen, tip):
+            heading = _read_heading(file)
+            if heading.pen in (pen, None) and heading.tip in (tip, None):
                 return self._read(file)
         return None
 
@@ -93,8 +95,8 @@ class FolderArchive:
         """Return the last accepted result of the swing in a folder, or None."""
         for file in self._files():
             with suppress(FileError, ValueError):  # a name that no file can have
-                place = _read_head(file).get("record")
-                if place is not None and self._located(str(place)) == folder.absolute():
+                place = _read_heading(file).record
+                if place is not None and self._located(place) == folder.absolute():
                     return self._read(file)
         return None
 
@@ -130,18 +132,17 @@ class FolderArchive:
 
 def _number(file: Path) -> int:
     """Return the place of a file in the order of acceptance; 0 for a foreign file."""
-    digits = file.name.partition("_")[0]
+    digits = file.stem.partition("_")[0]  # what follows were date and time of format 2
     return int(digits) if digits.isdecimal() else 0
 
 
-def _read_head(file: Path) -> Mapping[str, Any]:
+def _read_heading(file: Path) -> Heading:
     """Read the first entries of a result, all of them if it has no calibration."""
     try:
         with file.open("rb") as stream:
             start = stream.read(HEAD)
     except OSError as error:
         raise unreadable(file, WHAT, error) from error
-    head = head_of(start)
-    if head is None:
-        head = read_bytes(file, WHAT, LIMIT)
-    return parse_entries(head, file)
+    if not has_head(start):
+        start = read_bytes(file, WHAT, LIMIT)
+    return parse_heading(start, file)

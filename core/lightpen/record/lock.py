@@ -6,22 +6,15 @@ keeps writers from each other; reading needs no lock and is never kept out. A di
 the network that knows no locks is written to as if nobody else did.
 """
 
-import errno
-import os
-import sys
-import time
 from pathlib import Path
 from typing import IO
 
 from lightpen.errors import FileError
+from lightpen.formats.file_locks import NO_LOCKS, locked, unlock
 from lightpen.formats.files import printable
 from lightpen.sentences import sentence
 
 PATIENCE = 0.5  # s for one who only looks, or is about to close, to let go
-PAUSE = 0.01  # s between two attempts
-LOCKED_BYTE = 2**30  # behind any journal: Windows lets nobody read what is locked
-TAKEN = (errno.EAGAIN, errno.EACCES, errno.EDEADLK)
-NO_LOCKS = (errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK)
 
 
 def lock_journal(journal: IO[bytes], folder: Path) -> None:
@@ -55,7 +48,7 @@ def lock_journal(journal: IO[bytes], folder: Path) -> None:
 def unlock_journal(journal: IO[bytes]) -> None:
     """Let other writers in."""
     try:
-        _unlock(journal.fileno())
+        unlock(journal.fileno())
     except OSError as error:
         if error.errno not in NO_LOCKS:
             raise
@@ -77,39 +70,9 @@ def is_locked(path: Path) -> bool:
 
 
 def _is_taken_over(descriptor: int, shared: bool) -> bool:
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        try:
-            _lock(descriptor, shared)
-        except OSError as error:
-            if error.errno in NO_LOCKS:
-                return True
-            if error.errno not in TAKEN:
-                raise
-        else:
+    try:
+        return locked(descriptor, shared=shared, patience_s=PATIENCE)
+    except OSError as error:
+        if error.errno in NO_LOCKS:
             return True
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(PAUSE)
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _lock(descriptor: int, shared: bool) -> None:
-        os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-
-    def _unlock(descriptor: int) -> None:
-        os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_UNLCK, 1)
-else:
-    import fcntl
-
-    def _lock(descriptor: int, shared: bool) -> None:
-        # Disks of the network let nobody keep others out of a file open for reading.
-        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
-
-    def _unlock(descriptor: int) -> None:
-        fcntl.flock(descriptor, fcntl.LOCK_UN)
+        raise

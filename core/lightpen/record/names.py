@@ -1,11 +1,8 @@
-"""Who calibrates what, and the folder that the record of a new swing gets."""
+"""Who calibrates what, and the name of the folder that a swing gets by it."""
 
-import os
 import re
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import chain, count
-from pathlib import Path
 
 UNFIT = re.compile(r"[^\w.-]+")  # for the name of a folder
 LONGEST_WORD = 24  # characters; of up to 4 bytes, of the 255 that a name may have
@@ -31,22 +28,14 @@ class Names:
     ball_diameter: float | None = None
 
 
-def new_folder(root: Path, names: Names, now: datetime) -> Path:
-    """Return a folder that does not exist, named by the time, the pen and the tip.
+def folder_name(names: Names, now: datetime) -> str:
+    """Return the name of a swing's folder, by the time, the pen and the tip.
 
     Parameters
     ----------
-    root : Path
-        That the records are in.
     names : Names
         Whatever characters they have.
     """
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)
-    stem = UNFIT.sub("-", "_".join(filter(None, words)))
-    free = (
-        folder
-        for tail in chain([""], map("-{}".format, count(2)))
-        if not os.path.lexists(folder := root / (stem + tail))
-    )
-    return next(free)
+    return UNFIT.sub("-", "_".join(filter(None, words)))

@@ -8,28 +8,28 @@ A record is a folder:
 ``camera.*``         copy of the camera file, byte by byte
 ``pen.*``            copy of the pen file
 ``images/*.png``     the kept images, lossless, numbered from 1
-``journal.jsonl``    one line for each thing that happened, appended and never changed
+``journal.jsonl``    what happened, see `lightpen.record.journal`
 ==================== ===================================================================
 
 `lightpen.record.writing` puts an image on the disk before its line, and its line
 before it acknowledges the image; `lightpen.record.lock` keeps a second program
-from writing meanwhile. A torn last line, or an image without a line, is what
-a crash leaves: it was not acknowledged and is passed over. Everything needed to
+from writing meanwhile. An image without a line is what a crash leaves: it was not
+acknowledged and is passed over. Header, lines and images each have their checksum;
+those of header and lines records of format 1 lacked. Everything needed to
 calibrate again is in the images and the two files; the centres in the journal spare
 reading the images when an interrupted swing goes on.
 """
 
-import json
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Self, TypeAlias
+from typing import Annotated, Self, TypeAlias
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.errors import FileError
@@ -41,18 +41,42 @@ from lightpen.formats.images import (
     ImageSource,
     decode_image,
 )
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Length,
+    Moment,
+    Vector,
+    has_checksum,
+    parse_json,
+    require_path,
+    require_usual,
+)
 from lightpen.formats.pen_files import PEN_FILE, read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
+from lightpen.record.journal import (
+    JOURNAL,
+    BackLine,
+    ImageLine,
+    Line,
+    MoreLine,
+    OutLine,
+    TakenOutLine,
+    VerdictLine,
+    damaged_line,
+    length_of,
+    parse_lines,
+    read_lines,
+)
 from lightpen.record.names import Names
 from lightpen.sentences import Sentence, sentence
 
-HEADER, JOURNAL, IMAGES = "header.json", "journal.jsonl", "images"
-FORMAT = 1
+HEADER, IMAGES = "header.json", "images"
+FORMAT = 2
+FIRST_WITH_CHECKSUMS = 2
 HEADER_LIMIT = MEGABYTE
-JOURNAL_LIMIT = 64 * MEGABYTE
-TAIL = 16_384  # bytes of a journal that hold its last few lines
 DISCARDED = "discarded"
 Plain: TypeAlias = str | int | float | bool | None
 
@@ -105,6 +129,43 @@ class Header:
     nominal_tip: FloatArray | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     settings: Mapping[str, Plain] = field(default_factory=dict)
+
+
+class FileEntry(Struct):
+    """The name of a file and the checksum of its copy, as the header has them."""
+
+    name: str
+    sha256: Digest
+
+    def __post_init__(self) -> None:
+        require_path(self.name)
+
+
+class _Format(Struct):
+    format: Annotated[int, Meta(ge=1)]
+
+
+class HeaderEntries(Struct):
+    """The header as it is written; see `Header`."""
+
+    format: int
+    created: Moment
+    program: str
+    station: str
+    operator: str
+    tip: str
+    cone: str
+    camera_file: FileEntry
+    pen_file: FileEntry
+    units: str | None
+    led_diameter_mm: Length | None
+    nominal_tip_mm: Vector | None
+    mask_px: tuple[Vector, ...]
+    settings: dict[str, Plain]
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+        _limits(self.settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,42 +274,47 @@ def open_record(folder: Path) -> Record:
         The folder is no record, or its files are damaged other than by a crash, or
         written by a later version of the program.
     """
-    header = _read_header(folder)
+    entries = _read_header(folder)
+    header = _header(folder, entries)
+    lines = read_lines(folder)
+    has_checksums = entries.format >= FIRST_WITH_CHECKSUMS
+    parsed = parse_lines(lines, folder, have_checksums=has_checksums)
+    last = 0
+    for number, line in enumerate(parsed, start=1):
+        if isinstance(line, ImageLine):
+            if line.number <= last or len(line.pixels) != _n_leds(parsed):
+                raise damaged_line(folder, number)
+            last = line.number
+    return _record(folder, header, parsed, length_of(lines))
+
+
+def _n_leds(lines: Sequence[Line]) -> int:
+    """Return how many LEDs the first image tells of."""
+    return next(len(line.pixels) for line in lines if isinstance(line, ImageLine))
+
+
+def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) -> Record:
+    """Return what a record comes to, line by line."""
     images: list[RecordedImage] = []
     taken_out: dict[int, str] = {}
     verdict, more = None, None
-    lines = _sound_lines(folder)
-    for number, line in enumerate(lines, start=1):
-        try:
-            entries = json.loads(line)
-            match entries["kind"]:
-                case "image":
-                    images.append(_recorded_image(folder, entries))
-                    verdict = None
-                case "out":
-                    taken_out.update(
-                        dict.fromkeys(entries["numbers"], entries["reason"])
-                    )
-                case "back":
-                    for image in entries["numbers"]:
-                        taken_out.pop(image, None)
-                case "verdict":
-                    verdict = str(entries["verdict"])
-                case "more":
-                    more = int(entries["min_images"]), int(entries["max_images"])
-        except (ValueError, KeyError, TypeError) as error:
-            raise FileError(
-                sentence(
-                    "record.damaged-line",
-                    "Line {line} of {file} is damaged. Restore the file from a "
-                    "copy, or remove the line to go on without that image.",
-                    line=number,
-                    file=printable(str(folder / JOURNAL)),
-                )
-            ) from error
-    return Record(
-        folder, header, tuple(images), taken_out, verdict, more, _length_of(lines)
-    )
+    for line in lines:
+        match line:
+            case ImageLine():
+                images.append(_recorded_image(folder, line))
+                verdict = None
+            case OutLine():
+                taken_out.update(dict.fromkeys(line.numbers, line.reason))
+            case BackLine():
+                for image in line.numbers:
+                    taken_out.pop(image, None)
+            case TakenOutLine():
+                taken_out = {n: why for why, ns in line.reasons.items() for n in ns}
+            case VerdictLine():
+                verdict = line.verdict
+            case MoreLine():
+                more = line.min_images, line.max_images
+    return Record(folder, header, tuple(images), taken_out, verdict, more, length)
 
 
 def record_files(record: Record) -> tuple[Path, ...]:
@@ -296,31 +362,6 @@ def unacknowledged_images(record: Record) -> tuple[str, ...]:
     known = {image_name(image.number) for image in record.images}
     found = (f"{IMAGES}/{path.name}" for path in (record.folder / IMAGES).glob("*.png"))
     return tuple(sorted(set(found) - known))
-
-
-def ends_in_verdict(folder: Path) -> bool:
-    """Return whether the end of the journal shows a verdict that no image follows.
-
-    No more is read than its last lines, so that thousands of concluded records cost
-    little. That no verdict is seen there does not mean that there is none.
-
-    Raises
-    ------
-    OSError
-        There is no journal, or it cannot be read.
-    """
-    with (folder / JOURNAL).open("rb") as journal:
-        length = journal.seek(0, os.SEEK_END)
-        journal.seek(max(0, length - TAIL))
-        lines = journal.read().split(b"\n")[:-1]
-    for line in reversed(lines):
-        try:
-            kind = json.loads(line)["kind"]
-        except (ValueError, KeyError, TypeError):  # torn, cut by the limit, or damaged
-            return False
-        if kind in ("image", "verdict"):
-            return bool(kind == "verdict")
-    return False
 
 
 def source(record: Record) -> RecordSource:
@@ -375,93 +416,72 @@ def copy_name(stem: str, file: FileCopy) -> str:
     return stem + Path(file.name).suffix.lower()
 
 
-def _recorded_image(folder: Path, entries: Mapping[str, Any]) -> RecordedImage:
-    points = [[np.nan, np.nan] if p is None else p for p in entries["pixels"]]
-    number = int(entries["number"])
+def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
+    points = [(np.nan, np.nan) if p is None else p for p in line.pixels]
     return RecordedImage(
-        number=number,
-        file=folder / image_name(number),
-        sha256=str(entries["sha256"]),
-        time=float(entries["time"]),
-        device_time_ns=entries["device_time_ns"],
+        number=line.number,
+        file=folder / image_name(line.number),
+        sha256=line.sha256,
+        time=line.time,
+        device_time_ns=line.device_time_ns,
         pixels=np.array(points, dtype=np.float64).reshape(-1, 2),
-        rotation=np.array(entries["rotation"], dtype=np.float64).reshape(3, 3),
-        translation=np.array(entries["translation"], dtype=np.float64).reshape(3),
+        rotation=np.array(line.rotation, dtype=np.float64),
+        translation=np.array(line.translation, dtype=np.float64),
     )
 
 
-def _sound_lines(folder: Path) -> list[bytes]:
-    """Return the lines of the journal but a torn last one."""
-    path = folder / JOURNAL
-    if path.is_file() and path.stat().st_size == 0:
-        return []
-    lines = read_bytes(path, sentence("file.journal", "journal"), JOURNAL_LIMIT).split(
-        b"\n"
-    )[:-1]
-    if lines and not _is_whole(lines[-1]):  # blocks of zeros, after a power cut
-        lines.pop()
-    return lines
-
-
-def sound_length(folder: Path) -> int:
-    """Return how many bytes of the journal in a folder are whole lines."""
-    return _length_of(_sound_lines(folder))
-
-
-def _length_of(lines: list[bytes]) -> int:
-    return sum(len(line) + 1 for line in lines)
-
-
-def _is_whole(line: bytes) -> bool:
-    try:
-        json.loads(line)
-    except ValueError:
-        return False
-    return True
-
-
-def _read_header(folder: Path) -> Header:
+def _read_header(folder: Path) -> HeaderEntries:
     path = folder / HEADER
-    header = sentence("file.header", "record's header")
-    data = read_bytes(path, header, HEADER_LIMIT)
+    data = read_bytes(path, sentence("file.header", "record's header"), HEADER_LIMIT)
     try:
-        entries = json.loads(data)
-        if entries["format"] > FORMAT:
-            raise _of_later_version(path, entries["format"])
-        if entries["format"] != FORMAT:
-            raise ValueError(entries["format"])
-        tip = entries["nominal_tip_mm"]
-        return Header(
-            camera=_read_copy(folder, "camera", CAMERA_FILE, entries["camera_file"]),
-            pen=_read_copy(folder, "pen", PEN_FILE, entries["pen_file"]),
-            created=datetime.fromisoformat(entries["created"]),
-            program=entries["program"],
-            station=entries["station"],
-            operator=entries["operator"],
-            tip=entries["tip"],
-            cone=entries["cone"],
-            units=entries["units"],
-            led_diameter=entries["led_diameter_mm"],
-            nominal_tip=None if tip is None else np.array(tip, dtype=np.float64),
-            mask=np.array(entries["mask_px"], dtype=np.float64).reshape(-1, 3),
-            settings=entries["settings"],
+        is_sound = has_checksum(data)
+        number = parse_json(data, _Format).format
+        if number > FORMAT:
+            raise _of_later_version(path, number)
+        if number >= FIRST_WITH_CHECKSUMS and not is_sound:
+            raise DamagedError("There is no checksum.")
+        return parse_json(data, HeaderEntries)
+    except DamagedError as error:
+        raise damaged_file(path) from error
+
+
+def _header(folder: Path, entries: HeaderEntries) -> Header:
+    """Return the header with the copies of the files that it names."""
+    tip = entries.nominal_tip_mm
+    return Header(
+        camera=_read_copy(folder, "camera", CAMERA_FILE, entries.camera_file),
+        pen=_read_copy(folder, "pen", PEN_FILE, entries.pen_file),
+        created=entries.created,
+        program=entries.program,
+        station=entries.station,
+        operator=entries.operator,
+        tip=entries.tip,
+        cone=entries.cone,
+        units=entries.units,
+        led_diameter=entries.led_diameter_mm,
+        nominal_tip=None if tip is None else np.array(tip, dtype=np.float64),
+        mask=np.array(entries.mask_px, dtype=np.float64).reshape(-1, 3),
+        settings=entries.settings,
+    )
+
+
+def damaged_file(path: Path) -> FileError:
+    """Return the error of a file of a record, other than an image or a copy."""
+    return FileError(
+        sentence(
+            "record.damaged",
+            "{path} is damaged. Restore it from a copy.",
+            path=printable(str(path)),
         )
-    except (ValueError, KeyError, TypeError) as error:
-        raise FileError(
-            sentence(
-                "record.damaged",
-                "{path} is damaged. Restore it from a copy.",
-                path=printable(str(path)),
-            )
-        ) from error
+    )
 
 
-def _of_later_version(path: Path, number: Any) -> FileError:
+def _of_later_version(path: Path, number: int) -> FileError:
     return FileError(
         sentence(
             "record.later-version",
             "{path} was written by a later version of the program (format {number}; "
-            "this version reads {known}). Open the record with that version.",
+            "this version reads up to {known}). Open the record with that version.",
             path=printable(str(path)),
             number=number,
             known=FORMAT,
@@ -469,13 +489,10 @@ def _of_later_version(path: Path, number: Any) -> FileError:
     )
 
 
-def _read_copy(
-    folder: Path, stem: str, what: Sentence, entries: Mapping[str, str]
-) -> FileCopy:
-    name = entries["name"]
-    path = folder / (stem + Path(name).suffix.lower())
+def _read_copy(folder: Path, stem: str, what: Sentence, entry: FileEntry) -> FileCopy:
+    path = folder / (stem + Path(entry.name).suffix.lower())
     data = read_bytes(path, what, 4 * MEGABYTE)
-    if sha256(data).hexdigest() != entries["sha256"]:
+    if sha256(data).hexdigest() != entry.sha256:
         raise FileError(
             sentence(
                 "record.file-changed",
@@ -484,7 +501,7 @@ def _read_copy(
                 path=printable(str(path)),
             )
         )
-    return FileCopy(name, data)
+    return FileCopy(entry.name, data)
 
 
 def recorded_names(record: Record) -> Names:
@@ -496,23 +513,28 @@ def recorded_names(record: Record) -> Names:
         pen=str(header.settings.get("pen", "")),
         tip=header.tip,
         cone=header.cone,
-        ball_diameter=_number(record, "ball_diameter_mm", 0.0) or None,
+        ball_diameter=_number(header.settings, "ball_diameter_mm", 0.0) or None,
     )
 
 
 def recorded_limits(record: Record) -> SwingLimits:
     """Return what a record's swing needed, and when it was to end."""
+    return _limits(record.header.settings)
+
+
+def _limits(settings: Mapping[str, Plain]) -> SwingLimits:
+    """Return the limits in the settings of a header; `ValueError` if there are none."""
     usual = SwingLimits()
     return SwingLimits(
-        max_uncertainty=_number(record, "max_uncertainty_mm", usual.max_uncertainty),
-        min_images=int(_number(record, "min_images", usual.min_images)),
-        max_images=int(_number(record, "max_images", usual.max_images)),
-        min_per_field=int(_number(record, "min_per_field", usual.min_per_field)),
-        spacing=_number(record, "spacing_rad", usual.spacing),
+        max_uncertainty=_number(settings, "max_uncertainty_mm", usual.max_uncertainty),
+        min_images=int(_number(settings, "min_images", usual.min_images)),
+        max_images=int(_number(settings, "max_images", usual.max_images)),
+        min_per_field=int(_number(settings, "min_per_field", usual.min_per_field)),
+        spacing=_number(settings, "spacing_rad", usual.spacing),
     )
 
 
-def _number(record: Record, key: str, usual: float) -> float:
+def _number(settings: Mapping[str, Plain], key: str, usual: float) -> float:
     """Return a number of a record's settings; older programs wrote fewer of them."""
-    value = record.header.settings.get(key)
+    value = settings.get(key)
     return value if isinstance(value, int | float) else usual

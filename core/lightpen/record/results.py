@@ -1,37 +1,100 @@
 """An accepted calibration, and how it is written.
 
-A result is one JSON object. Its first entries say who accepted what and when, and which
-swing it comes from; the last, ``calibration``, is the whole record of the calibration,
-as `lightpen.estimation.report` makes it. Results of format 1 had of it no more than tip
-and uncertainty.
+A result is one JSON object. Its first entries, the head, say who accepted what and
+when, and which swing it comes from; they end with their checksum. The last entry,
+``calibration``, is the whole record of the calibration, as
+`lightpen.estimation.report` makes it; its checksum is in the head, so that a head is
+known to be sound without the rest. Results of format 2 had no checksums, and those of
+format 1 of the calibration no more than tip and uncertainty.
 """
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.estimation.report import json_bytes
 from lightpen.formats.files import printable
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Moment,
+    Vector,
+    has_checksum,
+    in_shape,
+    parse_json,
+    require_path,
+    require_usual,
+    with_checksum,
+)
 from lightpen.record.names import Names
 from lightpen.sentences import sentence
 
-FORMAT = 2
+FORMAT = 3
+FIRST_WITH_CHECKSUM = 3
 OLD = timedelta(days=30)  # after which a tip is better calibrated again
 CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
-SHAPES = {
-    "tip_pen_mm": (3,),
-    "expanded_uncertainty_mm": (3,),
-    "cone_cam_mm": (3,),
-    "covariance": (6, 6),
-}
-N_SHAPES_1 = 2  # of these, format 1 had the first
+END = b"\n}\n"
+
+Row: TypeAlias = tuple[float, float, float, float, float, float]
+
+
+class Heading(Struct):
+    """What tells whether a result is the one that is looked for.
+
+    Attributes
+    ----------
+    pen, tip, record : str or None
+        None where a later version does not say; else as `Names` and `Result`.
+    """
+
+    format: Annotated[int, Meta(ge=1)]
+    pen: str | None = None
+    tip: str | None = None
+    record: str | None = None
+
+    def __post_init__(self) -> None:
+        require_path(self.record or "")
+
+
+class _Entries(Struct):
+    format: int
+    accepted: Moment
+    station: str
+    operator: str
+    pen: str
+    tip: str
+    cone: str
+    ball_diameter_mm: float | None
+    grade: str
+    record: str
+    images: tuple[int, ...] | None = None
+    calibration_sha256: Digest | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.accepted)
+        require_path(self.record)
+
+
+class _Calibration1(Struct):
+    tip_pen_mm: Vector
+    expanded_uncertainty_mm: Vector
+
+
+class _Calibration(_Calibration1):
+    cone_cam_mm: Vector
+    covariance: tuple[Row, Row, Row, Row, Row, Row]
+
+
+class _Whole(Struct):
+    calibration: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +162,7 @@ def result_bytes(result: Result, record: str) -> bytes:
         Where the folder of its swing is, as it is to be written.
     """
     names = result.names
+    rest = CALIBRATION + json_bytes(result.calibration).rstrip(b"\n") + END
     head = {
         "format": FORMAT,
         "accepted": result.accepted.isoformat(),
@@ -111,40 +175,33 @@ def result_bytes(result: Result, record: str) -> bytes:
         "grade": result.grade,
         "record": record,
         "images": result.images,
+        "calibration_sha256": sha256(rest).hexdigest(),
     }
-    start = json_bytes(head).removesuffix(b"\n}\n")
-    calibration = json_bytes(result.calibration).rstrip(b"\n")
-    return start + CALIBRATION + calibration + b"\n}\n"
+    return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
 
 
-def head_of(start: bytes) -> bytes | None:
-    """Return what comes before the calibration, as JSON of its own.
+def has_head(start: bytes) -> bool:
+    """Return whether the start of a result, as much as was read, has its head."""
+    return CALIBRATION in start
+
+
+def parse_heading(start: bytes, file: Path) -> Heading:
+    """Return whose result a file holds, by its start with the head, or the whole of it.
 
     Parameters
     ----------
-    start : bytes
-        Of a result, as much as was read; None is returned if that is too little, or
-        there is no calibration.
-    """
-    head, found, _ = start.partition(CALIBRATION)
-    return head + b"}" if found else None
-
-
-def parse_entries(data: bytes, file: Path) -> Mapping[str, Any]:
-    """Return the entries of a result or of its head; `file` is named if damaged.
+    file : Path
+        For the sentence.
 
     Raises
     ------
     FileError
-        It is no JSON object.
+        It is damaged.
     """
     try:
-        entries = json.loads(data)
-    except (ValueError, RecursionError) as error:
+        return _heading(_head_of(start))
+    except DamagedError as error:
         raise _damaged(file) from error
-    if not isinstance(entries, dict):
-        raise _damaged(file)
-    return entries
 
 
 def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Result:
@@ -162,46 +219,62 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
     FileError
         It is damaged, or written by a later version of the program.
     """
-    entries = parse_entries(data, file)
     try:
-        number = int(entries["format"])
+        head = _head_of(data)
+        number = _heading(head).format
         if number > FORMAT:
             raise _of_later_version(file, number)
-        keys = tuple(SHAPES)[: N_SHAPES_1 if number == 1 else None]
-        calibration = (
-            {key: entries[key] for key in keys}
-            if number == 1
-            else dict(entries["calibration"])
-        )
-        _require_numbers(calibration, keys)
-        ball, images = entries["ball_diameter_mm"], entries.get("images")
-        result = Result(
+        entries = parse_json(head if number > 1 else data, _Entries)
+        if number >= FIRST_WITH_CHECKSUM:
+            _require_digest(data[len(head) - 1 :], entries.calibration_sha256)
+        return Result(
             names=Names(
-                station=entries["station"],
-                operator=entries["operator"],
-                pen=entries["pen"],
-                tip=entries["tip"],
-                cone=entries["cone"],
-                ball_diameter=None if ball is None else float(ball),
+                station=entries.station,
+                operator=entries.operator,
+                pen=entries.pen,
+                tip=entries.tip,
+                cone=entries.cone,
+                ball_diameter=entries.ball_diameter_mm,
             ),
-            accepted=datetime.fromisoformat(entries["accepted"]),
-            grade=str(entries["grade"]),
-            record=locate(str(entries["record"])),
-            images=None if images is None else tuple(map(int, images)),
-            calibration=calibration,
+            accepted=entries.accepted,
+            grade=entries.grade,
+            record=locate(entries.record),
+            images=entries.images,
+            calibration=_calibration(data, number),
         )
-        if result.accepted.tzinfo is None:
-            raise ValueError(entries["accepted"])
-    except (ValueError, KeyError, TypeError) as error:
+    except DamagedError as error:
         raise _damaged(file) from error
-    return result
 
 
-def _require_numbers(calibration: Mapping[str, Any], keys: tuple[str, ...]) -> None:
-    for key in keys:
-        numbers = np.array(calibration[key], dtype=np.float64)
-        if numbers.shape != SHAPES[key] or not np.isfinite(numbers).all():
-            raise ValueError(key)
+def _head_of(data: bytes) -> bytes:
+    """Return what comes before the calibration, as JSON of its own."""
+    head, found, _ = data.partition(CALIBRATION)
+    return head + b"}" if found else data
+
+
+def _heading(head: bytes) -> Heading:
+    is_sound = has_checksum(head)
+    heading = parse_json(head, Heading)
+    if heading.format >= FIRST_WITH_CHECKSUM and not is_sound:
+        raise DamagedError("There is no checksum.")
+    return heading
+
+
+def _calibration(data: bytes, number: int) -> Mapping[str, Any]:
+    if number == 1:
+        first = parse_json(data, _Calibration1)
+        return {
+            "tip_pen_mm": list(first.tip_pen_mm),
+            "expanded_uncertainty_mm": list(first.expanded_uncertainty_mm),
+        }
+    calibration = parse_json(data, _Whole).calibration
+    in_shape(calibration, _Calibration)
+    return calibration
+
+
+def _require_digest(rest: bytes, digest: str | None) -> None:
+    if sha256(rest).hexdigest() != digest:
+        raise DamagedError("The checksum of the calibration is another one.")
 
 
 def _damaged(file: Path) -> FileError:

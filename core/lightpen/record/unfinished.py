@@ -5,14 +5,13 @@ from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, strerror
+from lightpen.record.journal import JOURNAL, ends_in_verdict
 from lightpen.record.lock import is_locked
 from lightpen.record.reading import (
     DISCARDED,
     HEADER,
     IMAGES,
-    JOURNAL,
     Record,
-    ends_in_verdict,
     open_record,
 )
 from lightpen.record.writing import RecordWriter

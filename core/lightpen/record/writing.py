@@ -4,31 +4,48 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+from datetime import datetime
 from hashlib import sha256
 from io import FileIO
+from itertools import chain, count
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
+from msgspec import to_builtins
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, strerror, sync_folder, write_whole
 from lightpen.formats.images import encode_png
+from lightpen.formats.own_json import with_checksum
+from lightpen.formats.part_files import sweep_parts
+from lightpen.record.journal import (
+    JOURNAL,
+    ImageLine,
+    Line,
+    MoreLine,
+    OutLine,
+    TakenOutLine,
+    VerdictLine,
+    line_bytes,
+    sound_length,
+)
 from lightpen.record.lock import lock_journal, unlock_journal
+from lightpen.record.names import Names, folder_name
 from lightpen.record.reading import (
     FORMAT,
     HEADER,
     IMAGES,
-    JOURNAL,
     FileCopy,
+    FileEntry,
     Header,
+    HeaderEntries,
     Record,
     copy_name,
     image_name,
     open_record,
-    sound_length,
 )
 from lightpen.sentences import sentence
 
@@ -65,18 +82,24 @@ class RecordWriter:
                 )
             )
         try:
-            (folder / IMAGES).mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / JOURNAL).touch(exist_ok=False)
         except OSError as error:
             raise _unwritable(folder, error) from error
-        write_whole(folder / copy_name("camera", header.camera), header.camera.data)
-        write_whole(folder / copy_name("pen", header.pen), header.pen.data)
-        write_whole(folder / JOURNAL, b"")
-        text = json.dumps(_header_entries(header), indent=1, ensure_ascii=False)
-        # The bytes of a file name that is no text become JSON escapes.
-        write_whole(folder / HEADER, text.encode("utf-8", "backslashreplace"))
-        _sync_folder(folder)
-        _sync_folder(folder.parent)
-        return cls(folder, 1, 0)
+        with ExitStack() as stack:
+            writer = cls(folder, 1, 0)  # locked from here on
+            stack.callback(writer.close)
+            try:
+                (folder / IMAGES).mkdir()
+            except OSError as error:
+                raise _unwritable(folder, error) from error
+            write_whole(folder / copy_name("camera", header.camera), header.camera.data)
+            write_whole(folder / copy_name("pen", header.pen), header.pen.data)
+            write_whole(folder / HEADER, _header_bytes(header))
+            _sync_folder(folder)
+            _sync_folder(folder.parent)
+            stack.pop_all()
+        return writer
 
     @classmethod
     def resume(cls, record: Record) -> Self:
@@ -89,9 +112,7 @@ class RecordWriter:
             cannot be written.
         """
         writer = cls(record.folder, record.next_number, record.length)
-        for part in (record.folder / IMAGES).glob(".*.part"):
-            with suppress(OSError):  # it does no harm where it is
-                part.unlink()
+        sweep_parts(record.folder / IMAGES)
         return writer
 
     @classmethod
@@ -162,37 +183,40 @@ class RecordWriter:
         write_whole(path, data)
         _sync_folder(path.parent)
         self._write_line(
-            {
-                "kind": "image",
-                "number": number,
-                "sha256": sha256(data).hexdigest(),
-                "time": time,
-                "device_time_ns": device_time_ns,
-                "pixels": [_point(point) for point in pixels],
-                "rotation": rotation.tolist(),
-                "translation": translation.tolist(),
-            }
+            ImageLine(
+                number=number,
+                sha256=sha256(data).hexdigest(),
+                time=time,
+                device_time_ns=device_time_ns,
+                pixels=tuple(map(_point, pixels)),
+                rotation=rotation.tolist(),
+                translation=translation.tolist(),
+            )
         )
         self._next_number = number + 1
         return number
 
     def take_out(self, numbers: Sequence[int], reason: str) -> None:
         """Leave images out of the calibration; they stay on the disk."""
-        self._write_line({"kind": "out", "numbers": list(numbers), "reason": reason})
+        self._write_line(OutLine(tuple(numbers), str(reason)))
 
-    def put_back(self, numbers: Sequence[int]) -> None:
-        """Let images take part in the calibration again."""
-        self._write_line({"kind": "back", "numbers": list(numbers)})
+    def set_taken_out(self, taken_out: Mapping[int, str]) -> None:
+        """Leave these images out of the calibration, for a reason each, and no others.
+
+        It is one line, so that a kill leaves all of an edit or nothing.
+        """
+        reasons: dict[str, tuple[int, ...]] = {}
+        for number, reason in sorted(taken_out.items()):
+            reasons[reason] = (*reasons.get(reason, ()), number)
+        self._write_line(TakenOutLine(reasons))
 
     def ask_for_more(self, min_images: int, max_images: int) -> None:
         """Note that the swing goes on after a verdict, and to how many images."""
-        self._write_line(
-            {"kind": "more", "min_images": min_images, "max_images": max_images}
-        )
+        self._write_line(MoreLine(min_images, max_images))
 
     def conclude(self, verdict: str) -> None:
         """Write the verdict: the swing is no longer interrupted."""
-        self._write_line({"kind": "verdict", "verdict": verdict})
+        self._write_line(VerdictLine(str(verdict)))
 
     def close(self) -> None:
         """Close the journal and let other writers in."""
@@ -201,8 +225,8 @@ class RecordWriter:
         with self._journal, suppress(OSError):  # closing does it, too
             unlock_journal(self._journal)
 
-    def _write_line(self, entries: Mapping[str, Any]) -> None:
-        line = json.dumps(entries, allow_nan=False).encode() + b"\n"
+    def _write_line(self, entries: Line) -> None:
+        line = line_bytes(entries)
         length = len(line)
         try:
             # What a crash or a write that failed left of a line.
@@ -215,6 +239,33 @@ class RecordWriter:
                 self._journal.truncate(self._length)
             raise _unwritable(self._folder / JOURNAL, error) from error
         self._length += length
+
+
+def make_folder(root: Path, names: Names, now: datetime) -> Path:
+    """Make a folder for a record, with a name that none had.
+
+    Of two programs that do so in the same second each gets its own.
+
+    Parameters
+    ----------
+    root : Path
+        That the records are in.
+
+    Raises
+    ------
+    FileError
+        No folder can be made there.
+    """
+    name = folder_name(names, now)
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        for tail in chain([""], map("-{}".format, count(2))):
+            with suppress(FileExistsError):
+                (folder := root / (name + tail)).mkdir()
+                break
+    except OSError as error:
+        raise _unwritable(root, error) from error
+    return folder
 
 
 def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
@@ -231,13 +282,9 @@ def note_taken_out(folder: Path, taken_out: Mapping[int, str]) -> None:
         The record cannot be written.
     """
     record = open_record(folder)
-    back = sorted(set(record.taken_out) - set(taken_out))
-    out = sorted(set(taken_out) - set(record.taken_out))
     with RecordWriter.resume(record) as writer:
-        if back:
-            writer.put_back(back)
-        for reason in sorted({taken_out[number] for number in out}):
-            writer.take_out([n for n in out if taken_out[n] == reason], reason)
+        if record.taken_out != taken_out:
+            writer.set_taken_out(taken_out)
 
 
 def _own_journal(folder: Path, length: int) -> FileIO:
@@ -263,33 +310,35 @@ def _own_journal(folder: Path, length: int) -> FileIO:
     return journal
 
 
-def _header_entries(header: Header) -> dict[str, Any]:
-    return {
-        "format": FORMAT,
-        "created": header.created.isoformat(),
-        "program": header.program,
-        "station": header.station,
-        "operator": header.operator,
-        "tip": header.tip,
-        "cone": header.cone,
-        "camera_file": _copy_entries(header.camera),
-        "pen_file": _copy_entries(header.pen),
-        "units": header.units,
-        "led_diameter_mm": header.led_diameter,
-        "nominal_tip_mm": (
-            None if header.nominal_tip is None else header.nominal_tip.tolist()
-        ),
-        "mask_px": header.mask.tolist(),
-        "settings": dict(header.settings),
-    }
+def _header_bytes(header: Header) -> bytes:
+    tip = header.nominal_tip
+    entries = HeaderEntries(
+        format=FORMAT,
+        created=header.created,
+        program=header.program,
+        station=header.station,
+        operator=header.operator,
+        tip=header.tip,
+        cone=header.cone,
+        camera_file=_file_entry(header.camera),
+        pen_file=_file_entry(header.pen),
+        units=header.units,
+        led_diameter_mm=header.led_diameter,
+        nominal_tip_mm=None if tip is None else tip.tolist(),
+        mask_px=header.mask.tolist(),
+        settings=dict(header.settings),
+    )
+    text = json.dumps(to_builtins(entries), indent=1, ensure_ascii=False)
+    # The bytes of a file name that is no text become JSON escapes.
+    return with_checksum(text.encode("utf-8", "backslashreplace"))
 
 
-def _copy_entries(file: FileCopy) -> dict[str, str]:
-    return {"name": file.name, "sha256": sha256(file.data).hexdigest()}
+def _file_entry(file: FileCopy) -> FileEntry:
+    return FileEntry(file.name, sha256(file.data).hexdigest())
 
 
-def _point(point: FloatArray) -> list[float] | None:
-    return point.tolist() if np.isfinite(point).all() else None
+def _point(point: FloatArray) -> tuple[float, float] | None:
+    return (float(point[0]), float(point[1])) if np.isfinite(point).all() else None
 
 
 def _unwritable(path: Path, error: OSError) -> FileError:

@@ -19,7 +19,6 @@ from lightpen.messages import no_tip
 from lightpen.model.limits import SwingLimits
 from lightpen.record.acceptance import accept
 from lightpen.record.archive import Archive
-from lightpen.record.names import new_folder
 from lightpen.record.reading import (
     DISCARDED,
     open_record,
@@ -28,7 +27,7 @@ from lightpen.record.reading import (
 )
 from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.unfinished import discard_swing
-from lightpen.record.writing import RecordWriter, note_taken_out
+from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.capture import capture_image
@@ -211,7 +210,7 @@ class SwingCourse:
     def begin(self, preparation: Preparation) -> None:
         """Begin a new swing, or say why it cannot."""
         try:
-            folder = new_folder(self._records, preparation.names, self._now())
+            folder = make_folder(self._records, preparation.names, self._now())
             RecordWriter.create(folder, preparation.header()).close()
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:

@@ -5,12 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.record.reading import Record, open_record, recorded_limits, source
+from lightpen.model.pen import Pen
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import (
+    Record,
+    damaged_file,
+    open_record,
+    recorded_limits,
+    source,
+)
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.kept_images import kept_before
 from lightpen.swing.rules import start_again
 from lightpen.swing.shortfall import limits_for_more
 from lightpen.swing.state import SwingSetup, SwingState
+
+ROUNDING = 1e-6  # of a rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +54,8 @@ def read_resumable(folder: Path) -> Resumable:
     """
     record = open_record(folder)
     setup = recorded_setup(record)
+    if not _shows(record, setup.pen):
+        raise damaged_file(folder / JOURNAL)
     if record.more is not None:
         min_images, max_images = record.more
         limits = replace(setup.limits, min_images=min_images, max_images=max_images)
@@ -67,6 +79,22 @@ def read_for_more(folder: Path) -> Resumable:
         writer.ask_for_more(limits.min_images, limits.max_images)
     setup = replace(swing.setup, limits=limits)
     return replace(swing, record=open_record(folder), setup=setup)
+
+
+def _shows(record: Record, pen: Pen) -> bool:
+    """Return whether the journal can be of this pen before a camera.
+
+    Lines of format 1 have no checksum that would tell.
+    """
+    for image in record.images:
+        R, t = image.rotation, image.translation
+        if len(image.pixels) != pen.n_leds:
+            return False
+        if not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=ROUNDING):
+            return False
+        if (pen.leds @ R[2] + t[2]).min() <= 0:
+            return False
+    return True
 
 
 def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingState:

@@ -2727,8 +2727,16 @@
         <translation>旋转矩阵似乎被转置：按现有数据，各位姿的测头散布为 {as_read:.3g} mm，转置后为 {undone:.3g} mm。请按行给出 r11 至 r33，且旋转与平移均为 cam_from_pen。</translation>
     </message>
     <message>
-        <source>The settings cannot be saved: {file} cannot be written. Make sure that its folder is yours to write and that the disk is not full.</source>
-        <translation>设置无法保存：无法写入 {file}。请确认您有该文件夹的写入权限，且磁盘未满。</translation>
+        <source>The settings cannot be saved: {file} cannot be written ({reason}). Make sure that its folder is yours to write and that the disk is not full.</source>
+        <translation>无法保存设置：无法写入 {file}（{reason}）。请确认您对其文件夹有写入权限，且磁盘未满。</translation>
+    </message>
+    <message>
+        <source>The settings {file} are damaged and were set aside as {aside}. Restore them from a copy, or choose anew what is missing.</source>
+        <translation>设置文件 {file} 已损坏，已另存为 {aside}。请用备份恢复，或重新选择缺少的内容。</translation>
+    </message>
+    <message>
+        <source>The settings {file} were saved, though another program kept them to itself for {seconds:g} s. End that program if it hangs, or it may change them back.</source>
+        <translation>设置 {file} 已保存，但另一个程序将其占用了 {seconds:g} s。如果该程序已无响应，请结束它，否则它可能会把设置改回去。</translation>
     </message>
     <message>
         <source>The sign of t{axis} looks wrong: as they are read the poses scatter by {as_read:.3g} mm about one tip, with the other sign by {undone:.3g} mm. Give rotations and translations in the same right-handed frame.</source>
@@ -3045,6 +3053,10 @@
     <message>
         <source>result</source>
         <translation>结果</translation>
+    </message>
+    <message>
+        <source>settings file</source>
+        <translation>设置文件</translation>
     </message>
     <message>
         <source>source of images</source>
@@ -3507,8 +3519,8 @@
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
-        <source>{path} was written by a later version of the program (format {number}; this version reads {known}). Open the record with that version.</source>
-        <translation>{path} 由更新版本的程序写入（格式 {number}；本版本读取 {known}）。请用该版本打开记录。</translation>
+        <source>{path} was written by a later version of the program (format {number}; this version reads up to {known}). Open the record with that version.</source>
+        <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
     </message>
     <message>
         <source>{place} holds no images. Choose a recording that holds some.</source>

@@ -1,5 +1,13 @@
 """Choices outlive the program; a damaged file gives the defaults."""
 
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,10 +15,10 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
-from lightpen.errors import FileError
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings import Preferences, Settings, Station, settings_file
+from lightpen_app.work.settings_store import PATIENCE
 
 STATION = Station(
     operator="Zoë, 王 / \\ %",
@@ -28,8 +36,33 @@ PREFERENCES = Preferences(
 )
 
 
+HOLDER = """
+import sys, time
+from pathlib import Path
+from lightpen.formats.file_locks import folder_locked
+
+with folder_locked(Path(sys.argv[1]), 0.0) as is_alone:
+    print("held" if is_alone else "taken", flush=True)
+    time.sleep(600)
+"""
+TIMEOUT = 60.0  # s
+RUBBISH = [
+    bytes(range(256)) * 8,
+    b"{",
+    b"[]",
+    b'{"stations": []}',
+    b'{"a": {"b": NaN}}',
+    b"[" * 100_000,
+]
+
+
+def write(file: Path, content: object) -> None:
+    file.parent.mkdir()
+    file.write_text(json.dumps(content))
+
+
 def reopened(settings: Settings) -> Settings:
-    settings.sync()
+    assert settings.await_saved(TIMEOUT)
     return Settings(settings.file)
 
 
@@ -79,14 +112,21 @@ def test_a_station_needs_a_name(settings: Settings) -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["distance_m=near", "distance_m=nan", "language=tlh", "muted=1", "muted=a, b"],
+    "entries",
+    [
+        {"distance_m": "near"},
+        {"distance_m": "nan"},
+        {"distance_m": None},
+        {"distance_m": [3.0]},
+        {"language": "tlh"},
+        {"muted": "loud"},
+        {"muted": {"a": 1}},
+    ],
 )
 def test_a_value_that_makes_no_sense_gives_the_default(
-    settings: Settings, text: str
+    settings: Settings, entries: dict[str, object]
 ) -> None:
-    settings.file.parent.mkdir()
-    settings.file.write_text(f"[preferences]\n{text}\nappearance=dark\n")
+    write(settings.file, {"preferences": entries | {"appearance": "dark"}})
 
     preferences = Settings(settings.file).preferences()
 
@@ -96,11 +136,132 @@ def test_a_value_that_makes_no_sense_gives_the_default(
     assert preferences.appearance is Appearance.DARK
 
 
-def test_a_file_of_rubbish_gives_the_defaults(settings: Settings) -> None:
+@pytest.mark.parametrize("content", RUBBISH)
+def test_a_damaged_file_gives_the_defaults_is_told_and_kept(
+    settings: Settings, content: bytes
+) -> None:
     settings.file.parent.mkdir()
-    settings.file.write_bytes(bytes(range(256)) * 8)
+    settings.file.write_bytes(content)
 
-    assert Settings(settings.file).station("any") == Station()
+    again = Settings(settings.file)
+
+    assert again.station("any") == Station()
+    assert "set aside as lightpen.json.damaged" in str(again.trouble)
+    aside = settings.file.with_name("lightpen.json.damaged")
+    assert aside.read_bytes() == content
+
+
+def test_a_file_damaged_meanwhile_costs_nothing_that_is_known(
+    settings: Settings, qtbot: QtBot
+) -> None:
+    settings.set_station("Hall 3", STATION)
+    assert settings.await_saved(TIMEOUT)
+    settings.file.write_bytes(b"{")
+
+    with qtbot.waitSignal(settings.troubled) as told:
+        settings.set_last_station("Hall 3")
+
+    assert "were set aside" in str(told.args[0])
+    assert reopened(settings).station("Hall 3") == STATION
+
+
+def test_a_pipe_in_place_of_the_file_is_told_and_waited_for_by_nobody(
+    settings: Settings, qtbot: QtBot
+) -> None:
+    settings.file.parent.mkdir()
+    os.mkfifo(settings.file)
+
+    again = Settings(settings.file)
+    with qtbot.waitSignal(again.troubled):
+        again.set_last_station("Hall 3")
+
+    assert "is a pipe or a device" in str(again.trouble)
+    assert again.last_station() == "Hall 3"
+    assert again.await_saved(TIMEOUT)
+
+
+def test_two_windows_keep_what_each_has_changed(settings: Settings) -> None:
+    other = Settings(settings.file)
+    settings.set_station("Hall 3", STATION)
+    settings.set_last_station("Hall 3")
+    assert settings.await_saved(TIMEOUT)
+    other.set_station("Hall 4", Station(operator="Ann"))
+    other.set_preferences(PREFERENCES)
+
+    again = reopened(other)
+
+    assert again.stations() == ("Hall 3", "Hall 4")
+    assert again.station("Hall 3") == STATION
+    assert again.last_station() == "Hall 3"
+    assert again.preferences() == PREFERENCES
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs locks of folders")
+def test_a_stopped_program_that_holds_the_settings_keeps_nobody_from_saving(
+    settings: Settings, qtbot: QtBot
+) -> None:
+    settings.file.parent.mkdir()
+    words = [sys.executable, "-c", HOLDER, str(settings.file.parent)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        holder.send_signal(signal.SIGSTOP)
+
+        start = time.monotonic()
+        with qtbot.waitSignal(settings.troubled) as told:
+            settings.set_station("Hall 3", STATION)
+            elapsed = time.monotonic() - start
+
+        assert elapsed < PATIENCE
+        assert "another program kept them to itself" in str(told.args[0])
+        assert reopened(settings).station("Hall 3") == STATION
+        holder.kill()
+
+
+@pytest.mark.parametrize("content", [b"", b"1\nother\nfar\n", bytes(64)])
+def test_a_lock_that_version_0_1_has_left_is_no_matter(
+    settings: Settings, content: bytes
+) -> None:
+    settings.file.parent.mkdir()
+    for name in ("lightpen.ini.lock", "lightpen.json.lock"):
+        (settings.file.parent / name).write_bytes(content)
+    settings.set_station("Hall 3", STATION)
+
+    assert reopened(settings).station("Hall 3") == STATION
+
+
+def test_what_is_set_is_on_the_disk_within_a_second(settings: Settings) -> None:
+    for n in range(20):
+        settings.set_station("Hall 3", replace(STATION, pen=f"LP-{n}"))
+        settings.set_last_station(f"Hall {n}")
+    assert settings.await_saved(1.0)
+
+    again = Settings(settings.file)
+    assert (again.station("Hall 3").pen, again.last_station()) == ("LP-19", "Hall 19")
+
+
+def test_the_settings_of_version_0_1_are_taken_over_and_left_as_they_are(
+    settings: Settings, qtbot: QtBot, version_0_1: Path
+) -> None:
+    settings.file.parent.mkdir()
+    old = settings.file.with_suffix(".ini")
+    content = (version_0_1 / "lightpen.ini").read_bytes()
+    old.write_bytes(content)
+
+    taken_over = Settings(settings.file)
+    taken_over.set_last_station("Hall 5")
+    again = reopened(taken_over)
+
+    assert again.preferences() == replace(PREFERENCES, appearance=Appearance.SYSTEM)
+    assert again.stations() == ("Hall 3/2", "Hall\\4")
+    assert again.station("Hall 3/2") == STATION
+    assert again.station("Hall\\4").min_images == 60
+    assert again.last_station() == "Hall 5"
+    window = QWidget()
+    qtbot.addWidget(window)
+    window.setObjectName("main")
+    assert again.restore_geometry(window)
+    assert old.read_bytes() == content
 
 
 def test_a_window_comes_back_where_it_was(qtbot: QtBot, settings: Settings) -> None:
@@ -118,16 +279,23 @@ def test_a_window_comes_back_where_it_was(qtbot: QtBot, settings: Settings) -> N
     assert windows[1].geometry() == place
 
 
-def test_settings_that_cannot_be_saved_are_told(tmp_path: Path) -> None:
+def test_settings_that_cannot_be_saved_are_told_and_saved_when_they_can_be(
+    tmp_path: Path, qtbot: QtBot
+) -> None:
     (tmp_path / "file").write_text("not a folder")
-    settings = Settings(tmp_path / "file" / "lightpen.ini")
+    settings = Settings(tmp_path / "file" / "lightpen.json")
 
-    with pytest.raises(FileError, match=r"cannot be saved: .*lightpen\.ini"):
-        settings.set_preferences(Preferences())
+    with qtbot.waitSignal(settings.troubled) as told:
+        settings.set_preferences(PREFERENCES)
+    assert re.search(r"cannot be saved: .*lightpen\.json", str(told.args[0]))
+
+    (tmp_path / "file").unlink()
+    settings.set_last_station("Hall 3")
+    assert reopened(settings).preferences() == PREFERENCES
 
 
 def test_the_file_belongs_to_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere/else")
 
-    assert settings_file().name == "lightpen.ini"
+    assert settings_file().name == "lightpen.json"
     assert settings_file().parent.name == "lightpen"

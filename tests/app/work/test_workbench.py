@@ -165,7 +165,7 @@ def test_without_a_station_nothing_is_remembered(stage: Stage) -> None:
 def test_a_first_start_has_the_files_of_the_simulated_pen(
     tmp_path: Path, workbench: Workbench, qtbot: QtBot
 ) -> None:
-    settings = Settings(tmp_path / "new" / "lightpen.ini")
+    settings = Settings(tmp_path / "new" / "lightpen.json")
     first = Workbench(settings, tmp_path / "new data", workbench.around)
     first.start()
     qtbot.waitUntil(lambda: not first.is_reading)
@@ -242,11 +242,13 @@ def test_sample_files_that_cannot_be_written_are_told(
 def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
     stage: Stage,
 ) -> None:
+    assert stage.settings.await_saved(120.0)
     shutil.rmtree(stage.settings.file.parent)
     stage.settings.file.parent.write_text("not a folder")
     stage.choose(names=OTHER)
 
     assert stage.workbench.preparation.names == OTHER
+    stage.qtbot.waitUntil(lambda: bool(stage.sentences))
     assert "The settings cannot be saved" in stage.sentences[0]
 
 

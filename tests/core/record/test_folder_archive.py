@@ -1,23 +1,42 @@
 """Accepted tips: the last one of a pen and tip is in force, and none is ever lost."""
 
+import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lightpen.errors import FileError
+from lightpen.formats.own_json import with_checksum
 from lightpen.record.folder_archive import HEAD, FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 
+N_RIVALS, N_RIVAL_RESULTS = 4, 10
+RIVAL = f"""
+import sys
+from pathlib import Path
+from lightpen.record.folder_archive import FolderArchive
+sys.path.insert(0, sys.argv[1])
+from test_folder_archive import result
+
+archive = FolderArchive(Path(sys.argv[2]))
+print("ready", flush=True)
+sys.stdin.readline()
+for n in range({N_RIVAL_RESULTS}):
+    archive.store(result(3.0 * n))
+"""
 NAMES = Names("Halle 3", "Jörg", "LP-04", "T-10", "C-1", 3.0005)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 
@@ -62,6 +81,29 @@ def of_format_1(record: str) -> str:
         "record": record,
     }
     return json.dumps(entries, indent=1, ensure_ascii=False)
+
+
+def entries_of(file: Path) -> dict[str, Any]:
+    """Return the entries of a result but its checksums."""
+    entries: dict[str, Any] = json.loads(file.read_bytes())
+    return {
+        name: entry
+        for name, entry in entries.items()
+        if name not in ("checksum", "calibration_sha256")
+    }
+
+
+def rewrite(file: Path, entries: dict[str, Any]) -> None:
+    """Write a result with other entries as format 2 had it, without a checksum."""
+    file.write_text(json.dumps(entries_of(file) | {"format": 2} | entries))
+
+
+def with_flipped_bit(content: bytes, bit: int) -> bytes:
+    return (
+        content[: bit // 8]
+        + bytes([content[bit // 8] ^ 1 << bit % 8])
+        + content[bit // 8 + 1 :]
+    )
 
 
 @pytest.fixture
@@ -137,12 +179,58 @@ def test_nothing_is_overwritten_even_at_the_same_instant(
     for n in range(5):
         archive.store(result(3.0 * n))
 
+    assert [file.name for file in files_of(archive)] == [
+        f"{n:06d}.json" for n in range(1, 6)
+    ]
     tips = [
         json.loads(file.read_bytes())["calibration"]["tip_pen_mm"][0]
         for file in files_of(archive)
     ]
     assert tips == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert x_in_force(archive) == 4.0
+
+
+def test_programs_that_accept_at_once_take_one_number_each(
+    archive: FolderArchive,
+) -> None:
+    own, data = Path(__file__).parent, archive.folder.parent
+    words = [sys.executable, "-c", RIVAL, str(own), str(data)]
+    rivals = [
+        subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        for _ in range(N_RIVALS)
+    ]
+    for rival in rivals:  # all of them wait, then all of them start
+        assert rival.stdout is not None
+        assert rival.stdout.readline() == b"ready\n"
+    for rival in rivals:
+        assert rival.stdin is not None
+        rival.stdin.write(b"go\n")
+        rival.stdin.flush()
+    for rival in rivals:
+        rival.communicate()
+        assert rival.returncode == 0
+
+    n_results = N_RIVALS * N_RIVAL_RESULTS
+    assert sorted(file.name for file in archive.folder.iterdir()) == [
+        f"{n:06d}.json" for n in range(1, n_results + 1)
+    ]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs names that are not links")
+def test_on_a_disk_without_links_two_programs_take_one_number_each_too(
+    archive: FolderArchive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self: Path, target: Path) -> None:
+        raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+
+    monkeypatch.setattr(Path, "hardlink_to", refuse)
+    with ThreadPoolExecutor(N_RIVALS) as threads:
+        list(threads.map(archive.store, [result(3.0 * n) for n in range(20)]))
+
+    assert sorted(
+        json.loads(f.read_bytes())["calibration"]["cone_cam_mm"][0]
+        for f in files_of(archive)
+    ) == [3.0 * n for n in range(20)]
 
 
 @pytest.mark.parametrize(
@@ -180,7 +268,7 @@ def test_a_damaged_result_is_told_and_not_passed_over(
     file = files_of(archive)[1]
     file.write_bytes(content)
 
-    with pytest.raises(FileError, match="000002_") as caught:
+    with pytest.raises(FileError, match="000002") as caught:
         archive.in_force("LP-04", "T-10")
     assert str(file) in str(caught.value)
 
@@ -191,7 +279,7 @@ def test_a_result_cut_anywhere_is_damaged(archive: FolderArchive) -> None:
     content = file.read_bytes()
     for length in range(0, len(content) - 2, 7):
         file.write_bytes(content[:length])
-        with pytest.raises(FileError, match="000001_"):
+        with pytest.raises(FileError, match="000001"):
             archive.in_force("LP-04", "T-10")
 
 
@@ -211,7 +299,7 @@ def test_an_entry_that_makes_no_sense_is_damage(
 ) -> None:
     archive.store(result())
     (file,) = files_of(archive)
-    file.write_text(json.dumps(json.loads(file.read_bytes()) | {key: value}))
+    rewrite(file, {key: value})
 
     with pytest.raises(FileError, match="is damaged"):
         archive.in_force("LP-04", "T-10")
@@ -232,22 +320,48 @@ def test_a_tip_that_makes_no_sense_is_damage(
 ) -> None:
     archive.store(result())
     (file,) = files_of(archive)
-    entries = json.loads(file.read_bytes())
-    entries["calibration"][key] = value
-    file.write_text(json.dumps(entries))
+    calibration = json.loads(file.read_bytes())["calibration"]
+    rewrite(file, {"calibration": calibration | {key: value}})
 
     with pytest.raises(FileError, match="is damaged"):
         archive.in_force("LP-04", "T-10")
 
 
-def test_a_result_written_anew_by_other_programs_is_read(
+def test_a_result_of_format_2_is_read_without_a_checksum(
     archive: FolderArchive,
 ) -> None:
     archive.store(result(3.0))
     (file,) = files_of(archive)
-    file.write_text(json.dumps(json.loads(file.read_bytes())))
+    rewrite(file, {})
 
     assert x_in_force(archive) == 1.0
+    assert in_force(archive).images == (1, 2, 4)
+
+
+def test_a_result_that_another_program_wrote_anew_is_told(
+    archive: FolderArchive,
+) -> None:
+    """Nobody can tell that from damage."""
+    archive.store(result(3.0))
+    (file,) = files_of(archive)
+    file.write_text(json.dumps(json.loads(file.read_bytes())))
+
+    with pytest.raises(FileError, match=r"000001\.json is damaged"):
+        archive.in_force("LP-04", "T-10")
+
+
+@pytest.mark.parametrize("entry", ["checksum", "calibration_sha256"])
+def test_a_result_without_a_checksum_it_should_have_is_told(
+    archive: FolderArchive, entry: str
+) -> None:
+    archive.store(result(3.0))
+    (file,) = files_of(archive)
+    entries = json.loads(file.read_bytes())
+    del entries[entry]
+    file.write_text(json.dumps(entries))
+
+    with pytest.raises(FileError, match=r"000001\.json is damaged"):
+        archive.in_force("LP-04", "T-10")
 
 
 def test_a_result_of_a_later_version_is_refused_and_hides_none(
@@ -257,12 +371,33 @@ def test_a_result_of_a_later_version_is_refused_and_hides_none(
     archive.store(result(6.0))
     archive.store(result(9.0))
     file = files_of(archive)[2]
-    entries = json.loads(file.read_bytes())
-    file.write_text(json.dumps(entries | {"format": 3, "calibration": "elsewhere"}))
+    later = json.dumps(entries_of(file) | {"format": 4, "calibration": "elsewhere"})
+    file.write_bytes(with_checksum(later.encode()))
 
-    with pytest.raises(FileError, match=r"later version of the program \(format 3"):
+    with pytest.raises(FileError, match=r"later version of the program \(format 4"):
         archive.in_force("LP-04", "T-10")
     assert x_in_force(archive, tip="T-11") == 1.0
+
+
+def test_no_flipped_bit_puts_another_tip_in_force_and_each_is_named(
+    archive: FolderArchive,
+) -> None:
+    archive.store(result(3.0))
+    archive.store(result(6.0, accepted=NOON + timedelta(1)))
+    file = files_of(archive)[1]
+    content = file.read_bytes()
+
+    passed = []
+    for bit in range(0, 8 * len(content), 11):
+        file.write_bytes(with_flipped_bit(content, bit))
+        try:
+            archive.in_force("LP-04", "T-10")
+        except FileError as error:
+            assert str(file) in str(error)  # noqa: PT017 - thousands of them
+        else:
+            passed.append(bit)
+
+    assert passed == []
 
 
 def test_a_ball_diameter_that_is_not_known_is_stored_as_none(
@@ -291,7 +426,7 @@ def test_other_files_in_the_folder_are_left_alone(archive: FolderArchive) -> Non
     (archive.folder / "000009_x.txt").write_text("no result")
     archive.store(result(3.0))
 
-    assert [file.name[:7] for file in files_of(archive)] == ["000001_", "notes.j"]
+    assert [file.name[:7] for file in files_of(archive)] == ["000001.", "notes.j"]
     assert x_in_force(archive) == 1.0
 
 
@@ -399,10 +534,10 @@ def test_a_thousand_results_of_other_pens_cost_little(archive: FolderArchive) ->
     many = [{"file": f"{n:06d}.png", "leds": [0.5] * 100} for n in range(300)]
     whole = replace(result(), calibration={**result().calibration, "frames": many})
     archive.store(whole)
-    (first,) = files_of(archive)
-    content = first.read_bytes().replace(b"LP-04", b"LP-05")
-    for number in range(2, 1001):
-        (archive.folder / f"{number:06d}_x.json").write_bytes(content)
+    archive.store(replace(whole, names=replace(NAMES, pen="LP-05")))
+    content = files_of(archive)[1].read_bytes()
+    for number in range(3, 1001):
+        (archive.folder / f"{number:06d}.json").write_bytes(content)
 
     start = time.perf_counter()
     found = in_force(archive)

@@ -197,21 +197,24 @@ def test_damage_in_the_middle_is_refused_and_located(
 @pytest.mark.parametrize(
     ("number", "sentence"),
     [
-        (2, r"written by a later version of the program \(format 2; this version read"),
+        (3, r"written by a later version of the program \(format 3; this version read"),
         (0, "header.json is damaged"),
         ("new", "header.json is damaged"),
         (None, "header.json is damaged"),
     ],
 )
 def test_a_record_of_another_format_is_refused(
-    tmp_path: Path, header: Header, number: object, sentence: str
+    tmp_path: Path,
+    header: Header,
+    rewrite_header: Callable[..., None],
+    number: object,
+    sentence: str,
 ) -> None:
-    path = recorded(tmp_path / "swing", header, 1) / "header.json"
-    entries = json.loads(path.read_text("utf-8"))
-    path.write_text(json.dumps(entries | {"format": number}), "utf-8")
+    folder = recorded(tmp_path / "swing", header, 1)
+    rewrite_header(folder, format=number)
 
     with pytest.raises(FileError, match=sentence):
-        open_record(path.parent)
+        open_record(folder)
 
 
 def test_one_program_at_a_time_writes_to_a_record(
@@ -317,7 +320,7 @@ def test_images_are_taken_out_and_put_back(tmp_path: Path, header: Header) -> No
         for seed in range(4):
             append(writer, seed)
         writer.take_out([2, 3], "tip slipped")
-        writer.put_back([3])
+        writer.set_taken_out({2: "tip slipped"})
 
     record = open_record(tmp_path / "swing")
     assert record.numbers.tolist() == [1, 3, 4]

@@ -9,10 +9,18 @@ from pathlib import Path
 import pytest
 
 from lightpen.record.names import Names
-from lightpen.record.results import OLD, Result, head_of, parse_result, result_bytes
+from lightpen.record.results import (
+    CALIBRATION,
+    OLD,
+    Result,
+    has_head,
+    parse_heading,
+    parse_result,
+    result_bytes,
+)
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
-FILE = Path("000001_x.json")
+FILE = Path("000001.json")
 RESULT = Result(
     names=Names("Halle 3", "Jörg", "LP-04", "T-10", "C-1", 3.0005),
     accepted=NOON,
@@ -34,25 +42,25 @@ def test_a_tip_grows_old(age: timedelta, old: bool) -> None:
     assert RESULT.is_old(NOON + age) is old
 
 
-def test_the_head_says_all_but_the_calibration_and_needs_no_more_of_the_file() -> None:
+def test_the_head_tells_whose_it_is_and_needs_no_more_of_the_file() -> None:
     written = result_bytes(RESULT, "records/1")
-    head = head_of(written)
-    assert head is not None
+    length = written.index(CALIBRATION) + len(CALIBRATION)
 
-    assert head_of(written[: len(head) + 20]) == head
-    assert head_of(written[: len(head)]) is None
-    entries = json.loads(written)
-    del entries["calibration"]
-    assert json.loads(head) == entries
+    assert has_head(written[:length])
+    assert not has_head(written[: length - 1])
+    heading = parse_heading(written[:length], FILE)
+    assert (heading.format, heading.pen, heading.tip) == (3, "LP-04", "T-10")
+    assert heading.record == "records/1"
+    assert list(json.loads(written))[-2:] == ["checksum", "calibration"]
 
 
-@pytest.mark.parametrize("text", [',\n  "calibration": ', '"calibration": {'])
+@pytest.mark.parametrize(
+    "text", [',\n  "calibration": ', '"calibration": {', ', "checksum": "']
+)
 def test_a_name_like_the_end_of_the_head_is_no_end(text: str) -> None:
-    named = replace(RESULT, names=replace(RESULT.names, operator=text))
-    head = head_of(result_bytes(named, "records/1"))
+    named = replace(RESULT, names=replace(RESULT.names, pen=text))
 
-    assert head is not None
-    assert json.loads(head)["operator"] == text
+    assert parse_heading(result_bytes(named, "records/1"), FILE).pen == text
 
 
 def test_each_image_has_a_line_of_its_own_to_be_read_by_people() -> None:

@@ -13,7 +13,8 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, Cancelled, FileError
 from lightpen.estimation.report import calibration_record
 from lightpen.model.limits import SwingLimits
-from lightpen.record.reading import JOURNAL, image_name, open_record, record_files
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import image_name, open_record, record_files
 from lightpen.record.solving import (
     Solution,
     record_inputs,

@@ -13,8 +13,9 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, HEADER, JOURNAL, open_record
+from lightpen.record.reading import DISCARDED, HEADER, open_record
 from lightpen.record.unfinished import (
     discard_damaged,
     discard_swing,
@@ -44,7 +45,7 @@ def preparation(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
 
 def append(writer: RecordWriter, n_images: int) -> None:
     for _ in range(n_images):
-        writer.append(BLACK, np.ones((10, 2)), np.eye(3), np.ones(3), 0.0)
+        writer.append(BLACK, np.ones((10, 2)), np.eye(3), np.full(3, 1e3), 0.0)
 
 
 def recorded(
@@ -96,7 +97,7 @@ def test_images_taken_out_after_the_verdict_do_not(
     with recorded(preparation, tmp_path / "a", 3) as writer:
         writer.conclude("check")
         writer.take_out([1], "taken out")
-        writer.put_back([1])
+        writer.set_taken_out({})
 
     assert names_found(tmp_path) == []
 
@@ -346,3 +347,41 @@ def test_a_swing_that_goes_on_after_its_verdict_is_resumed_with_the_same_limits(
     assert more.setup.limits.min_images > limits.max_images
     assert again.setup.limits == more.setup.limits
     assert find_unfinished(tmp_path).interrupted == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("header.json", b"[" * 100_000),
+        ("header.json", b'{"format": 1, "created": "0001-01-01T00:00:00+00:00"}'),
+        ("journal.jsonl", b'{"kind": ' + b"[" * 100_000 + b"\n"),
+        ("journal.jsonl", b'{"kind": "out", "numbers": [Infinity], "reason": ""}\n'),
+    ],
+)
+def test_a_swing_damaged_in_spite_hides_no_other(
+    preparation: Preparation, tmp_path: Path, name: str, content: bytes
+) -> None:
+    for folder in ("a", "b"):
+        recorded(preparation, tmp_path / folder, 1).close()
+    (tmp_path / "a" / name).write_bytes(content)
+
+    found = find_unfinished(tmp_path)
+
+    assert [record.folder.name for record in found.interrupted] == ["b"]
+    assert [swing.folder.name for swing in found.damaged] == ["a"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes")
+@pytest.mark.parametrize("name", ["header.json", "journal.jsonl"])
+def test_a_pipe_in_a_swing_is_waited_for_by_nobody(
+    preparation: Preparation, tmp_path: Path, name: str
+) -> None:
+    for folder in ("a", "b"):
+        recorded(preparation, tmp_path / folder, 1).close()
+    (tmp_path / "a" / name).unlink()
+    os.mkfifo(tmp_path / "a" / name)
+
+    found = find_unfinished(tmp_path)
+
+    assert [record.folder.name for record in found.interrupted] == ["b"]
+    assert "is a pipe or a device" in str(found.damaged[0].sentence)

@@ -13,9 +13,11 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def solved(station: "Station", interrupted: Path) -> "Station":
+def solved(
+    station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
+) -> "Station":
     """A swing that was solved, whose tip can be accepted."""
-    station.limit_uncertainty(interrupted, 1.0)
+    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
     station.go_on(interrupted)
     station.solve()
     return station

@@ -20,8 +20,9 @@ from lightpen.formats.pen_files import write_pen
 from lightpen.live.looking import Live, LiveImage
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
+from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, IMAGES, JOURNAL, open_record
+from lightpen.record.reading import DISCARDED, IMAGES, open_record
 from lightpen.record.solving import solve_record
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.sample_pens import SAMPLE_PENS

@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lightpen.record.reading import DISCARDED, IMAGES, JOURNAL, open_record
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import DISCARDED, IMAGES, open_record
 from lightpen.swing.preparation import (
     Lack,
     Preparation,

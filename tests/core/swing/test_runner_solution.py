@@ -12,13 +12,8 @@ import pytest
 from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade
 from lightpen.messages import Code
-from lightpen.record.reading import (
-    DISCARDED,
-    JOURNAL,
-    Record,
-    open_record,
-    recorded_limits,
-)
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import DISCARDED, Record, open_record, recorded_limits
 from lightpen.record.solving import Solution, record_inputs, solve_record
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import stillness
@@ -322,13 +317,13 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
 
 
 def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
-    in_force: "Station", swung: Callable[..., Path]
+    in_force: "Station", swung: Callable[..., Path], rewrite_header: Callable[..., None]
 ) -> None:
     first = in_force.status.result
     assert first is not None
     other = in_force.records / "other"
     shutil.copytree(swung(), other)
-    in_force.limit_uncertainty(other, 1.0)
+    rewrite_header(other, {"max_uncertainty_mm": 1.0})
     in_force.go_on(other)
     in_force.solve()
     assert in_force.status.result is None
@@ -379,9 +374,9 @@ def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> N
 
 
 def test_a_tip_that_is_to_be_repeated_is_not_accepted(
-    station: "Station", interrupted: Path
+    station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    station.limit_uncertainty(interrupted, 1e-6)
+    rewrite_header(interrupted, {"max_uncertainty_mm": 1e-6})
     station.go_on(interrupted)
     station.solve()
     assert station.status.verdict is not None
@@ -427,13 +422,13 @@ def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> No
 
 
 def test_a_result_bears_the_time_that_the_runner_goes_by(
-    station: "Station", interrupted: Path
+    station: "Station", interrupted: Path, rewrite_header: Callable[..., None]
 ) -> None:
     noon = datetime(2026, 5, 1, 12, tzinfo=UTC)
     runner = SwingRunner(
         station.records, station.archive, station.witness, now=lambda: noon
     )
-    station.limit_uncertainty(interrupted, 1.0)
+    rewrite_header(interrupted, {"max_uncertainty_mm": 1.0})
     runner.go_on(read_resumable(interrupted))
     runner.finish()
     station.witness.wait_until(lambda: runner.status.verdict is not None)

@@ -66,8 +66,11 @@ class StartPage(Rearranged, Page):
         self._interrupted = InterruptedPanel()
         self._last = LastResultPanel(workbench.around.now)
         self._sound_test = SoundTest(sounds)
-        self._typing = QTimer(self, singleShot=True, interval=TYPING_PAUSE_MS)
-        self._searching = QTimer(self, singleShot=True, interval=0)
+        self._typing = QTimer(self)
+        self._typing.setSingleShot(True)
+        self._typing.setInterval(TYPING_PAUSE_MS)
+        self._searching = QTimer(self)
+        self._searching.setSingleShot(True)
 
         # Layout
         self._left = left = QVBoxLayout()

@@ -1,9 +1,8 @@
 """The step Review: from the verdict to the accepted tip, and every way back."""
 
-import json
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -105,14 +104,13 @@ class Bed:
     workbench: Workbench
     swing: Path
     pages: list[ReviewPage]
+    rewrite_header: Callable[..., None]
 
     def solve(self, limit: float = 0.05) -> Workbench:
         """Solve the swing, with a limit of U, mm."""
         workbench = self.workbench
         folder = workbench.run.records_folder / "swing"
-        header = json.loads((folder / "header.json").read_text("utf-8"))
-        header["settings"]["max_uncertainty_mm"] = limit
-        (folder / "header.json").write_text(json.dumps(header), "utf-8")
+        self.rewrite_header(folder, {"max_uncertainty_mm": limit})
         workbench.run.runner.go_on(read_resumable(folder))
         workbench.run.runner.finish()
         self.qtbot.waitUntil(lambda: workbench.run.status.verdict is not None)
@@ -131,11 +129,16 @@ class Bed:
 
 
 @pytest.fixture
-def bed(qtbot: QtBot, workbench: Workbench, recorded: Path) -> Iterator[Bed]:
+def bed(
+    qtbot: QtBot,
+    workbench: Workbench,
+    recorded: Path,
+    rewrite_header: Callable[..., None],
+) -> Iterator[Bed]:
     """Lay a recorded swing ready."""
     folder = workbench.run.records_folder / "swing"
     shutil.copytree(recorded, folder)
-    bed = Bed(qtbot, workbench, folder, [])
+    bed = Bed(qtbot, workbench, folder, [], rewrite_header)
     yield bed
     for page in bed.pages:
         page.shut_down()
@@ -367,10 +370,7 @@ def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> N
 
 
 def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
-    folder = bed.workbench.run.records_folder / "swing"
-    header = json.loads((folder / "header.json").read_text("utf-8"))
-    header["nominal_tip_mm"] = [3.0, -90.0, -20.0]
-    (folder / "header.json").write_text(json.dumps(header), "utf-8")
+    bed.rewrite_header(bed.swing, nominal_tip_mm=[3.0, -90.0, -20.0])
     bed.solve()
 
     said = remarks(bed.show())
@@ -437,9 +437,7 @@ def test_a_bug_in_the_lookup_of_the_last_result_leaves_the_tip(
 
 
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
-    header = json.loads((bed.swing / "header.json").read_text("utf-8"))
-    header["nominal_tip_mm"] = [-1.0, -90.0, -24.0]
-    (bed.swing / "header.json").write_text(json.dumps(header), "utf-8")
+    bed.rewrite_header(bed.swing, nominal_tip_mm=[-1.0, -90.0, -24.0])
     workbench = bed.solve()
     page = bed.show()
 

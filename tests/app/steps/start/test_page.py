@@ -179,14 +179,18 @@ def start(show: Callable[[Workbench], Opened], workbench: Workbench) -> Opened:
 
 
 def accepted(
-    workbench: Workbench, age: timedelta, pen: str | None = None, tip: str | None = None
+    workbench: Workbench,
+    age: timedelta,
+    pen: str | None = None,
+    tip: str | None = None,
+    grade: str = "pass",
 ) -> None:
     """Put a tip in force that was accepted some time ago."""
     names = workbench.preparation.names
     result = Result(
         names=replace(names, pen=pen or names.pen, tip=tip or names.tip),
         accepted=datetime.now().astimezone() - age,
-        grade="pass",
+        grade=grade,
         record=workbench.run.records_folder / "elsewhere",
         images=(),
         calibration={
@@ -298,6 +302,7 @@ def test_all_of_it_is_remembered_for_the_station(
     start.type_into("Images at most", "250")
     start.type_into("Images at least", "80")
 
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), Path("unused"))
     again.choose_station("Hall 2")
 
@@ -323,6 +328,7 @@ def test_any_name_will_do(
 
     names = Names(name, name, name, name, name, 10.0)
     assert workbench.preparation.names == names
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
     assert again.stations() == tuple(sorted(("Hall 2", name)))
     again.start()
@@ -385,6 +391,7 @@ def test_a_new_station_takes_over_the_present_choices(
     assert workbench.preparation.names == replace(before.names, station="Hall 3")
     assert workbench.preparation.pen_file is before.pen_file
     assert workbench.stations() == ("Hall 2", "Hall 3")
+    assert settings.await_saved(120.0)
     assert Settings(settings.file).last_station() == "Hall 3"
 
 
@@ -446,6 +453,7 @@ def test_the_station_survives_a_change_of_preferences(
 ) -> None:
     settings.set_preferences(Preferences(muted=True))
 
+    assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
     again.start()
 
@@ -672,9 +680,7 @@ def test_a_damaged_result_is_told_where_the_result_would_be(
 def test_a_verdict_of_a_later_version_is_shown_as_it_stands(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
-    accepted(workbench, timedelta(days=12))
-    (file,) = workbench.run.archive.folder.iterdir()
-    file.write_text(file.read_text().replace('"pass"', '"splendid"'))
+    accepted(workbench, timedelta(days=12), grade="splendid")
 
     assert show(workbench).last()[1] == "splendid"
 

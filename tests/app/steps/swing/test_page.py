@@ -19,8 +19,9 @@ from lightpen.cameras.worker import Connection
 from lightpen.live.sources import Surroundings, sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
+from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, JOURNAL, Record, open_record
+from lightpen.record.reading import DISCARDED, Record, open_record
 from lightpen.record.unfinished import (
     find_unfinished,
 )
@@ -235,7 +236,7 @@ def shared_desk(
 ) -> Iterator[Desk]:
     """A desk at which one test goes on where the last has left off."""
     folder = tmp_path_factory.mktemp("shared")
-    settings = Settings(folder / "lightpen.ini")
+    settings = Settings(folder / "lightpen.json")
     workbench = Workbench(settings, folder / "data", around)
     files = sample_files(around, folder / "samples")
     workbench.set_preparation(

@@ -1,0 +1,195 @@
+"""What is left when the program is killed while it writes.
+
+Usage: python benchmarks/hostile_kills.py
+
+For each kind of write a process does it over and over, tells what was acknowledged, and
+is killed at a random moment. What was acknowledged must be there, whole and not mixed
+with what came before, and the next start must leave nothing behind of the write that
+was cut off.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.hostile_records import NAMES, make_data
+from benchmarks.machine import description
+from benchmarks.rows import Row, table
+
+from lightpen.formats.files import write_whole
+from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.leftovers import OLDEST, sweep_leftovers
+from lightpen.record.reading import Record, open_record, source
+from lightpen.record.unfinished import find_unfinished
+from lightpen_app.work.settings_store import load
+
+SEED = 5
+N_KILLS = 60  # of each kind
+LONGEST = 0.3  # s that a process lives
+VICTIM = Path(__file__).with_name("write_until_killed.py")
+
+# Whether all is whole in a data folder after a kill, by what was told before it.
+Check = Callable[[Path, list[str]], bool]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the writes of a kind.
+
+    Attributes
+    ----------
+    n_told : int
+        Writes that were acknowledged.
+    n_sound : int
+        Kills that lost none of them, and mixed nothing.
+    n_left : int
+        Files and folders that were left behind after the next start.
+    """
+
+    n_told: int
+    n_sound: int
+    n_left: int
+
+
+def hostile_kill_rows() -> list[Row]:
+    """Return what was left after kills of each kind of write."""
+    if not hasattr(os, "fork"):
+        return [Row("killed while it writes", "needs processes that fork")]
+    outcomes = {kind: killed(kind, N_KILLS) for kind in CHECKS}
+    return [
+        Row(
+            f"killed {N_KILLS} times while it writes ({kind}), {outcome.n_told} writes "
+            "acknowledged: kills that lost and mixed nothing, files left behind",
+            f"{outcome.n_sound}, {outcome.n_left}",
+            f"{N_KILLS}, 0",
+            met=outcome.n_sound == N_KILLS and outcome.n_left == 0,
+        )
+        for kind, outcome in outcomes.items()
+    ]
+
+
+def killed(kind: str, n_kills: int) -> Outcome:
+    """Kill a process again and again while it writes; return what was left."""
+    rng = np.random.default_rng(SEED)
+    n_sound = n_told = n_left = 0
+    with tempfile.TemporaryDirectory(prefix="lightpen-kills-") as folder:
+        data = Path(folder)
+        make_data(data)
+        words = [sys.executable, str(VICTIM), kind, folder]
+        with subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8"
+        ) as victim:
+            for _ in range(n_kills):
+                told = _told_until_killed(victim, float(rng.uniform(0, LONGEST)))
+                n_told += len(told)
+                n_sound += CHECKS[kind](data, told)
+                n_left += _n_left_after_start(data)
+    return Outcome(n_told, n_sound, n_left)
+
+
+def _told_until_killed(victim: "subprocess.Popen[str]", seconds: float) -> list[str]:
+    assert victim.stdin is not None
+    assert victim.stdout is not None
+    victim.stdin.write("go\n")
+    victim.stdin.flush()
+    child = int(victim.stdout.readline())
+    time.sleep(seconds)
+    os.kill(child, signal.SIGKILL)
+    told = []
+    while (line := victim.stdout.readline().strip()) != "dead":
+        told.append(line)
+    return told
+
+
+def _n_left_after_start(data: Path) -> int:
+    """Do what a start does with leftovers, and return how many there are then."""
+    if any(not (f / "header.json").exists() for f in (data / RECORDS).iterdir()):
+        time.sleep(OLDEST)
+    sweep_leftovers(data)
+    load(data / "lightpen.json")
+    if (data / "tip.json").exists():
+        write_whole(data / "tip.json", (data / "tip.json").read_bytes())
+    unmade = [f for f in (data / RECORDS).iterdir() if not (f / "header.json").exists()]
+    return len(list(data.rglob(".*.part"))) + len(unmade)
+
+
+def _swings_are_whole(data: Path, told: list[str]) -> bool:
+    """Check that every image that was acknowledged is there as it was."""
+    if find_unfinished(data / RECORDS).damaged:
+        return False
+    return all(
+        int(line.split()[1]) in _sound_images(data / RECORDS / line.split()[0])
+        for line in told
+    )
+
+
+def _sound_images(folder: Path) -> set[int]:
+    record = open_record(folder)
+    for load_image in source(record).images.open():
+        load_image()
+    return set(record.all_numbers.tolist())
+
+
+def _taken_out_is_one_edit(data: Path, told: list[str]) -> bool:
+    record: Record = open_record(data / RECORDS / "swing")
+    out = tuple(sorted(record.taken_out))
+    return out in {(1, 3), (2, 4, 5)} or (not told and out == (2,))
+
+
+def _result_is_one(data: Path, told: list[str]) -> bool:
+    """Check that the last that was acknowledged is in force, or the one after."""
+    found = FolderArchive(data).in_force(NAMES.pen, NAMES.tip)
+    if found is None:
+        return False
+    x, y, _ = found.tip_pen.tolist()
+    return not told or (x == y and x >= float(told[-1]))
+
+
+def _settings_are_one(data: Path, told: list[str]) -> bool:
+    loaded = load(data / "lightpen.json")
+    if loaded.trouble is not None:
+        return False
+    numbers = {loaded.content["last"].get(name, 0) for name in ("a", "b")}
+    return len(numbers) == 1 and (not told or max(numbers) >= int(told[-1]))
+
+
+def _json_is_one(data: Path, told: list[str]) -> bool:
+    path = data / "tip.json"
+    if not path.exists():
+        return not told
+    record = json.loads(path.read_bytes())
+    return len(set(record["frames"])) == 1 and (
+        not told or record["frames"][0] >= int(told[-1])
+    )
+
+
+CHECKS: dict[str, Check] = {
+    "swing": _swings_are_whole,
+    "resume": _swings_are_whole,
+    "take out": _taken_out_is_one_edit,
+    "accept": _result_is_one,
+    "settings": _settings_are_one,
+    "json": _json_is_one,
+}
+
+
+def main() -> int:
+    """Measure, print the table, and return the exit status."""
+    rows = hostile_kill_rows()
+    print(f"{description()}\n\n{table(rows)}")
+    return 0 if all(row.met for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

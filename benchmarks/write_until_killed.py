@@ -1,0 +1,125 @@
+"""Write one kind of file over and over in a process of its own, to be killed.
+
+Usage: python benchmarks/write_until_killed.py KIND FOLDER
+
+For each line of its input it forks; the child tells its number, and then each write
+that it has acknowledged.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.hostile_records import IMAGE, NAMES
+
+from lightpen.formats.files import write_whole
+from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.reading import open_record
+from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
+from lightpen_app.work.settings_store import Content, load, save
+
+N_ROWS = 20_000  # of a JSON that takes a while to be written
+EDITS = ((1, 3), (2, 4, 5))
+
+
+def tell(*words: object) -> None:
+    """Print a line at one stroke, so that none is left half by a kill."""
+    os.write(1, (" ".join(map(str, words)) + "\n").encode())
+
+
+def swing(data: Path) -> None:
+    """Begin swings, and keep three images of each."""
+    model = open_record(data / RECORDS / "swing")
+    for _ in count():
+        folder = make_folder(data / RECORDS, NAMES, datetime.now(UTC))
+        with RecordWriter.create(folder, model.header) as writer:
+            for image in model.images[:3]:
+                number = writer.append(
+                    IMAGE, image.pixels, image.rotation, image.translation, image.time
+                )
+                tell(folder.name, number)
+
+
+def resume(data: Path) -> None:
+    """Go on with a swing, image by image."""
+    folder = data / RECORDS / "swing"
+    for _ in count():
+        record = open_record(folder)
+        image = record.images[0]
+        with RecordWriter.resume(record) as writer:
+            number = writer.append(
+                IMAGE, image.pixels, image.rotation, image.translation, image.time
+            )
+            tell(folder.name, number)
+
+
+def take_out(data: Path) -> None:
+    """Put back what is out, and take out others, in one edit."""
+    for n in count():
+        out = EDITS[n % 2]
+        note_taken_out(data / RECORDS / "swing", dict.fromkeys(out, "taken out"))
+        tell(n)
+
+
+def accept(data: Path) -> None:
+    """Put one tip after the other in force."""
+    archive = FolderArchive(data)
+    before = archive.in_force(NAMES.pen, NAMES.tip)
+    assert before is not None
+    start = int(before.tip_pen[0])
+    for n in count(start + 1):
+        tip = {"tip_pen_mm": [float(n), float(n), 0.0]}
+        archive.store(replace(before, calibration={**before.calibration, **tip}))
+        tell(n)
+
+
+def settings(data: Path) -> None:
+    """Write two settings that must agree."""
+    file = data / "lightpen.json"
+    content: Content = load(file).content
+    for n in count(int(content["last"].get("a", 0)) + 1):
+        save(file, content, {("last", "a"): n, ("last", "b"): n})
+        tell(n)
+
+
+def write_json(data: Path) -> None:
+    """Write a record with one number in all of its rows."""
+    path = data / "tip.json"
+    start = json.loads(path.read_bytes())["frames"][0] if path.exists() else 0
+    for n in count(start + 1):
+        write_whole(path, json.dumps({"frames": [n] * N_ROWS}).encode())
+        tell(n)
+
+
+KINDS: dict[str, Callable[[Path], None]] = {
+    "swing": swing,
+    "resume": resume,
+    "take out": take_out,
+    "accept": accept,
+    "settings": settings,
+    "json": write_json,
+}
+
+
+def main() -> int:
+    """Write until killed, once for each line of the input."""
+    kind, data = sys.argv[1], Path(sys.argv[2])
+    for _ in sys.stdin:
+        child = os.fork()
+        if child == 0:
+            tell(os.getpid())
+            KINDS[kind](data)
+        os.waitpid(child, 0)
+        tell("dead")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

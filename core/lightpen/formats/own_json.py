@@ -1,0 +1,129 @@
+"""JSON of the program's own files, read back as what it must be, or not at all.
+
+Records, results and settings all come in here. A text is turned into a declared type:
+what is missing, of another type or out of its range is refused, and so is what JSON as
+Python reads it lets pass, such as ``NaN``, a number too large for a float, or an entry
+given twice. A checksum as the last entry tells damage that leaves the text well-formed.
+"""
+
+import json
+import math
+import os
+from datetime import datetime
+from hashlib import sha256
+from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
+
+from msgspec import Meta, convert
+
+CHECKSUM = b', "checksum": "'  # no text in JSON holds quotation marks as they are
+FIRST_YEAR, LAST_YEAR = 1970, 9998  # of dates that can be told in any time zone
+
+Moment: TypeAlias = Annotated[datetime, Meta(tz=True)]
+Length: TypeAlias = Annotated[float, Meta(ge=-1e7, le=1e7)]  # mm or px
+Vector: TypeAlias = tuple[Length, Length, Length]
+Digest: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
+
+T = TypeVar("T")
+
+
+class DamagedError(ValueError):
+    """A text is not as the program wrote it; who named the file says so to its user."""
+
+
+def parse_json(data: bytes, shape: type[T]) -> T:
+    """Return what a text holds.
+
+    Parameters
+    ----------
+    shape : type
+        As `msgspec` knows them; entries that it does not name are passed over.
+
+    Raises
+    ------
+    DamagedError
+        It does not hold that.
+    """
+    try:
+        tree = json.loads(
+            data,
+            object_pairs_hook=_entries,
+            parse_float=_finite,
+            parse_constant=_refuse,
+        )
+    except (ValueError, RecursionError) as error:
+        raise DamagedError(str(error)) from error
+    return in_shape(tree, shape)
+
+
+def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
+    """Return a value that was read as what it must be; see `parse_json`.
+
+    Parameters
+    ----------
+    strict : bool
+        Whether a text is no number, even one that reads as one.
+    """
+    try:
+        return convert(tree, shape, strict=strict)
+    except (ValueError, RecursionError) as error:
+        raise DamagedError(str(error)) from error
+
+
+def with_checksum(text: bytes) -> bytes:
+    """Return the text of an object with its checksum as the last entry."""
+    body = text.rstrip().removesuffix(b"}").rstrip()
+    return body + CHECKSUM + _digest(body) + b'"}'
+
+
+def has_checksum(text: bytes) -> bool:
+    """Return whether the text of an object has a checksum, and is as it says.
+
+    Raises
+    ------
+    DamagedError
+        It is not.
+    """
+    body, mark, end = text.rpartition(CHECKSUM)
+    if mark and end != _digest(body) + b'"}':
+        raise DamagedError("The checksum is another one.")
+    return bool(mark)
+
+
+def require_usual(moment: datetime) -> None:
+    """Refuse a date that cannot be told in every time zone.
+
+    Raises
+    ------
+    ValueError
+        Also where `parse_json` makes the type that calls it.
+    """
+    if not FIRST_YEAR <= moment.year <= LAST_YEAR:
+        raise ValueError(f"{moment} is too far away.")
+
+
+def require_path(text: str) -> None:
+    """Refuse what can be no file's name, as `require_usual` does a date."""
+    if b"\0" in os.fsencode(text):
+        raise ValueError("A file's name holds a zero.")
+
+
+def _digest(body: bytes) -> bytes:
+    return sha256(body).hexdigest().encode()
+
+
+def _entries(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    entries = dict(pairs)
+    if len(entries) < len(pairs):
+        raise ValueError("An entry is given twice.")
+    return entries
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text} is too large.")
+    return number
+
+
+def _refuse(constant: str) -> NoReturn:
+    raise ValueError(f"{constant} is no number of JSON.")

@@ -1,0 +1,76 @@
+"""The files that data is written to before it takes its name, and what kills leave.
+
+A part is locked as long as it is written, so that one whose lock can be had was left
+behind by a program that was killed. Windows lets no open file be renamed, and some
+disks know no locks: there a part is known by its age.
+"""
+
+import contextlib
+import os
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from lightpen.formats.file_locks import locked
+
+PATIENCE = 2.0  # s for one who sweeps to let go
+LONGEST_WRITE = 60.0  # s, after which a part that cannot be locked is taken as left
+_NAME = re.compile(r"\.[0-9a-f]{16}\.part")
+
+
+@contextlib.contextmanager
+def part_of(target: Path, data: bytes) -> Iterator[Path]:
+    """Put data on the disk beside its target, until it has a name of its own.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    part, stream = _own_part(target.parent)
+    try:
+        with stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+            if os.name != "posix":
+                stream.close()
+            yield part
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def sweep_parts(folder: Path) -> None:
+    """Remove what writes that were killed have left in a folder, where that can be."""
+    with contextlib.suppress(OSError):  # they do no harm where they are
+        for path in list(folder.iterdir()):
+            if _NAME.fullmatch(path.name):
+                _sweep(path)
+
+
+def _own_part(folder: Path) -> tuple[Path, IO[bytes]]:
+    """Make a part that nobody else takes as left."""
+    while True:
+        part = folder / f".{os.urandom(8).hex()}.part"
+        stream = part.open("xb")
+        try:
+            # One who sweeps may have come between the making and the locking.
+            if locked(stream.fileno(), patience_s=PATIENCE) and part.exists():
+                return part, stream
+        except OSError:  # a disk without locks
+            return part, stream
+        stream.close()
+
+
+def _sweep(part: Path) -> None:
+    with part.open("rb") as stream:
+        if os.name == "posix":
+            with contextlib.suppress(OSError):  # a disk without locks
+                if locked(stream.fileno()):
+                    part.unlink()  # nobody else can lock it meanwhile
+                return
+    if time.time() - part.stat().st_mtime > LONGEST_WRITE:
+        part.unlink()
