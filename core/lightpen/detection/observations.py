@@ -22,7 +22,8 @@ from lightpen.detection.sighting import (
 )
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.images import ImageSource, keep_freed_memory
+from lightpen.formats.decoding import keep_freed_memory
+from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -30,6 +31,8 @@ from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
+SEARCH_MEMORY = 250_000_000  # bytes that all threads take
+SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
 NO_SPOTS = Spots(
     centers=np.zeros((0, 2)),
@@ -106,7 +109,7 @@ def observe_images(
     report : callable
         Called with the fraction done, 0 to 1.
     n_threads : int, optional
-        One a core if not given.
+        If not given, one a core, but fewer if the images are large.
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
 
@@ -122,7 +125,7 @@ def observe_images(
     sightings: list[Sighting] = []
     n_images = len(source.names)
     search = partial(_search, camera=camera, mask=mask)
-    for image in _in_threads(source, search, n_threads or os.cpu_count() or 1):
+    for image in _in_threads(source, search, n_threads or _most_threads(camera)):
         searched.append(image)
         n_left = len(searched) - len(sightings)
         if n_left == LABELLED_AT_ONCE or len(searched) == n_images:
@@ -172,6 +175,11 @@ def leave_out(
         if kept[index] is Reason.NONE:
             kept[index] = reason
     return replace(observations, reasons=tuple(kept))
+
+
+def _most_threads(camera: Camera) -> int:
+    of_an_image = SEARCH_MEMORY_A_PIXEL * camera.width * camera.height
+    return max(min(os.cpu_count() or 1, SEARCH_MEMORY // of_an_image), 1)
 
 
 def _in_threads(

@@ -14,8 +14,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import printable, strerror, sync_folder, write_whole
-from lightpen.formats.images import encode_png
 from lightpen.record.lock import lock_journal, unlock_journal
 from lightpen.record.reading import (
     FORMAT,
