@@ -58,7 +58,7 @@ _UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in name
 _LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
 _COORDINATES = (("x",), ("y",), ("z",))
 _NORMALS = (("nx",), ("ny",), ("nz",))
-_COLUMN = r"(nx|ny|nz|x|y|z|diameter)(?:[\s_/]*[\[(]?\s*([a-zμ]+)\s*[\])]?)?"
+_COLUMN = r"(nx|ny|nz|x|y|z|diameter)(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {"units", "leds", "diameter", "nominaltip", "name", "comment"}
 
