@@ -20,8 +20,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.json_mutations import flipped, mutated
 from benchmarks.machine import description
-from benchmarks.mutations import flipped, mutated
 from benchmarks.rows import Row, table
 
 from lightpen.errors import LightpenError

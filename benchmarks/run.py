@@ -18,8 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
-from benchmarks.hostile_kills import hostile_kill_rows
-from benchmarks.hostile_records import hostile_record_rows
+from benchmarks.hostile import hostile_rows
 from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
@@ -48,7 +47,7 @@ SECTIONS: dict[str, Section] = {
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),
     "killed": lambda workers, data: killed_rows(),
-    "hostile": lambda workers, data: [*hostile_record_rows(), *hostile_kill_rows()],
+    "hostile": lambda workers, data: hostile_rows(),
     "start": lambda workers, data: start_rows(),
     "soak": lambda workers, data: soak_rows(),
 }

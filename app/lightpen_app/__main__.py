@@ -16,9 +16,11 @@ def main() -> int:
 
 def _show_window(plays_demo: bool) -> int:
     # Commands start faster without the window's libraries.
+    from lightpen.formats.decoding import keep_freed_memory
     from lightpen_app.application import run, run_demo
     from lightpen_app.wizard_pages import make_pages
 
+    keep_freed_memory()
     return run_demo(make_pages) if plays_demo else run(make_pages)
 
 

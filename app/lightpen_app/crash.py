@@ -17,6 +17,8 @@ from types import TracebackType
 
 from PySide6.QtCore import QObject, Signal, qVersion
 
+from lightpen.local_time import local_now
+
 PACKAGES = (
     "lightpen",
     "PySide6_Essentials",
@@ -99,7 +101,7 @@ class CrashHook(QObject):
             )
 
     def _write(self, text: str, number: int) -> str:
-        now = datetime.now().astimezone()
+        now = local_now()
         path = self._folder / f"crash-{now:%Y%m%d-%H%M%S}-{number}.txt"
         try:
             self._folder.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from functools import wraps
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TypeAlias
+from typing import NoReturn, TypeAlias
 
 import cv2
 import numpy as np
@@ -34,7 +34,7 @@ from lightpen.estimation.report import (
 from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import write_whole
+from lightpen.formats.files import printable, write_whole
 from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
@@ -56,6 +56,7 @@ DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
 MAX_NAMED = 3  # images; of more the first is named
+MAX_RENDERED = 30_000  # images
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # What to type about what the core says, by its codes.
 ADVICE = {
@@ -113,12 +114,22 @@ def main(
 def _complain(trouble: Sentence) -> None:
     """Print what is wrong, and what to type about it."""
     advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
-    print("lightpen:", trouble, *advice, file=sys.stderr)
+    print(_shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
+
+
+def _shown(text: str) -> str:
+    """Return a text in which names of files say nothing to the terminal."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        super().error(_shown(message))
 
 
 def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     has_window = show_window is not None
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="lightpen",
         description="Calibrate the probe tip of a light pen."
         + (" Without a command, a window opens and leads through it." * has_window),
@@ -212,6 +223,8 @@ def _n_images(text: str) -> int:
     number = _whole_number(text)
     if number == 0:
         raise argparse.ArgumentTypeError("at least one image is needed.")
+    if number > MAX_RENDERED:
+        raise argparse.ArgumentTypeError(f"at most {MAX_RENDERED} images are rendered.")
     return number
 
 
@@ -328,9 +341,10 @@ def _calibrate(options: argparse.Namespace) -> None:
         calibrated = _from_observations(options)
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
-    print(
-        calibration_text(calibration, options.method, calibrated.nominal_tip, verdict)
+    text = calibration_text(
+        calibration, options.method, calibrated.nominal_tip, verdict
     )
+    print(_shown(text))
     if options.json is not None:
         record = calibration_record(
             calibration, calibrated.inputs(), options.method, calibrated.limits
@@ -399,7 +413,7 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
             n_images=len(names),
             first=names[0],
         )
-    print("lightpen:", note, file=sys.stderr)
+    print(_shown(f"lightpen: {note}"), file=sys.stderr)
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
@@ -440,6 +454,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
     else:
         source = find_images(*options.images)
         files = source.files
+        _require_other_file(options.json, *files)
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
     return _Calibrated(
@@ -474,9 +489,11 @@ def _simulate(options: argparse.Namespace) -> None:
     with _progress("Rendering") as report:
         x, y, z = write_scene(scene, options.out, report)
     print(
-        f"{scene.n_images} images, camera.yaml, leds.csv and the true answer "
-        f"(truth.json) are in {options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} "
-        "mm in the frame of leds.csv."
+        _shown(
+            f"{scene.n_images} images, camera.yaml, leds.csv and the true answer "
+            f"(truth.json) are in {options.out}.\nThe true tip is {x:.4f} {y:.4f} "
+            f"{z:.4f} mm in the frame of leds.csv."
+        )
     )
 
 
@@ -498,9 +515,18 @@ def _pivot(options: argparse.Namespace) -> None:
 
 @_printing
 def _pen(options: argparse.Namespace) -> None:
+    if _are_same(options.raw, options.out):
+        raise UsageError(
+            sentence(
+                "cli.pen-over-raw",
+                "{out} would replace the measured LEDs that it is made from. Give the "
+                "pen file another name.",
+                out=str(options.out),
+            )
+        )
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
-    print(f"{raw.n_leds} LEDs in the pen frame are in {options.out}.")
+    print(_shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))
 
 
 def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
@@ -508,7 +534,7 @@ def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
     if record is None:
         return
     for path in inputs:
-        if path is not None and path.resolve() == record.resolve():
+        if path is not None and _are_same(path, record):
             raise UsageError(
                 sentence(
                     "cli.json-over-input",
@@ -517,6 +543,12 @@ def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
                     record=str(record),
                 )
             )
+
+
+def _are_same(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return one.samefile(other)
+    return os.path.realpath(one) == os.path.realpath(other)
 
 
 @contextmanager

@@ -4,8 +4,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import label_images
 from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
-from lightpen.detection.reasons import Reason
+from lightpen.detection.reasons import MISHAPS, Reason, mishap_detail
 from lightpen.detection.sighting import (
     Sighting,
     sighting_of_centers,
@@ -22,7 +23,8 @@ from lightpen.detection.sighting import (
 )
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.images import ImageSource, keep_freed_memory
+from lightpen.formats.decoding import keep_freed_memory
+from lightpen.formats.images import ImageSource
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -30,15 +32,8 @@ from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
 IN_FLIGHT = 4  # images per thread that may wait in memory
-
-NO_SPOTS = Spots(
-    centers=np.zeros((0, 2)),
-    shapes=np.zeros((0, 2, 2)),
-    areas=np.zeros(0),
-    contrasts=np.zeros(0),
-    edge_widths=np.zeros(0),
-    flaws=np.zeros(0, dtype=np.int64),
-)
+SEARCH_MEMORY = 250_000_000  # bytes that all threads take
+SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
 Report = Callable[[float], None]
 
@@ -81,11 +76,15 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class _Searched:
-    """The spots of one image, or why it was not searched."""
+    """The spots of one image, or why there are none."""
 
-    spots: Spots
+    spots: Spots = field(default_factory=Spots.none)
     reason: Reason = Reason.NONE
     detail: Sentence | None = None
+
+    @classmethod
+    def failed(cls, error: Exception) -> Self:
+        return cls(reason=Reason.UNHANDLED, detail=mishap_detail(error))
 
 
 def observe_images(
@@ -106,7 +105,7 @@ def observe_images(
     report : callable
         Called with the fraction done, 0 to 1.
     n_threads : int, optional
-        One a core if not given.
+        If not given, one a core, but fewer if the images are large.
     mask : (M, 3) array, optional
         Circles of stray light to leave out: centre x, y and radius, px.
 
@@ -119,16 +118,19 @@ def observe_images(
     """
     keep_freed_memory()
     searched: list[_Searched] = []
-    sightings: list[Sighting] = []
+    labelled: list[tuple[_Searched, Sighting]] = []
     n_images = len(source.names)
     search = partial(_search, camera=camera, mask=mask)
-    for image in _in_threads(source, search, n_threads or os.cpu_count() or 1):
+    for image in _in_threads(source, search, n_threads or _most_threads(camera)):
         searched.append(image)
-        n_left = len(searched) - len(sightings)
-        if n_left == LABELLED_AT_ONCE or len(searched) == n_images:
-            sightings += _sighted(searched[-n_left:], camera, pen)
-        report(len(searched) / n_images)
-    _require_size(searched, camera)
+        n_done = len(labelled) + len(searched)
+        if len(searched) == LABELLED_AT_ONCE or n_done == n_images:
+            labelled += _labelled(searched, camera, pen)
+            searched = []
+        report(n_done / n_images)
+    images = [image for image, _ in labelled]
+    sightings = [sighting for _, sighting in labelled]
+    _require_size(images, camera)
     seen = _observations(source.names, sightings)
     spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
     mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_images
@@ -136,7 +138,7 @@ def observe_images(
         _require_right_hand(spots, camera, pen)
     return replace(
         seen,
-        details=tuple(image.detail for image in searched),
+        details=tuple(image.detail for image in images),
         advice=None if mostly_labelled else _advice(seen.reasons, spots, camera, pen),
     )
 
@@ -174,6 +176,11 @@ def leave_out(
     return replace(observations, reasons=tuple(kept))
 
 
+def _most_threads(camera: Camera) -> int:
+    of_an_image = SEARCH_MEMORY_A_PIXEL * camera.width * camera.height
+    return max(min(os.cpu_count() or 1, SEARCH_MEMORY // of_an_image), 1)
+
+
 def _in_threads(
     source: ImageSource,
     search: Callable[[Callable[[], Image]], _Searched],
@@ -196,21 +203,35 @@ def _search(
     try:
         image = load()
     except FileError as error:
-        return _Searched(NO_SPOTS, Reason.UNREADABLE, error.sentence)
+        return _Searched(reason=Reason.UNREADABLE, detail=error.sentence)
     if not camera.fits(image):
         height, width = image.shape
         size = sentence(
             "image.size", "{width} x {height} px", width=width, height=height
         )
-        return _Searched(NO_SPOTS, Reason.WRONG_SIZE, size)
-    return _Searched(detect_spots(image, mask))
+        return _Searched(reason=Reason.WRONG_SIZE, detail=size)
+    try:
+        return _Searched(detect_spots(image, mask))
+    except MISHAPS as error:
+        return _Searched.failed(error)
 
 
-def _sighted(searched: list[_Searched], camera: Camera, pen: Pen) -> list[Sighting]:
+def _labelled(
+    searched: list[_Searched], camera: Camera, pen: Pen
+) -> list[tuple[_Searched, Sighting]]:
+    """Return the images with what they show; one that fails says so from then on."""
     spots = [image.spots for image in searched]
-    sightings = sightings_of(spots, label_images(spots, camera, pen), camera)
+    try:
+        sightings = sightings_of(spots, label_images(spots, camera, pen), camera)
+    except MISHAPS as error:
+        if len(searched) > 1:  # which one it was is seen one by one
+            return [
+                pair for image in searched for pair in _labelled([image], camera, pen)
+            ]
+        failed = _Searched.failed(error)
+        return [(failed, unseen(pen, failed.reason))]
     return [
-        unseen(pen, image.reason) if image.reason else sighting
+        (image, unseen(pen, image.reason) if image.reason else sighting)
         for image, sighting in zip(searched, sightings, strict=True)
     ]
 

@@ -2,7 +2,13 @@
 
 from enum import StrEnum
 
+import cv2
+
 from lightpen.sentences import Sentence, sentence
+
+# What arithmetic ends in on an image that nobody thought of. One such image is left
+# out, and says so; it does not end a swing or a calibration.
+MISHAPS = (ArithmeticError, ValueError, cv2.error)
 
 
 class Reason(StrEnum):
@@ -10,6 +16,7 @@ class Reason(StrEnum):
 
     NONE = ""
     UNREADABLE = "unreadable"
+    UNHANDLED = "unhandled"
     WRONG_SIZE = "wrong size"
     EMPTY = "empty"
     BLURRED = "blurred"
@@ -28,6 +35,7 @@ class Reason(StrEnum):
 
 _WORDS = {
     Reason.UNREADABLE: sentence("reason.unreadable", "unreadable"),
+    Reason.UNHANDLED: sentence("reason.unhandled", "the program failed on it"),
     Reason.WRONG_SIZE: sentence("reason.wrong-size", "wrong size"),
     Reason.EMPTY: sentence("reason.empty", "no LED seen"),
     Reason.BLURRED: sentence("reason.blurred", "blurred"),
@@ -38,3 +46,14 @@ _WORDS = {
     Reason.SLIPPED: sentence("reason.slipped", "tip slipped"),
     Reason.TAKEN_OUT: sentence("reason.taken-out", "taken out"),
 }
+
+
+def mishap_detail(error: Exception) -> Sentence:
+    """Return what there is to say of an image that ended in one of `MISHAPS`."""
+    return sentence(
+        "image.unhandled",
+        "The program failed on this image ({kind}: {problem}). Keep the image, and "
+        "report it.",
+        kind=type(error).__name__,
+        problem=str(error),
+    )

@@ -19,7 +19,7 @@ from lightpen.detection.labelling.labels import (
     track_spots,
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
-from lightpen.detection.reasons import Reason
+from lightpen.detection.reasons import MISHAPS, Reason
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
@@ -117,9 +117,12 @@ def look(
     """
     if not camera.fits(image):
         return unseen(pen, Reason.WRONG_SIZE)
-    spots = detect_spots(image, mask)
-    labels = _label(spots, camera, pen, before)
-    return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
+    try:
+        spots = detect_spots(image, mask)
+        labels = _label(spots, camera, pen, before)
+        return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
+    except MISHAPS:
+        return unseen(pen, Reason.UNHANDLED)
 
 
 def sightings_of(

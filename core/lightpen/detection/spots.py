@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from enum import IntFlag
 from math import ceil
 from statistics import median
+from typing import Self
 
 import cv2
 import numpy as np
@@ -102,6 +103,19 @@ class Spots:
     edge_widths: FloatArray
     flaws: IntArray
     has_smears: bool = False
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return the spots of an image without any."""
+        nothing = np.zeros(0)
+        return cls(
+            centers=np.zeros((0, 2)),
+            shapes=np.zeros((0, 2, 2)),
+            areas=nothing,
+            contrasts=nothing,
+            edge_widths=nothing,
+            flaws=np.zeros(0, dtype=np.int64),
+        )
 
     def __len__(self) -> int:
         return len(self.centers)
@@ -228,9 +242,9 @@ def _flattened(image: Image, full_scale: int) -> Image:
     step = max(min(image.shape) // NOISE_SAMPLES, 1)
     coarse = cv2.medianBlur(np.ascontiguousarray(image[::step, ::step]), 5)
     size = (image.shape[1], image.shape[0])
-    background = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)
-    uneven = np.asarray(background) - coarse.min()
-    flat: Image = np.asarray(cv2.subtract(image, uneven)).view(image.dtype)
+    uneven = np.asarray(cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR))
+    uneven -= coarse.min()
+    flat: Image = np.asarray(cv2.subtract(image, uneven, dst=uneven)).view(image.dtype)
     np.copyto(flat, image, where=image >= full_scale)
     return flat
 

@@ -4,7 +4,6 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from importlib.metadata import version
 from typing import Any
 
@@ -17,6 +16,7 @@ from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCal
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
 from lightpen.sentences import Sentence, sentence
@@ -88,7 +88,7 @@ def calibration_record(
     nominal = inputs.nominal_tip
     record = {
         "program": _program(),
-        "created": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "created": local_now().isoformat(timespec="seconds"),
         "method": method,
         "tip_pen_mm": tip,
         "cone_cam_mm": result.cone_cam,
@@ -136,7 +136,7 @@ def pivot_record(
     group = np.ones(len(fit.used), dtype=int) if groups is None else groups.group
     record = {
         "program": _program(),
-        "created": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "created": local_now().isoformat(timespec="seconds"),
         "method": "least squares" if least_squares else "robust",
         "tip_pen_mm": fit.tip_pen,
         "pivot_cam_mm": fit.pivot_cam,

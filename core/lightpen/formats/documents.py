@@ -22,6 +22,7 @@ from lightpen.sentences import sentence
 Tree: TypeAlias = "dict[str, Tree] | list[Tree] | str | bool | None"
 
 MAX_DEPTH = 20  # of nesting; the files read here have at most six levels
+MAX_VALUES = 200_000  # with names; a file may keep the points of a calibration
 
 _YAML_NAMESPACE = "tag:yaml.org,2002:"
 _YAML_TAGS = {
@@ -109,7 +110,7 @@ def parse_json(text: str, name: str) -> Tree:
         ) from error
     except RecursionError as error:
         raise _too_deep(name) from error
-    _check_depth(tree, name)
+    _check_size(tree, name)
     return tree
 
 
@@ -122,7 +123,7 @@ def parse_yaml(text: str, name: str) -> Tree:
     if text.startswith("%YAML"):
         text = re.sub(_YAML_DIRECTIVE, "", text, count=1)
     try:
-        return _yaml_document(iter(yaml.parse(text, Loader=loader)), name)
+        return _yaml_document(_limited(yaml.parse(text, Loader=loader), name), name)
     except yaml.MarkedYAMLError as error:
         if error.problem_mark is None:
             raise _no_yaml(name) from error
@@ -171,6 +172,13 @@ def parse_xml(text: str, name: str) -> Tree:
             )
         ) from error
     return builder.root
+
+
+def _limited(events: Iterator[Any], name: str) -> Iterator[Any]:
+    for count, event in enumerate(events):
+        if count > MAX_VALUES:
+            raise _too_many(name)
+        yield event
 
 
 def _yaml_document(events: Iterator[Any], name: str) -> Tree:
@@ -271,10 +279,14 @@ class _XmlBuilder:
         self.root: Tree = None
         self._name = name
         self._open: list[_Element] = []
+        self._n_elements = 0
 
     def open(self, tag: str, line: int) -> None:
         if len(self._open) > MAX_DEPTH:
             raise _too_deep(self._name)
+        self._n_elements += 1
+        if self._n_elements > MAX_VALUES:
+            raise _too_many(self._name)
         if self._open:
             parent = self._open[-1]
             if tag in parent.seen and (tag != "_" or len(parent.seen) > 1):
@@ -312,8 +324,9 @@ def _xml_scalar(text: str) -> str:
     return text
 
 
-def _check_depth(tree: Tree, name: str) -> None:
+def _check_size(tree: Tree, name: str) -> None:
     level = [tree]
+    n_values = 0
     for _ in range(MAX_DEPTH + 1):
         below: list[Tree] = []
         for node in level:
@@ -321,6 +334,9 @@ def _check_depth(tree: Tree, name: str) -> None:
                 below.extend(node.values())
             elif isinstance(node, list):
                 below.extend(node)
+        n_values += len(below)
+        if n_values > MAX_VALUES:
+            raise _too_many(name)
         if not below:
             return
         level = below
@@ -333,6 +349,17 @@ def _no_yaml(name: str) -> FileError:
             "yaml.invalid",
             "{name} is not valid YAML. Check that the right file is named.",
             name=name,
+        )
+    )
+
+
+def _too_many(name: str) -> FileError:
+    return FileError(
+        sentence(
+            "document.too-many-values",
+            "{name} has more than {most:,} values. Check that the right file is named.",
+            name=name,
+            most=MAX_VALUES,
         )
     )
 

@@ -11,6 +11,7 @@ from lightpen.formats.files import printable, quoted
 from lightpen.formats.tables import number_flaw, too_large_number
 from lightpen.sentences import Sentence, sentence
 
+MAX_NUMBERS = 10_000  # of one entry; a covariance has 324
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
 
 
@@ -102,6 +103,18 @@ class Entries:
         """
         key, value = self.entry(*names)
         cells = _cells(value)
+        if len(cells) > MAX_NUMBERS:
+            raise FileError(
+                sentence(
+                    "entry.too-many-numbers",
+                    "{entry} in {name} has {counted}; at most {most} are read. "
+                    "Correct it, or export the file again.",
+                    entry=printable(key),
+                    name=self.name,
+                    counted=counted_numbers(len(cells)),
+                    most=MAX_NUMBERS,
+                )
+            )
         for cell in cells:
             flaw = _flaw(cell)
             if flaw:

@@ -1,11 +1,14 @@
 """Files read whole within a limit, and written whole or not at all."""
 
+import contextlib
 import errno
 import os
 import re
 import stat
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
@@ -49,6 +52,10 @@ _REASONS = {
     errno.ENAMETOOLONG: sentence(
         "write.name-too-long", "the name is too long. Choose a shorter one."
     ),
+    errno.ELOOP: sentence(
+        "write.link-loop",
+        "the name is a link that leads back to itself. Choose another name.",
+    ),
     errno.EEXIST: sentence(
         "write.name-taken", "there is a file of that name already. Try again."
     ),
@@ -72,12 +79,31 @@ def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
     FileError
         The file is missing, a folder, empty, unreadable or larger than `limit`.
     """
+    with opened(path, what, limit) as stream:
+        # Of a longer read, all that it may bring is asked for in advance.
+        return stream.read(os.fstat(stream.fileno()).st_size)
+
+
+@contextlib.contextmanager
+def opened(path: Path, what: Sentence, limit: int) -> Iterator[BinaryIO]:
+    """Open a file to be read, having looked at what it is.
+
+    Parameters
+    ----------
+    what, limit
+        As for `read_bytes`.
+
+    Raises
+    ------
+    FileError
+        As for `read_bytes`, also while it is read.
+    """
     shown = printable(str(path))
     try:
-        status = path.stat()
-        _check_readable(status, what, shown, limit)
+        _check_readable(path.stat(), what, shown, limit)
         with path.open("rb") as stream:
-            data = stream.read(limit + 1)
+            _check_readable(os.fstat(stream.fileno()), what, shown, limit)
+            yield stream
     except (FileNotFoundError, NotADirectoryError) as error:
         raise FileError(
             sentence(
@@ -89,9 +115,6 @@ def read_bytes(path: Path, what: Sentence, limit: int) -> bytes:
         ) from error
     except OSError as error:
         raise unreadable(path, what, error) from error
-    if len(data) > limit:
-        raise _too_large(what, shown, len(data), limit)
-    return data
 
 
 def read_text(path: Path, what: Sentence, limit: int) -> str:
@@ -347,6 +370,8 @@ def _decode(data: bytes) -> str:
 
 
 def _replace(target: Path, data: bytes) -> None:
+    if target.is_symlink():  # still, after all that can be followed was
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None

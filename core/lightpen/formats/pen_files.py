@@ -67,7 +67,7 @@ _COORDINATES = (("x",), ("y",), ("z",))
 _NORMALS = (("nx",), ("ny",), ("nz",))
 _COLUMN = (
     r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
-    r"(?:[\s_/]*[\[(]?\s*([a-zμ]+)\s*[\])]?)?"
+    r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
 )
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {

@@ -16,9 +16,12 @@ from lightpen.sentences import Sentence, sentence
 
 MAX_LINES = 300_000  # 30 000 frames of ten LEDs, 0.2 GB while they are read
 MAX_LINE_LENGTH = 10_000  # characters
+MAX_CELL_LENGTH = 500  # characters
+MAX_CELLS = 2_000_000
 LARGEST_WHOLE = 2**31 - 1  # of frame and LED numbers
 
-_NUMBER = r"(?a:[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?)"
+# No digit can be matched in two ways, so that what is no number is so at once.
+_NUMBER = r"(?a:[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?)"
 _NUMBER_CHARACTERS = b"0123456789+-.eE\n"
 _NOT_FINITE = r"(?i:[+-]?\.?(nan|inf|infinity|1\.#\w+))"
 _BLANK = sentence("look-alike.blank", "blank inside")
@@ -202,13 +205,16 @@ class Table:
         """Raise the error of the cell that keeps `numbers` from its result."""
         first: dict[str, int] = {}
         for i, row in enumerate(self.rows):
-            for cell in (row[column] for column in columns):
-                flaw = number_flaw(cell)
-                if flaw and number_flaw(cell.replace(",", ".")):
-                    raise self.error(i, flaw)
-                for mark in ".,":
-                    if mark in cell:
-                        first.setdefault(mark, i)
+            cells = [row[column] for column in columns]
+            text = "\n".join(cells)
+            if _clean_numbers([text.replace(",", ".")]) is None:
+                for cell in cells:
+                    flaw = number_flaw(cell)
+                    if flaw and number_flaw(cell.replace(",", ".")):
+                        raise self.error(i, flaw)
+            for mark in ".,":
+                if mark in text:
+                    first.setdefault(mark, i)
         raise self.error(
             max(first.values()),
             sentence(
@@ -259,6 +265,7 @@ def parse_table(text: str, name: str) -> Table:
             )
         )
     numbers = [number for number, _ in lines]
+    _check_cells(lines, separator, name)
     rows = [_cells(line, separator, number, name) for number, line in lines]
     if all(row[-1] == "" and len(row) > 1 for row in rows):
         rows = [row[:-1] for row in rows]
@@ -396,6 +403,43 @@ def _cells(line: str, separator: str | None, number: int, name: str) -> list[str
                 name=name,
             )
         ) from error
+
+
+def _check_cells(
+    lines: list[tuple[int, str]], separator: str | None, name: str
+) -> None:
+    """Refuse more or longer cells than are read, before they take any memory."""
+    if separator is None:
+        n_cells = sum(len(line.split()) for _, line in lines)
+    else:
+        n_cells = sum(line.count(separator) for _, line in lines) + len(lines)
+    if n_cells > MAX_CELLS:
+        raise FileError(
+            sentence(
+                "table.too-many-cells",
+                "{name} has {n_cells:,} cells; at most {most:,} are read. Check that "
+                "the right file is named, or divide it.",
+                name=name,
+                n_cells=n_cells,
+                most=MAX_CELLS,
+            )
+        )
+    for number, line in lines:
+        if len(line) <= MAX_CELL_LENGTH:
+            continue
+        longest = max(len(cell.strip()) for cell in line.split(separator))
+        if longest > MAX_CELL_LENGTH:
+            raise FileError(
+                sentence(
+                    "table.long-cell",
+                    "Line {line} of {name} has a cell of {n_characters} characters; "
+                    "at most {most} are read. Check that the right file is named.",
+                    line=number,
+                    name=name,
+                    n_characters=longest,
+                    most=MAX_CELL_LENGTH,
+                )
+            )
 
 
 def _looks_numeric(cell: str) -> bool:

@@ -28,6 +28,7 @@ from lightpen.cameras.worker import (
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
+from lightpen.detection.reasons import MISHAPS
 from lightpen.detection.sighting import Sighting, look
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import LightpenError
@@ -203,11 +204,13 @@ class Live:
     def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:
         camera, pen, mask = wanted.camera, wanted.pen, wanted.mask
         if camera is None or pen is None or not camera.fits(frame.image):
-            return LiveImage(frame, detect_spots(frame.image, mask), None)
+            try:
+                return LiveImage(frame, detect_spots(frame.image, mask), None)
+            except MISHAPS:
+                return LiveImage(frame, Spots.none(), None)
         sighting = look(frame.image, camera, pen, mask, self._last)
         self._last = sighting
-        spots = sighting.spots
-        assert spots is not None
+        spots = Spots.none() if sighting.spots is None else sighting.spots
         return LiveImage(frame, spots, sighting)
 
     def _on_event(self, event: WorkerEvent) -> None:

@@ -9,6 +9,7 @@ from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
+from lightpen.local_time import local_now
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
@@ -29,7 +30,7 @@ class Surroundings:
 
     scene: Scene = field(default_factory=Scene)
     clock: Clock = field(default_factory=MachineClock)
-    now: Callable[[], datetime] = lambda: datetime.now().astimezone()
+    now: Callable[[], datetime] = local_now
 
 
 def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:

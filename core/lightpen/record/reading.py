@@ -34,13 +34,9 @@ from msgspec import Meta, Struct
 from lightpen.arrays import FloatArray, Image, IntArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, read_camera
+from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
 from lightpen.formats.files import FOLDER, MEGABYTE, printable, read_bytes, unreadable
-from lightpen.formats.images import (
-    IMAGE_FILE,
-    MAX_FILE_SIZE,
-    ImageSource,
-    decode_image,
-)
+from lightpen.formats.images import ImageSource
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,

@@ -17,8 +17,8 @@ from msgspec import to_builtins
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import FileError
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import printable, strerror, sync_folder, write_whole
-from lightpen.formats.images import encode_png
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.journal import (

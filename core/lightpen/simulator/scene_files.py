@@ -12,8 +12,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import strerror, write_whole
-from lightpen.formats.images import encode_png
 from lightpen.formats.pen_files import write_pen
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw

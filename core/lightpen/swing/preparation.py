@@ -1,7 +1,6 @@
 """What a calibration needs before the pen is swung, and what of it is missing."""
 
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from enum import StrEnum
 from importlib.metadata import version
 
@@ -12,6 +11,7 @@ from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import PEN_FILE
+from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
@@ -168,7 +168,7 @@ class Preparation:
         return Header(
             camera=FileCopy.of(self.camera_file.path, CAMERA_FILE),
             pen=FileCopy.of(self.pen_file.path, PEN_FILE),
-            created=datetime.now(UTC).astimezone(),
+            created=local_now(),
             program=f"lightpen {version('lightpen')}",
             station=self.names.station,
             operator=self.names.operator,

@@ -263,6 +263,8 @@ def _unsettled(setup: SwingSetup, state: SwingState) -> Transition | None:
 def _capturing(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
     if _is_lost(state):
         return _pause_for(state, Pause.LOST, PEN_LOST)
+    if sighting.reason is Reason.UNHANDLED:
+        state = replace(state, n_dropped=_more(state, 1, sighting.reason))
     if not sighting.has_pose:
         return Transition(state)
     if not in_place(state, state.recent[-1:]).all():

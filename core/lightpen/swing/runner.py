@@ -14,6 +14,7 @@ from pathlib import Path
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.sighting import Sighting
+from lightpen.local_time import local_now
 from lightpen.record.archive import Archive
 from lightpen.swing.course import SwingCourse
 from lightpen.swing.preparation import Preparation
@@ -44,7 +45,7 @@ class SwingRunner:
         records: Path,
         archive: Archive,
         listener: SwingListener,
-        now: Callable[[], datetime] = lambda: datetime.now().astimezone(),
+        now: Callable[[], datetime] = local_now,
     ) -> None:
         self._queue = SerialQueue("swing", lambda: self._course.recover())
         self._course = SwingCourse(records, archive, listener, now, self._queue.start)

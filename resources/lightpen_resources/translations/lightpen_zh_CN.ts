@@ -2399,6 +2399,10 @@
         <translation>{name} 第 {line} 行开始一个文档类型定义，它能使小文件占满内存。请删除；OpenCV 的内参文件中没有这种定义。</translation>
     </message>
     <message>
+        <source>Line {line} of {name} has a cell of {n_characters} characters; at most {most} are read. Check that the right file is named.</source>
+        <translation>{name} 第 {line} 行有一个长达 {n_characters} 个字符的单元格；最多读取 {most} 个。请检查文件是否选对。</translation>
+    </message>
+    <message>
         <source>Line {line} of {name} has a list in place of a name. Check that the right file is named.</source>
         <translation>{name} 第 {line} 行应为名称的地方是列表。请检查是否选对了文件。</translation>
     </message>
@@ -2663,6 +2667,10 @@
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
     <message>
+        <source>The path of the video {path} is no valid UTF-8, which the video decoder needs. Rename the video or its folder, or copy it elsewhere.</source>
+        <translation>视频路径 {path} 不是有效的 UTF-8，视频解码器无法使用。请重命名视频或其文件夹，或将其复制到别处。</translation>
+    </message>
+    <message>
         <source>The pen hardly moved: its postures differ by {found:.1f} degrees (rms), {needed:.0f} degrees are needed. Tilt the pen to all sides, by 20 degrees or more, and turn it about its own axis.</source>
         <translation>光笔几乎没有动：各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请把光笔向各个方向倾斜 20° 以上，并绕自身轴线转动。</translation>
     </message>
@@ -2681,6 +2689,10 @@
     <message>
         <source>The poses have no tip in common: the best one scatters by {scatter:.0f} mm, while the poses themselves are {movement:.0f} mm apart. Check that they are of one pen that was swung on its tip, as cam_from_pen, and that rotations and translations belong together.</source>
         <translation>这些位姿没有共同的测头：最佳结果的散布为 {scatter:.0f} mm，而位姿本身彼此相距 {movement:.0f} mm。请检查：位姿是否来自同一支绕测头摆动的光笔，是否以 cam_from_pen 给出，旋转与平移是否对应。</translation>
+    </message>
+    <message>
+        <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
+        <translation>程序处理该图像时出错（{kind}: {problem}）。请保留该图像并反馈此问题。</translation>
     </message>
     <message>
         <source>The program made a mistake of its own and looks at no more images. Open the camera again.</source>
@@ -2817,6 +2829,14 @@
     <message>
         <source>The video {path} cannot be opened, or holds no frames. Check that it plays, or save its frames as images.</source>
         <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
+    </message>
+    <message>
+        <source>The video {path} has more than {most} frames. Cut out the swing, or save its frames as images.</source>
+        <translation>视频 {path} 超过 {most} 帧。请截取摆动部分，或将各帧另存为图像。</translation>
+    </message>
+    <message>
+        <source>The video {path} is coded as {codec}, which is not read here. Save it with FFV1 or MJPG, or save its frames as images.</source>
+        <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
     </message>
     <message>
         <source>The {what} of recorded images cannot be changed. Choose a live camera.</source>
@@ -3111,6 +3131,10 @@
         <translation>文件超过此处允许的大小。请写到其他磁盘。</translation>
     </message>
     <message>
+        <source>the name is a link that leads back to itself. Choose another name.</source>
+        <translation>该名称是指向自身的链接。请另选名称。</translation>
+    </message>
+    <message>
         <source>the name is too long. Choose a shorter one.</source>
         <translation>名称太长。请选择较短的名称。</translation>
     </message>
@@ -3121,6 +3145,10 @@
     <message>
         <source>the scale of the LED file. State its uncertainty in the file, and measure where the pen is used</source>
         <translation>LED 文件的尺度。请在文件中给出其不确定度，并在使用光笔的环境中测量</translation>
+    </message>
+    <message>
+        <source>the program failed on it</source>
+        <translation>程序处理出错</translation>
     </message>
     <message>
         <source>the scatter of the poses, and that it hangs together from pose to pose</source>
@@ -3251,6 +3279,10 @@
         <translation>{name} 中的 {entry} 有 {counted}，需要 {needed} 个。请改正，或重新导出文件。</translation>
     </message>
     <message>
+        <source>{entry} in {name} has {counted}; at most {most} are read. Correct it, or export the file again.</source>
+        <translation>{name} 中的 {entry} 有 {counted}；最多读取 {most} 个。请更正，或重新导出文件。</translation>
+    </message>
+    <message>
         <source>{entry} in {name} must hold {needed} numbers, none of them negative: of fx fy cx cy and the {n_coefficients} distortion coefficients. Correct or remove it.</source>
         <translation>{name} 中的 {entry} 必须含 {needed} 个非负数：fx fy cx cy 以及 {n_coefficients} 个畸变系数。请改正或删除。</translation>
     </message>
@@ -3359,6 +3391,10 @@
         <translation>{name} 的主点位于 ({cx:g}, {cy:g}) px，远在 {width} × {height} px 的图像之外。请检查两者是否属于同一台相机和同一图像尺寸。</translation>
     </message>
     <message>
+        <source>{name} has more than {most:,} values. Check that the right file is named.</source>
+        <translation>{name} 中的值超过 {most:,} 个。请检查文件是否选对。</translation>
+    </message>
+    <message>
         <source>{name} has more than {most} lines. Check that the right file is named, or divide it.</source>
         <translation>{name} 超过 {most} 行。请检查是否选对了文件，或把它分开。</translation>
     </message>
@@ -3431,6 +3467,10 @@
         <translation>{name} 中的 {key} 没有意义。请删除，或改为 {known} 之一。</translation>
     </message>
     <message>
+        <source>{name} has {n_cells:,} cells; at most {most:,} are read. Check that the right file is named, or divide it.</source>
+        <translation>{name} 有 {n_cells:,} 个单元格；最多读取 {most:,} 个。请检查文件是否选对，或将其拆分。</translation>
+    </message>
+    <message>
         <source>{name} has {n_frames} frames; at most {most} are read. Check that the right file is named, or divide it.</source>
         <translation>{name} 有 {n_frames} 帧；最多读取 {most} 帧。请检查是否选对了文件，或把它分开。</translation>
     </message>
@@ -3443,12 +3483,24 @@
         <translation>{name} 的数值类型为 {value_type}；需要 8 或 16 位灰度值。请不经转换保存图像。</translation>
     </message>
     <message>
+        <source>{name} is a JPEG of {n_scans} scans; at most {most} are read. Save the images as PNG.</source>
+        <translation>{name} 是含 {n_scans} 次扫描的 JPEG；最多读取 {most} 次。请将图像保存为 PNG。</translation>
+    </message>
+    <message>
+        <source>{name} is a TIFF with the compression {compression}, which is not read here. Save the images as PNG, or without compression.</source>
+        <translation>{name} 是压缩方式为 {compression} 的 TIFF，此处不支持。请将图像保存为 PNG，或不压缩保存。</translation>
+    </message>
+    <message>
         <source>{name} is a list; a pen file is a mapping with leds and units. Write it so.</source>
         <translation>{name} 是列表；LED 文件应为含 leds 和 units 的映射。请照此编写。</translation>
     </message>
     <message>
         <source>{name} is a table, which has no place for the name and the nominal tip of the pen. Choose a name that ends in .json.</source>
         <translation>{name} 是表格，无法存放光笔的名称和标称测头。请选择以 .json 结尾的名称。</translation>
+    </message>
+    <message>
+        <source>{name} is an animation. Save its images one by one.</source>
+        <translation>{name} 是动画。请将其中的图像逐幅保存。</translation>
     </message>
     <message>
         <source>{name} is cut off. Capture or copy it again.</source>
@@ -3459,8 +3511,12 @@
         <translation>{name} 已损坏（校验和错误）。请重新拍摄或复制。</translation>
     </message>
     <message>
-        <source>{name} is damaged or no image. Capture or copy it again.</source>
-        <translation>{name} 已损坏或不是图像。请重新拍摄或复制。</translation>
+        <source>{name} is damaged or no image that can be read here (PNG, JPEG, BMP, TIFF, PGM, WebP). Capture or copy it again.</source>
+        <translation>{name} 已损坏，或不是此处可读取的图像（PNG、JPEG、BMP、TIFF、PGM、WebP）。请重新采集或复制。</translation>
+    </message>
+    <message>
+        <source>{name} is {width} x {height} px; at most {most:,} px are read, more than usual cameras have. Choose images of the calibrated camera.</source>
+        <translation>{name} 为 {width} × {height} px；最多读取 {most:,} px，已超过一般相机的像素数。请选择已标定相机的图像。</translation>
     </message>
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that the right file is named.</source>
@@ -3475,12 +3531,12 @@
         <translation>{name} 不是有效的 YAML。请检查是否选对了文件。</translation>
     </message>
     <message>
-        <source>{name} is {width} x {height} px, the first image is {first_width} x {first_height} px. Replay only images of one camera together.</source>
-        <translation>{name} 为 {width} × {height} px，第一幅图像为 {first_width} × {first_height} px。请只回放同一台相机的图像。</translation>
+        <source>{name} is {width} x {height} px and would take {needed:.0f} MB to be decoded; at most {most:.0f} MB are given to an image. Save the images as grey PNG.</source>
+        <translation>{name} 为 {width} × {height} px，解码需要 {needed:.0f} MB；每幅图像最多可用 {most:.0f} MB。请将图像保存为灰度 PNG。</translation>
     </message>
     <message>
-        <source>{name} is {width} x {height} px; at most {most:,} px are read. Choose images of the calibrated camera.</source>
-        <translation>{name} 为 {width} × {height} px；最多读取 {most:,} px。请选择已标定相机的图像。</translation>
+        <source>{name} is {width} x {height} px, the first image is {first_width} x {first_height} px. Replay only images of one camera together.</source>
+        <translation>{name} 为 {width} × {height} px，第一幅图像为 {first_width} × {first_height} px。请只回放同一台相机的图像。</translation>
     </message>
     <message>
         <source>{name} states its lengths in {stated}, but the unit {given} is given. Leave the unit away, or correct the file.</source>

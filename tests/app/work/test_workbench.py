@@ -13,7 +13,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.images import encode_png
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import SwingLimits

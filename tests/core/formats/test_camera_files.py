@@ -670,3 +670,25 @@ def test_the_shared_camera_is_read(shared_data: Path) -> None:
     found = read_camera(shared_data / "swing-clean" / "camera.yaml")
     expected = camera(distortion=np.array([-0.082, 0.105, 3e-4, -2e-4, 0.0]))
     assert_same(found, expected)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "camera_matrix: [" + "1," * 300_000 + "1]\n",
+        '{"camera_matrix": [' + "1," * 300_000 + "1]}",
+        "<opencv_storage><a>" + "<_></_>" * 300_000 + "</a></opencv_storage>",
+    ],
+    ids=["yaml", "json", "xml"],
+)
+def test_more_values_than_any_calibration_has_are_refused(
+    tmp_path: Path, text: str
+) -> None:
+    assert "more than 200,000 values" in refusal(tmp_path, text)
+
+
+def test_more_numbers_than_any_matrix_has_are_refused(tmp_path: Path) -> None:
+    xml = "<a><camera_matrix>" + "1 " * 20_000 + "</camera_matrix>"
+    xml += "<image_width>2</image_width><image_height>2</image_height></a>"
+
+    assert "20000 numbers; at most 10000" in refusal(tmp_path, xml)

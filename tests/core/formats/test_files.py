@@ -188,6 +188,16 @@ def test_writing_through_a_link_keeps_the_link(tmp_path: Path) -> None:
 
 
 @posix_only
+@posix_only
+def test_a_link_to_itself_is_not_written_over(tmp_path: Path) -> None:
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+
+    with pytest.raises(FileError, match="leads back to itself"):
+        write_whole(loop, b"new")
+    assert loop.is_symlink()
+
+
 def test_a_device_is_written_to_and_not_replaced() -> None:
     write_whole(Path(os.devnull), b"new")
     assert Path(os.devnull).is_char_device()

@@ -1,9 +1,11 @@
 """Images from folders, patterns and videos; what is damaged is named."""
 
+import os
 import subprocess
 import sys
 import zlib
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -12,7 +14,8 @@ import pytest
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.images import decode_image, encode_png, find_images, read_image
+from lightpen.formats.decoding import decode_image, encode_png, read_image
+from lightpen.formats.images import find_images
 
 RNG = np.random.default_rng(0)
 GREY = RNG.integers(0, 255, (48, 64), dtype=np.uint8)
@@ -123,6 +126,50 @@ def test_a_huge_image_is_refused_before_it_is_decoded() -> None:
         decode_image(huge, "huge.png")
 
 
+def test_an_image_that_takes_too_much_memory_is_refused() -> None:
+    deep = b"\x89PNG\r\n\x1a\n" + (13).to_bytes(4, "big") + b"IHDR"
+    deep += (6000).to_bytes(4, "big") * 2 + bytes([16, 6, 0, 0, 0])
+
+    with pytest.raises(FileError, match=r"would take 576 MB .* at most 250 MB"):
+        decode_image(deep, "deep.png")
+
+
+def test_a_jpeg_without_end_is_refused() -> None:
+    whole = bytes(cv2.imencode(".jpg", GREY)[1])
+
+    assert decode_image(whole, "whole.jpg").shape == GREY.shape
+    with pytest.raises(FileError, match="cut off"):
+        decode_image(whole[:-500], "cut.jpg")
+
+
+def test_a_jpeg_of_endless_scans_is_refused() -> None:
+    whole = bytes(cv2.imencode(".jpg", GREY)[1])
+    scan = whole.index(b"\xff\xda")
+
+    with pytest.raises(FileError, match="JPEG of 101 scans; at most 64"):
+        decode_image(whole[:scan] + 101 * whole[scan:-2] + whole[-2:], "long.jpg")
+
+
+def test_an_animation_is_refused() -> None:
+    still = png(GREY)
+    control = b"acTL" + bytes(8)
+    chunk = bytes([0, 0, 0, 8]) + control + zlib.crc32(control).to_bytes(4, "big")
+
+    with pytest.raises(FileError, match="animation"):
+        decode_image(still[:33] + chunk + still[33:], "moving.png")
+
+
+def test_large_images_are_decoded_in_turn(tmp_path: Path) -> None:
+    large = np.zeros((7000, 9000), dtype=np.uint8)  # half of the memory and more
+    path = tmp_path / "large.png"
+    path.write_bytes(bytes(cv2.imencode(".png", large)[1]))
+
+    with ThreadPoolExecutor(4) as executor:
+        shapes = [image.shape for image in executor.map(read_image, [path] * 6)]
+
+    assert shapes == [large.shape] * 6
+
+
 def test_floating_point_images_are_refused() -> None:
     data = bytes(cv2.imencode(".tiff", GREY.astype(np.float32))[1])
 
@@ -173,6 +220,84 @@ def test_a_folder_that_may_not_be_looked_into_is_refused(
         "Check that it is yours to read and that its disk is connected."
     )
     assert told.stdout.splitlines() == [sentence, sentence]
+
+
+def test_names_with_digits_that_are_no_numbers_have_an_order(tmp_path: Path) -> None:
+    for name in ("5²3.png", "5.png", "٣.png", "10.png"):
+        (tmp_path / name).write_bytes(png(GREY))
+
+    names = find_images(str(tmp_path)).names
+
+    assert names.index("5.png") < names.index("10.png")
+    assert len(names) == 4
+
+
+def write_video(
+    path: Path, n_frames: int = 6, size: tuple[int, int] = (64, 48)
+) -> None:
+    frame = np.zeros((size[1], size[0], 3), dtype=np.uint8)
+    code = cv2.VideoWriter.fourcc(*"MJPG")
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, 20.0, size)
+    for _ in range(n_frames):
+        writer.write(frame)
+    writer.release()
+
+
+def test_the_frames_of_a_video_are_counted_whatever_its_header_says(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "swing.avi"
+    write_video(path)
+    data = bytearray(path.read_bytes())
+    of_file, of_stream = data.index(b"avih") + 24, data.index(b"strh") + 40
+    for place in (of_file, of_stream):
+        data[place : place + 4] = (2**31 - 2).to_bytes(4, "little")
+    path.write_bytes(data)
+
+    source = find_images(str(path))
+
+    assert len(source.names) == 6
+    assert [load().shape for load in source.open()] == [(48, 64)] * 6
+
+
+def test_a_video_of_larger_frames_than_those_of_cameras_is_refused(
+    tmp_path: Path,
+) -> None:
+    small, large = (
+        bytes(cv2.imencode(".jpg", np.zeros(shape, np.uint8))[1])
+        for shape in ((48, 64, 3), (4100, 5000, 3))
+    )
+    path = tmp_path / "swing.avi"
+    path.write_bytes(4 * small + large + 2 * small)
+
+    with pytest.raises(FileError, match=r"Frame 5 .* 5000 x 4100 px"):
+        find_images(str(path))
+
+
+def test_a_video_of_an_unknown_codec_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "swing.avi"
+    write_video(path)
+    path.write_bytes(path.read_bytes().replace(b"MJPG", b"FV1k"))
+
+    with pytest.raises(FileError, match='coded as "FV1K"'):
+        find_images(str(path))
+
+
+def test_the_name_of_a_video_is_no_pattern(tmp_path: Path) -> None:
+    path = tmp_path / "swing_%03d.avi"
+    write_video(path)
+
+    assert len(find_images(str(path)).names) == 6
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs names of any bytes")
+def test_a_video_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "swing.avi"
+    write_video(path)
+    renamed = path.rename(tmp_path / os.fsdecode(b"swing\xff.avi"))
+
+    with pytest.raises(FileError, match=r"swing\\udcff.avi is no valid UTF-8"):
+        find_images(str(renamed))
 
 
 def test_a_video_that_is_none_is_refused(tmp_path: Path) -> None:

@@ -255,3 +255,18 @@ def test_more_lines_than_fit_the_memory_are_refused() -> None:
 def test_a_line_longer_than_any_row_is_refused() -> None:
     with pytest.raises(FileError, match=r"^Line 2 of t\.csv has 10001 characters"):
         parse_table("led,x\n" + "," * 10_001, "t.csv")
+
+
+def test_more_cells_than_fit_the_memory_are_refused() -> None:
+    with pytest.raises(FileError, match=r"t\.csv has 2,000,010 cells; at most 2,000"):
+        parse_table(("1" + ",1" * 29 + "\n") * 66_667, "t.csv")
+
+
+def test_a_cell_longer_than_any_number_or_name_is_refused() -> None:
+    with pytest.raises(FileError, match=r"^Line 2 of t\.csv has a cell of 501 char"):
+        parse_table("led,x\n1," + "1" * 501, "t.csv")
+
+
+def test_what_is_no_number_is_so_in_one_pass() -> None:
+    # Twice over the digits for each of them would take an hour.
+    assert number_flaw("1" * 300_000 + "a") is not None

@@ -18,7 +18,7 @@ import pytest
 from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
-from lightpen.formats.images import encode_png
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.record.reading import (
     FileCopy,

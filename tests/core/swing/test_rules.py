@@ -9,7 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.cameras.clock import SkippingClock
 from lightpen.detection.reasons import Reason
-from lightpen.detection.sighting import Sighting, sight_centers
+from lightpen.detection.sighting import Sighting, sight_centers, unseen
 from lightpen.messages import (
     FOLLOW_ARROW,
     LEAN_TO_YOUR_RIGHT,
@@ -476,6 +476,19 @@ def test_too_few_leds_are_said_and_not_kept() -> None:
     station.operator.uncover()
     station.run(1.0)
     assert station.state.message == FOLLOW_ARROW
+
+
+def test_an_image_that_the_program_failed_on_is_counted_and_the_swing_goes_on() -> None:
+    station = capturing()
+    n_kept = station.state.n_kept
+    failed = unseen(station.setup.pen, Reason.UNHANDLED)
+    station.take(advance(station.setup, station.state, failed, station.now))
+    assert station.state.n_dropped[Reason.UNHANDLED] == 1
+    assert station.state.phase is Phase.CAPTURING
+
+    station.run(2.0)
+    assert station.state.n_dropped[Reason.UNHANDLED] == 1
+    assert station.state.n_kept > n_kept
 
 
 def test_a_noisy_image_is_judged_by_the_others_as_soon_as_there_are_enough() -> None:

@@ -4,6 +4,7 @@ from PySide6.QtCore import QObject
 
 from lightpen.estimation.report import warnings_of
 from lightpen.estimation.verdict import USUAL_CHANGE, distance_from_nominal
+from lightpen.local_time import local_time
 from lightpen.record.names import Names
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
@@ -47,7 +48,7 @@ class ReviewDoubts(QObject):
             "The tip lies {0} mm from the calibration of {1} (usual change: {2} "
             "mm). Was the tip exchanged?"
         )
-        date = f"{last.accepted.astimezone():%Y-%m-%d}"
+        date = f"{local_time(last.accepted):%Y-%m-%d}"
         return text.format(f"{change.distance:.3f}", date, USUAL_CHANGE)
 
     def _of_nominal(self, outcome: Outcome) -> str:

@@ -18,6 +18,7 @@ from lightpen.estimation.verdict import (
     NextStep,
     Verdict,
 )
+from lightpen.local_time import local_time
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
 from lightpen.swing.status import Activity
@@ -389,7 +390,7 @@ class ReviewPage(Rearranged, Page):
     def _state(self) -> State:
         status = self._run.status
         if status.result is not None:
-            since = f"{status.result.accepted.astimezone():%Y-%m-%d %H:%M:%S}"
+            since = f"{local_time(status.result.accepted):%Y-%m-%d %H:%M:%S}"
             text = self.tr("Since {0}. Earlier results are kept.").format(since)
             return State(self.tr("IN FORCE"), text, Sign.CHECK, Tone.GOOD)
         if status.verdict is None:

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.verdict import Change, change_since, halves_agree
+from lightpen.local_time import local_time
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
@@ -140,7 +141,7 @@ class ResultPanel(Translated, QFrame):
         if change is None or outcome.last is None:
             rows.append((self.tr("no earlier result"), BLANK))
         else:
-            date = f"{outcome.last.accepted.astimezone():%Y-%m-%d}"
+            date = f"{local_time(outcome.last.accepted):%Y-%m-%d}"
             since = self.tr("since {0}").format(date)
             u = change.expanded_uncertainty
             rows += [(since, _texts(change.difference, u)), (within, _texts(u, u))]

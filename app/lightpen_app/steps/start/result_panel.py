@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.estimation.verdict import Grade
+from lightpen.local_time import local_time
 from lightpen.record.results import OLD, Result
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
@@ -179,7 +180,7 @@ class LastResultPanel(Translated, QGroupBox):
         return Remark(text, Sign.WARNING, Tone.WARN)
 
     def _age_text(self, result: Result, now: datetime) -> str:
-        days = (now.date() - result.accepted.astimezone().date()).days
+        days = (now.date() - local_time(result.accepted).date()).days
         if days < 0:
             return self.tr("In the future")
         if days == 0:

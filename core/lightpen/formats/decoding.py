@@ -1,0 +1,242 @@
+"""An image file as grey values: read within limits, checked, decoded."""
+
+import ctypes
+import os
+import struct
+import sys
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from threading import Condition
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lightpen.arrays import Image
+from lightpen.errors import FileError
+from lightpen.formats.files import opened
+from lightpen.formats.image_headers import (
+    PNG_SIGNATURE,
+    ImageHeader,
+    cut_off_image,
+    damaged_image,
+    read_image_header,
+)
+from lightpen.sentences import Sentence, sentence
+
+IMAGE_FILE = sentence("file.image", "image")
+MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
+MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
+MAX_SCANS = 64  # of a JPEG, each of which takes as long as the image; 10 are usual
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
+MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
+MAX_KEPT_MEMORY = 256 * 2**20
+MAX_ARENAS = 4  # of threads; each reserves 64 MB, of what `ulimit -v` leaves
+
+
+def keep_freed_memory() -> None:
+    """Let the next image use the memory of the last one (Linux with glibc).
+
+    Blocks as large as an image otherwise go back to the kernel when freed, and come
+    anew page by page, zeroed: two fifths of the time that decoding takes. Threads that
+    begin later share a few arenas.
+    """
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MAX_KEPT_BLOCK)
+        mallopt(M_TRIM_THRESHOLD, MAX_KEPT_MEMORY)
+        mallopt(M_ARENA_MAX, MAX_ARENAS)
+
+
+def read_image(path: Path) -> Image:
+    """Read one image file as grey values of 8 or 16 bit.
+
+    The bytes are read first and decoded then: `cv2.imread` fails on names outside
+    the code page of Windows.
+
+    Raises
+    ------
+    FileError
+        The file is missing, empty, too large, damaged or no image.
+    """
+    with opened(path, IMAGE_FILE, MAX_FILE_SIZE) as stream:
+        header = read_image_header(stream, path.name)
+        size = os.fstat(stream.fileno()).st_size
+        with _MEMORY.given(_needed(header, size, path.name)):
+            stream.seek(0)
+            return _decoded(stream.read(size), path.name)
+
+
+def decode_image(data: bytes, name: str) -> Image:
+    """Decode the bytes of an image file as grey values of 8 or 16 bit, (H, W).
+
+    Raises
+    ------
+    FileError
+        The image is damaged, too large or no image.
+    """
+    header = read_image_header(BytesIO(data), name)
+    with _MEMORY.given(_needed(header, len(data), name)):
+        return _decoded(data, name)
+
+
+def encode_png(image: Image) -> bytes:
+    """Return a grey image as PNG, made for dark images: runs of equal values.
+
+    No row is predicted from the last, which costs time and gains nothing on noise.
+    """
+    options = [
+        *(cv2.IMWRITE_PNG_COMPRESSION, 1),
+        *(cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE),
+    ]
+    if hasattr(cv2, "IMWRITE_PNG_FILTER"):  # OpenCV 4.12 and later
+        options += [cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_NONE]
+    return cv2.imencode(".png", image, options)[1].tobytes()
+
+
+class _Memory:
+    """Lets those in who need some of it, as long as there is enough for all."""
+
+    def __init__(self, n_bytes: int) -> None:
+        self._free = n_bytes
+        self._changed = Condition()
+
+    @contextmanager
+    def given(self, n_bytes: int) -> Iterator[None]:
+        with self._changed:
+            self._changed.wait_for(lambda: self._free >= n_bytes)
+            self._free -= n_bytes
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._free += n_bytes
+                self._changed.notify_all()
+
+
+_MEMORY = _Memory(MAX_MEMORY)
+
+
+def _needed(header: ImageHeader, size: int, name: str) -> int:
+    """Return the memory for a file of that size, and what decoding it takes."""
+    # OpenCV decodes into memory of its own and then copies the image to numpy's.
+    needed = size + header.decoded + max(header.decoded, header.working)
+    if needed > MAX_MEMORY:
+        raise FileError(
+            sentence(
+                "image.too-much-memory",
+                "{name} is {width} x {height} px and would take {needed:.0f} MB to be "
+                "decoded; at most {most:.0f} MB are given to an image. Save the images "
+                "as grey PNG.",
+                name=name,
+                width=header.width,
+                height=header.height,
+                needed=needed / 1e6,
+                most=MAX_MEMORY / 1e6,
+            )
+        )
+    return needed
+
+
+def _decoded(data: bytes, name: str) -> Image:
+    if data.startswith(PNG_SIGNATURE):
+        _check_png(data, name)
+    elif data.startswith(b"\xff\xd8"):
+        _check_jpeg(data, name)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise FileError(
+            sentence(
+                "image.undecodable",
+                "{name} cannot be decoded: {problem}.",
+                name=name,
+                problem=error.err,
+            )
+        ) from error
+    if image is None:
+        raise damaged_image(name)
+    return grey_image(np.asarray(image), name)
+
+
+def grey_image(image: npt.NDArray[Any], name: str | Sentence) -> Image:
+    """Return a decoded image in grey values of 8 or 16 bit, (H, W).
+
+    Raises
+    ------
+    FileError
+        Its values are of another type.
+    """
+    if image.dtype not in (np.uint8, np.uint16):
+        raise FileError(
+            sentence(
+                "image.value-type",
+                "{name} holds values of type {value_type}; grey values of 8 or 16 "
+                "bit are needed. Save the images without conversion.",
+                name=name,
+                value_type=str(image.dtype),
+            )
+        )
+    if image.ndim == 2:
+        return image
+    conversion = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(image.shape[2])
+    if conversion is None:
+        return np.ascontiguousarray(image[..., 0])
+    grey: Image = np.asarray(cv2.cvtColor(image, conversion), dtype=image.dtype)
+    return grey
+
+
+def _check_png(data: bytes, name: str) -> None:
+    """Walk over the chunks of a PNG: the decoder would only print what is wrong."""
+    position = len(PNG_SIGNATURE)
+    kind = b""
+    while kind != b"IEND":
+        head = data[position : position + 8]
+        if len(head) < 8:
+            raise cut_off_image(name)
+        length, kind = struct.unpack(">I4s", head)
+        body = data[position + 4 : position + 8 + length]
+        checksum = data[position + 8 + length : position + 12 + length]
+        if len(checksum) < 4:
+            raise cut_off_image(name)
+        if zlib.crc32(body) != int.from_bytes(checksum, "big"):
+            raise FileError(
+                sentence(
+                    "image.wrong-checksum",
+                    "{name} is damaged (wrong checksum). Capture or copy it again.",
+                    name=name,
+                )
+            )
+        if kind == b"acTL":
+            raise FileError(
+                sentence(
+                    "image.animated",
+                    "{name} is an animation. Save its images one by one.",
+                    name=name,
+                )
+            )
+        position += 12 + length
+
+
+def _check_jpeg(data: bytes, name: str) -> None:
+    """Refuse a JPEG without an end, which the decoder makes up, or without end."""
+    if data.rfind(b"\xff\xd9") < data.rfind(b"\xff\xda"):
+        raise cut_off_image(name)
+    n_scans = data.count(b"\xff\xda")
+    if n_scans > MAX_SCANS:
+        raise FileError(
+            sentence(
+                "image.too-many-scans",
+                "{name} is a JPEG of {n_scans} scans; at most {most} are read. Save "
+                "the images as PNG.",
+                name=name,
+                n_scans=n_scans,
+                most=MAX_SCANS,
+            )
+        )

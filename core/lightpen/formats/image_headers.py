@@ -1,0 +1,286 @@
+"""How large the image in a file is, and what decoding it takes, by its header alone.
+
+A kilobyte can claim to be an image of gigapixels, and a decoder believes it. So the few
+formats that cameras write are told here by their first bytes, and their headers are
+read as their decoders read them; no other format is decoded.
+"""
+
+import re
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import BinaryIO, TypeAlias
+
+from lightpen.errors import FileError
+from lightpen.sentences import Sentence, sentence
+
+MAX_PIXELS = 70_000_000  # 9344 x 7000 are the most of the usual sensors
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+_PNM_GAP = rb"(?:\s|#[^\r\n]*[\r\n])"
+_PNM_HEAD = re.compile(
+    rb"P([1-6])%b+(\d{1,9})%b+(\d{1,9})(?:%b+(\d{1,9}))?" % ((_PNM_GAP,) * 3)
+)
+_PNM_HEAD_LENGTH = 4096  # bytes, with comments
+_BMP_HEAD_OF_OS2 = 12  # bytes
+_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_JPEG_PROGRESSIVE = 0xC2
+_JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
+_JPEG_MARKERS = 1000  # before the frame; a colour profile takes 255
+_TIFF_VALUES = {1: "B", 3: "H", 4: "I"}  # by the type of an entry
+_TIFF_ENTRIES = 500
+_TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
+
+
+@dataclass(frozen=True)
+class ImageHeader:
+    """What the header of an image says.
+
+    Attributes
+    ----------
+    width, height : int
+        px.
+    decoded : int
+        Size of the decoded image, bytes.
+    working : int
+        Memory that its decoder takes besides, bytes.
+    """
+
+    width: int
+    height: int
+    decoded: int
+    working: int = 0
+
+
+_Name: TypeAlias = str | Sentence
+_Reader: TypeAlias = Callable[[BinaryIO, _Name], ImageHeader]
+
+
+def read_image_header(stream: BinaryIO, name: str | Sentence) -> ImageHeader:
+    """Read the header of an image, and refuse what is larger than cameras take.
+
+    Parameters
+    ----------
+    stream : BinaryIO
+        The file, at its first byte; it is left anywhere.
+    name : str or Sentence
+        Of the image, for the sentences.
+
+    Raises
+    ------
+    FileError
+        The format is not known, the header is damaged, or the image is too large.
+    """
+    start = stream.read(16)
+    stream.seek(0)
+    header = _reader(start, name)(stream, name)
+    if header.width == 0 or header.height == 0:
+        raise damaged_image(name)
+    check_pixels(header.width, header.height, name)
+    return header
+
+
+def check_pixels(
+    width: int, height: int, name: str | Sentence, most: int = MAX_PIXELS
+) -> None:
+    """Refuse an image with more pixels than those of cameras.
+
+    Raises
+    ------
+    FileError
+        It has more than `most`.
+    """
+    if width * height > most:
+        raise FileError(
+            sentence(
+                "image.too-many-pixels",
+                "{name} is {width} x {height} px; at most {most:,} px are read, more "
+                "than usual cameras have. Choose images of the calibrated camera.",
+                name=name,
+                width=width,
+                height=height,
+                most=most,
+            )
+        )
+
+
+def damaged_image(name: str | Sentence) -> FileError:
+    """Return the error of what is damaged, or no image at all."""
+    return FileError(
+        sentence(
+            "image.damaged",
+            "{name} is damaged or no image that can be read here (PNG, JPEG, BMP, "
+            "TIFF, PGM, WebP). Capture or copy it again.",
+            name=name,
+        )
+    )
+
+
+def cut_off_image(name: str | Sentence) -> FileError:
+    """Return the error of an image whose end is missing."""
+    return FileError(
+        sentence(
+            "image.cut-off",
+            "{name} is cut off. Capture or copy it again.",
+            name=name,
+        )
+    )
+
+
+def _reader(start: bytes, name: _Name) -> _Reader:
+    if start.startswith(PNG_SIGNATURE):
+        return _png
+    if start.startswith(b"\xff\xd8\xff"):
+        return _jpeg
+    if start.startswith(b"BM"):
+        return _bmp
+    if start.startswith((b"II*\0", b"MM\0*")):
+        return _tiff
+    if start.startswith(b"RIFF") and start[8:12] == b"WEBP":
+        return _webp
+    if re.match(rb"P[1-6][\s#]", start):
+        return _pnm
+    raise damaged_image(name)
+
+
+def _exactly(stream: BinaryIO, count: int, name: _Name) -> bytes:
+    data = stream.read(count)
+    if len(data) < count:
+        raise cut_off_image(name)
+    return data
+
+
+def _png(stream: BinaryIO, name: _Name) -> ImageHeader:
+    stream.seek(len(PNG_SIGNATURE))
+    length, kind, width, height, depth, colour = struct.unpack(
+        ">I4sIIBB", _exactly(stream, 18, name)
+    )
+    if (length, kind) != (13, b"IHDR"):
+        raise damaged_image(name)
+    # All but grey may come with transparency, which makes it four channels.
+    bytes_a_pixel = (1 if colour == 0 else 4) * (2 if depth == 16 else 1)
+    return ImageHeader(width, height, width * height * bytes_a_pixel)
+
+
+def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
+    stream.seek(2)
+    for _ in range(_JPEG_MARKERS):
+        if _exactly(stream, 1, name) != b"\xff":
+            raise damaged_image(name)
+        (marker,) = _exactly(stream, 1, name)
+        while marker == 0xFF:  # fill bytes
+            (marker,) = _exactly(stream, 1, name)
+        if marker in _JPEG_WITHOUT_LENGTH:
+            continue
+        (length,) = struct.unpack(">H", _exactly(stream, 2, name))
+        if length < 2:
+            raise damaged_image(name)
+        if marker in _JPEG_FRAMES:
+            break
+        stream.seek(length - 2, 1)
+    else:
+        raise damaged_image(name)
+    depth, height, width, channels = struct.unpack(">BHHB", _exactly(stream, 6, name))
+    if depth != 8 or channels not in (1, 3, 4):
+        raise damaged_image(name)
+    pixels = width * height
+    # It keeps the coefficients of all scans, two bytes each.
+    working = 2 * channels * pixels if marker == _JPEG_PROGRESSIVE else 0
+    return ImageHeader(width, height, pixels * (1 if channels == 1 else 3), working)
+
+
+def _bmp(stream: BinaryIO, name: _Name) -> ImageHeader:
+    stream.seek(14)
+    (size,) = struct.unpack("<I", _exactly(stream, 4, name))
+    layout = "<HHHH" if size == _BMP_HEAD_OF_OS2 else "<iiHH"
+    width, height, _, bits = struct.unpack(
+        layout, _exactly(stream, struct.calcsize(layout), name)
+    )
+    if width < 0:
+        raise damaged_image(name)
+    return ImageHeader(
+        width, abs(height), width * abs(height) * (4 if bits == 32 else 3)
+    )
+
+
+def _tiff(stream: BinaryIO, name: _Name) -> ImageHeader:
+    order = "<" if _exactly(stream, 2, name) == b"II" else ">"
+    _, place = struct.unpack(order + "HI", _exactly(stream, 6, name))
+    stream.seek(place)
+    (count,) = struct.unpack(order + "H", _exactly(stream, 2, name))
+    if count > _TIFF_ENTRIES:
+        raise damaged_image(name)
+    entries = _exactly(stream, 12 * count, name)
+    values: dict[int, int] = {}
+    for i in range(count):
+        tag, kind, n_values = struct.unpack_from(order + "HHI", entries, 12 * i)
+        if kind not in _TIFF_VALUES or tag in values:
+            continue
+        layout = order + _TIFF_VALUES[kind]
+        if n_values * struct.calcsize(layout) <= 4:
+            (values[tag],) = struct.unpack_from(layout, entries, 12 * i + 8)
+        else:  # of several, such as the depths of channels, the first
+            (offset,) = struct.unpack_from(order + "I", entries, 12 * i + 8)
+            stream.seek(offset)
+            (values[tag],) = struct.unpack(
+                layout, _exactly(stream, struct.calcsize(layout), name)
+            )
+    return _tiff_header(values, name)
+
+
+def _tiff_header(values: dict[int, int], name: _Name) -> ImageHeader:
+    width, height = values.get(256, 0), values.get(257, 0)
+    depth, compression, channels = (
+        values.get(258, 1),
+        values.get(259, 1),
+        values.get(277, 1),
+    )
+    if compression not in _TIFF_LOSSLESS:
+        raise FileError(
+            sentence(
+                "image.tiff-compression",
+                "{name} is a TIFF with the compression {compression}, which is not "
+                "read here. Save the images as PNG, or without compression.",
+                name=name,
+                compression=compression,
+            )
+        )
+    if not 1 <= channels <= 4 or depth > 64:
+        raise damaged_image(name)
+    # It is decoded strip by strip or tile by tile, each from a copy.
+    strip = width * min(values.get(278, height), height)
+    if 322 in values or 323 in values:
+        strip = values.get(322, 0) * values.get(323, 0)
+    bytes_a_pixel = 4 * max(-(-depth // 8), 1)
+    return ImageHeader(
+        width, height, width * height * channels * -(-depth // 8), strip * bytes_a_pixel
+    )
+
+
+def _webp(stream: BinaryIO, name: _Name) -> ImageHeader:
+    stream.seek(12)
+    kind = _exactly(stream, 4, name)
+    stream.seek(20)
+    head = _exactly(stream, 10, name)
+    if kind == b"VP8X":
+        width = int.from_bytes(head[4:7], "little") + 1
+        height = int.from_bytes(head[7:10], "little") + 1
+    elif kind == b"VP8L":
+        sizes = int.from_bytes(head[1:5], "little")
+        width, height = (sizes & 0x3FFF) + 1, (sizes >> 14 & 0x3FFF) + 1
+    elif kind == b"VP8 ":
+        width, height = (side & 0x3FFF for side in struct.unpack("<HH", head[6:10]))
+    else:
+        raise damaged_image(name)
+    return ImageHeader(width, height, 4 * width * height, 4 * width * height)
+
+
+def _pnm(stream: BinaryIO, name: _Name) -> ImageHeader:
+    head = _PNM_HEAD.match(stream.read(_PNM_HEAD_LENGTH))
+    if head is None or (head[4] is None and head[1] not in b"14"):
+        raise damaged_image(name)
+    kind, width, height = int(head[1]), int(head[2]), int(head[3])
+    brightest = 1 if kind in (1, 4) else int(head[4])
+    channels = 3 if kind in (3, 6) else 1
+    bytes_a_value = 2 if brightest > 255 else 1
+    return ImageHeader(width, height, width * height * channels * bytes_a_value)

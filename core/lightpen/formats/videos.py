@@ -1,0 +1,139 @@
+"""The frames of a video, counted and decoded one after the other."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+
+import cv2
+
+from lightpen.arrays import Image
+from lightpen.errors import FileError
+from lightpen.formats.decoding import grey_image
+from lightpen.formats.files import printable, quoted
+from lightpen.formats.image_headers import check_pixels, read_image_header
+from lightpen.sentences import Sentence, sentence
+
+MAX_VIDEO_FRAMES = 30_000
+MAX_VIDEO_PIXELS = 20_000_000  # of a frame, of which a decoder keeps several
+MOTION_JPEG = "MJPG"
+# Anything else FFmpeg may take for raw pixels, of a layout that it has not.
+CODECS = frozenset(
+    {
+        *(MOTION_JPEG, "FFV1", "HFYU", "FFVH", "H264", "AVC1", "HEVC", "HEV1", "HVC1"),
+        *("MP4V", "FMP4", "XVID", "DIVX", "DX50", "MPG1", "MPG2", "PIM1", "PIM2"),
+        *("VP80", "VP90", "VP08", "VP09", "AV01"),
+    }
+)
+
+
+def count_frames(path: Path) -> int:
+    """Return how many frames a video has, which its header need not say truly.
+
+    They are counted as they come, not decoded.
+
+    Raises
+    ------
+    FileError
+        It is no video, or longer or larger than is read.
+    """
+    stream = _opened_video(path, cv2.CAP_PROP_FORMAT, -1)
+    try:
+        check_pixels(
+            int(stream.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            int(stream.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+            printable(path.name),
+            MAX_VIDEO_PIXELS,
+        )
+        codec = _codec(stream)
+        if stream.isOpened() and codec not in CODECS:
+            raise FileError(
+                sentence(
+                    "video.codec",
+                    "The video {path} is coded as {codec}, which is not read here. "
+                    "Save it with FFV1 or MJPG, or save its frames as images.",
+                    path=printable(str(path)),
+                    codec=quoted(codec),
+                )
+            )
+        n_frames = 0
+        while n_frames <= MAX_VIDEO_FRAMES and stream.grab():
+            n_frames += 1
+            if codec == MOTION_JPEG:  # each has a size of its own
+                _check_jpeg(stream.retrieve()[1].tobytes(), _name(n_frames))
+    finally:
+        stream.release()
+    if n_frames == 0:
+        raise FileError(
+            sentence(
+                "image.video",
+                "The video {path} cannot be opened, or holds no frames. Check that "
+                "it plays, or save its frames as images.",
+                path=printable(str(path)),
+            )
+        )
+    if n_frames > MAX_VIDEO_FRAMES:
+        raise FileError(
+            sentence(
+                "video.too-many-frames",
+                "The video {path} has more than {most} frames. Cut out the swing, or "
+                "save its frames as images.",
+                path=printable(str(path)),
+                most=MAX_VIDEO_FRAMES,
+            )
+        )
+    return n_frames
+
+
+def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:
+    """Yield a loader for each frame: it returns it in grey, or raises `FileError`."""
+    stream = _opened_video(path)
+    try:
+        for i in range(n_frames):
+            name = _name(i + 1)
+            good, frame = stream.read()
+            yield partial(_frame, grey_image(frame, name) if good else None, name)
+    finally:
+        stream.release()
+
+
+def _opened_video(path: Path, *parameters: int) -> cv2.VideoCapture:
+    try:
+        name = str(path)
+        name.encode()
+    except UnicodeEncodeError as error:  # OpenCV would crash
+        raise FileError(
+            sentence(
+                "video.path",
+                "The path of the video {path} is no valid UTF-8, which the video "
+                "decoder needs. Rename the video or its folder, or copy it elsewhere.",
+                path=printable(str(path)),
+            )
+        ) from error
+    # One thread: each takes the memory of some frames. Other backends than FFmpeg take
+    # a name for a pattern, or for a description of a pipeline.
+    return cv2.VideoCapture(
+        name, cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1, *parameters]
+    )
+
+
+def _codec(stream: cv2.VideoCapture) -> str:
+    code = int(stream.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF
+    return code.to_bytes(4, "little").decode("latin-1").upper()
+
+
+def _check_jpeg(data: bytes, name: Sentence) -> None:
+    header = read_image_header(BytesIO(data), name)
+    check_pixels(header.width, header.height, name, MAX_VIDEO_PIXELS)
+
+
+def _name(number: int) -> Sentence:
+    return sentence("image.frame", "Frame {number} of the video", number=number)
+
+
+def _frame(frame: Image | None, name: Sentence) -> Image:
+    if frame is None:
+        raise FileError(
+            sentence("image.frame-undecodable", "{name} cannot be decoded.", name=name)
+        )
+    return frame

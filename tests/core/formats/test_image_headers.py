@@ -1,0 +1,113 @@
+"""What an image is, and what decoding it takes, is known from its header."""
+
+import struct
+from io import BytesIO
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.errors import FileError
+from lightpen.formats.image_headers import ImageHeader, read_image_header
+
+RNG = np.random.default_rng(0)
+WIDTH, HEIGHT = 67, 45
+
+
+def image_of(depth: type, channels: int = 1) -> Any:
+    return RNG.integers(0, 255, (HEIGHT, WIDTH, channels)).astype(depth)
+
+
+def encoded(suffix: str, image: Any, *options: int) -> bytes:
+    return bytes(cv2.imencode(suffix, image, options)[1])
+
+
+def header_of(data: bytes) -> ImageHeader:
+    return read_image_header(BytesIO(data), "image")
+
+
+GREY, DEEP, COLOUR = image_of(np.uint8), image_of(np.uint16), image_of(np.uint8, 3)
+FILES = {
+    "png": encoded(".png", GREY),
+    "png of 16 bits": encoded(".png", DEEP),
+    "png in colour": encoded(".png", COLOUR),
+    "png with transparency": encoded(".png", image_of(np.uint16, 4)),
+    "jpeg": encoded(".jpg", GREY),
+    "jpeg in colour": encoded(".jpg", COLOUR),
+    "progressive jpeg": encoded(".jpg", COLOUR, cv2.IMWRITE_JPEG_PROGRESSIVE, 1),
+    "bmp": encoded(".bmp", GREY),
+    "bmp in colour": encoded(".bmp", COLOUR),
+    "tiff": encoded(".tiff", GREY, cv2.IMWRITE_TIFF_COMPRESSION, 1),
+    "tiff of 16 bits": encoded(".tiff", DEEP, cv2.IMWRITE_TIFF_COMPRESSION, 5),
+    "tiff in colour": encoded(".tiff", COLOUR, cv2.IMWRITE_TIFF_COMPRESSION, 8),
+    "pgm": encoded(".pgm", GREY),
+    "pgm of 16 bits": encoded(".pgm", DEEP),
+    "pgm as text": encoded(".pgm", GREY, cv2.IMWRITE_PXM_BINARY, 0),
+    "pgm with a remark": b"P5 # 1 2\n67\n#\n45 255\n" + GREY.tobytes(),
+    "webp": encoded(".webp", COLOUR, cv2.IMWRITE_WEBP_QUALITY, 50),
+    "webp without loss": encoded(".webp", COLOUR, cv2.IMWRITE_WEBP_QUALITY, 101),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_size_is_that_of_the_image(name: str) -> None:
+    header = header_of(FILES[name])
+    image = cv2.imdecode(np.frombuffer(FILES[name], np.uint8), cv2.IMREAD_UNCHANGED)
+
+    assert (header.width, header.height) == (WIDTH, HEIGHT)
+    assert image is not None
+    assert header.decoded >= image.nbytes
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_header_that_ends_early_is_damaged(name: str) -> None:
+    for length in (1, 5, 8):
+        with pytest.raises(FileError, match=r"cut off|damaged"):
+            header_of(FILES[name][:length])
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\0\0\0\x0cjP  \r\n\x87\n" + bytes(100),  # JPEG 2000
+        b"\0\0\0\x1cftypavif" + bytes(100),
+        b"GIF89a" + bytes(100),
+        b"v/1\x01" + bytes(100),  # OpenEXR
+        b"II+\0" + bytes(100),  # TIFF beyond 4 GB
+        b"not an image at all",
+    ],
+)
+def test_a_format_whose_size_is_not_known_here_is_refused(data: bytes) -> None:
+    with pytest.raises(FileError, match="no image that can be read here"):
+        header_of(data)
+
+
+def test_a_png_with_a_header_of_two_bytes_is_damaged() -> None:
+    data = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4s", 2, b"IHDR") + bytes(50)
+
+    with pytest.raises(FileError, match="damaged"):
+        header_of(data)
+
+
+def test_more_pixels_than_those_of_cameras_are_refused() -> None:
+    pgm = b"P5\n60000 60000\n255\n"
+
+    with pytest.raises(FileError, match=r"60000 x 60000 px; at most 70,000,000"):
+        header_of(pgm)
+
+
+def test_a_tile_counts_by_its_own_size() -> None:
+    entries = [(256, 100), (257, 100), (258, 8), (322, 16_000), (323, 16_000)]
+    packed = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
+    data = b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed
+
+    assert header_of(data).working >= 16_000 * 16_000
+
+
+def test_a_lossy_tiff_is_refused() -> None:
+    entries = [(256, 100), (257, 100), (259, 7)]
+    packed = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
+
+    with pytest.raises(FileError, match="compression 7"):
+        header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed)
