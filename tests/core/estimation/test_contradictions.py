@@ -59,7 +59,9 @@ def off_by(covariance: FloatArray | None, **changes: float) -> Camera:
     return with_intrinsics(intrinsics, covariance)
 
 
-def calibrated(file: Camera, seed: int, n_images: int = 60) -> tuple[Swing, Calibration]:
+def calibrated(
+    file: Camera, seed: int, n_images: int = 60
+) -> tuple[Swing, Calibration]:
     """Return a swing seen by the true camera, calibrated with that of a file."""
     rng = np.random.default_rng([seed, 4])
     swing = swing_poses(n_images, rng)
@@ -172,12 +174,32 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
     assert (error <= 1.5 * result.budget.expanded_uncertainty[:3]).all()
 
 
+def test_noise_that_lasts_contradicts_no_true_file() -> None:
+    true = with_intrinsics(CAMERA.intrinsics, CAMERA.covariance)
+    contradicted = 0
+    for seed in range(20):
+        rng = np.random.default_rng([seed, 5])
+        swing = swing_poses(15, rng)
+        errors = rng.standard_normal((15, PEN.n_leds, 2))
+        for i in range(1, 15):
+            errors[i] = 0.9 * errors[i - 1] + np.sqrt(1 - 0.81) * errors[i]
+        exact = simulate_centers(
+            CAMERA, PEN, swing.rotations, swing.translations, 0.0, rng
+        )
+        pixels = exact + 0.03 * errors
+        centers = Centers(np.arange(15), pixels, Path("simulated"))
+        observations = observe_centers(centers, true, PEN)
+        contradicted += bool(calibrate(true, PEN, observations).contradictions)
+
+    assert contradicted <= 1
+
+
 def test_the_camera_as_adjusted_is_nearer_to_the_truth_than_its_file() -> None:
     file = off_by(drawn_covariance(), focal_length=0.003, cy=3.0)
     _, result = calibrated(file, 2)
     fitted = result.bundle.state.rig.cameras[0]
 
-    # The issue of one swing: f to 0.014 %, cy to 2 px.
+    # 60 images know f to 0.014 % and fy / fx to 0.003 %.
     assert abs(fitted.fx / CAMERA.fx - 1) < 0.0006
     assert abs(fitted.fy / fitted.fx - CAMERA.fy / CAMERA.fx) < 0.0003
     assert not result.contradictions

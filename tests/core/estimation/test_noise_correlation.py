@@ -76,8 +76,8 @@ def test_u_covers_the_tip_whose_noise_lasts(n_images: int) -> None:
         error = np.abs(result.joint.tip_pen - swing.tip_pen)
         inside.append(error <= result.budget.expanded_uncertainty[:3])
 
-    # 95 % of 24 along each axis, less three standard deviations of 4.4 %.
-    assert (np.mean(inside, axis=0) >= 0.81).all()
+    # 90 % of 24 along each axis, less three standard deviations of 6.1 %.
+    assert (np.mean(inside, axis=0) >= 0.71).all()
 
 
 def test_an_led_that_is_not_used_has_no_part_in_the_correlation() -> None:

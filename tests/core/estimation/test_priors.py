@@ -28,10 +28,8 @@ def test_what_files_state_is_taken_as_stated() -> None:
     assert CAMERA.covariance is not None
     np.testing.assert_array_equal(priors.cameras[0].covariance, CAMERA.covariance)
     assert priors.led_sigma == 0.003
-    assert (priors.scale.covariance, priors.diameter.covariance) == (
-        pytest.approx(np.array([[5e-6**2]])),
-        pytest.approx(np.array([[0.02**2]])),
-    )
+    np.testing.assert_allclose(priors.scale.covariance, [[5e-6**2]])
+    np.testing.assert_allclose(priors.diameter.covariance, [[0.02**2]])
     stated = (*priors.cameras, priors.scale, priors.diameter)
     assert not any(prior.assumed for prior in stated)
 

@@ -267,9 +267,7 @@ def with_columns(header: str, *cells: str) -> str:
     """Return a table with further columns, filled row by row or all alike."""
     lines = table(header=f"led,x_mm,y_mm,z_mm,{header}").splitlines()
     rows = cells if len(cells) > 1 else cells * (len(lines) - 1)
-    added = [
-        f"{line},{cell}" for line, cell in zip(lines[1:], rows, strict=True)
-    ]
+    added = [f"{line},{cell}" for line, cell in zip(lines[1:], rows, strict=True)]
     return "\n".join([lines[0], *added, ""])
 
 
