@@ -58,12 +58,13 @@ def test_the_records_give_the_tip_that_they_gave(
     joint = calibration.joint
 
     assert recorded_names(record) == NAMES
-    for found, key in (
-        (joint.tip_pen, "tip_pen_mm"),
-        (joint.cone_cam, "cone_cam_mm"),
-        (calibration.budget.expanded_uncertainty[:3], "expanded_uncertainty_mm"),
+    # Then the camera was held at its file, now it is solved for.
+    uncertainty = calibration.budget.expanded_uncertainty
+    for found, key, within in (
+        (joint.tip_pen, "tip_pen_mm", uncertainty[:3]),
+        (joint.cone_cam, "cone_cam_mm", uncertainty[3:]),
     ):
-        np.testing.assert_allclose(found, tips[name][key], rtol=0, atol=ROUNDING)
+        assert (np.abs(found - tips[name][key]) <= within).all()
     assert len(calibration.used) == tips[name]["images"]["total"]
     assert calibration.used.sum() == tips[name]["images"]["used"]
 
