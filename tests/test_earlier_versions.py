@@ -21,7 +21,6 @@ from lightpen.swing.resuming import read_resumable
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 ACCEPTED = "20261122-084628_LP-04_T-10"
 INTERRUPTED = "20261122-084651_LP-04_T-10"
-ROUNDING = 1e-7  # mm; processors differ in the last digits
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.correlation import measure_correlation
 from lightpen.estimation.joint import JointFit, fit_joint
+from lightpen.estimation.noise_correlation import measure_correlation
 from lightpen.estimation.uncertainty import (
     Budget,
     ShareName,
