@@ -86,11 +86,14 @@ def repeated(shared_data: Path, record: Record) -> list[dict[str, Any]]:
     return [record(folder, "--centers", file) for file in files]
 
 
-def test_ten_calibrations_repeat_to_a_micrometre(
+def test_ten_calibrations_scatter_no_more_than_by_their_noise(
     repeated: list[dict[str, Any]],
 ) -> None:
+    """Their camera file states no uncertainty: each swing has to find the camera."""
     tips = [fields["tip_pen_mm"] for fields in repeated]
-    assert np.all(1000 * np.std(tips, axis=0, ddof=1) <= [0.7, 1.5, 1.5])
+    noise = [fields["uncertainty"]["independent_noise_mm"] for fields in repeated]
+    # The 99.9 % quantile of a standard deviation of 10.
+    assert (np.std(tips, axis=0, ddof=1) <= 1.76 * np.median(noise, axis=0)).all()
 
 
 def test_ten_two_stage_calibrations_scatter_as_the_method_must(
@@ -286,7 +289,7 @@ def test_the_verdict_is_printed_last_and_recorded_with_what_it_goes_by(
         fields["weakest_direction"]["expanded_uncertainty_mm"]
     ]
     assert verdict["limits"] == {
-        "max_uncertainty_mm": 0.005,
+        "max_uncertainty_mm": 0.01,
         "min_images": 60,
         "min_per_field": 2,
     }
@@ -756,7 +759,8 @@ def test_a_simulated_camera_and_pen_have_the_format_of_the_shared_sets(
         storage = cv2.FileStorage(str(folder / "camera.yaml"), cv2.FileStorage_READ)
         names.append(sorted(storage.root().keys()))
         assert storage.getNode("camera_matrix").mat().shape == (3, 3)
-    assert names[0] == names[1]
+    # Simulated files state their uncertainties besides.
+    assert names[0] == sorted([*names[1], "intrinsics_covariance"])
     headers = [
         (folder / "leds.csv").read_text(encoding="utf-8").splitlines()[0]
         for folder in (small, clean)

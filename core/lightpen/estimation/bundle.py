@@ -50,6 +50,7 @@ from lightpen.sentences import sentence
 LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
 MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 CONVERGED = 1e-5  # mm
+FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
 FINDING_PASSES = 2  # in which standard deviations are found; then they stand
 MAX_PASSES = 20
 Z_99 = 2.326  # normal quantile
@@ -160,7 +161,7 @@ def fit_bundle(
     sigma = _robust_sigma(residuals)
     components = Components(NONE, (NONE,) * len(FORMS), NONE, None)
     for n_pass in range(MAX_PASSES):
-        weight_sigma = sigma * float(np.sqrt(inflation))
+        weight_sigma = max(sigma * float(np.sqrt(inflation)), FINEST)
         eliminated = eliminate(views, used, weight_sigma, components.jitter)
         information, gradient = unknowns.system(eliminated)
         right = gradient + information @ taken_up

@@ -240,7 +240,12 @@ def _adjust(
         bundle = fit_bundle(seen, state, freed, lean)
     correlation = measure_correlation(bundle, seen)
     if correlation.factor > RELATED:
-        bundle = fit_bundle(seen, state, freed, lean, correlation.factor)
+        # Noise that lasts contradicts a file by chance more often.
+        factor = correlation.factor
+        bundle = fit_bundle(seen, state, priors, lean, factor)
+        contradictions, freed = find_contradictions(rig, bundle, priors)
+        if contradictions:
+            bundle = fit_bundle(seen, state, freed, lean, factor)
         correlation = measure_correlation(bundle, seen)
     return _Adjusted(bundle, freed, contradictions, correlation)
 

@@ -12,6 +12,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.priors import Prior, Priors
+from lightpen.estimation.unknowns import inverse
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig
 from lightpen.sentences import Sentence, sentence
@@ -101,7 +102,9 @@ def find_contradictions(
     for c, (camera, place) in enumerate(
         zip(rig.cameras, bundle.columns.cameras, strict=True)
     ):
-        prior, posterior = cameras[c].covariance, bundle.covariance[place, place]
+        # As it was fitted with: what a file has as exact is let be off by rounding.
+        prior = inverse(bundle.prior_information[place, place])
+        posterior = bundle.covariance[place, place]
         for entry in _entries(camera):
             before = float(entry.by @ prior @ entry.by)
             after = float(entry.by @ posterior @ entry.by)

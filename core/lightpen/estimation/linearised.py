@@ -91,10 +91,8 @@ def _view(state: State, c: int, pixels: FloatArray) -> View:
     normalised = points[..., :2] / points[..., 2:]
     own = camera.intrinsics_jacobian(normalised)
     if c > 0:
-        x, y, z = np.moveaxis((points - t_c)[..., None], 2, 0)
-        A = np.moveaxis(by_point, -1, 0)[..., None]
-        turned = [y * A[2] - z * A[1], z * A[0] - x * A[2], x * A[1] - y * A[0]]
-        own = np.concatenate([own, *turned, by_point], axis=3)
+        by_turn = np.cross((points - t_c)[:, :, None], by_point)
+        own = np.concatenate([own, by_turn, by_point], axis=3)
     # The centre of a disc's image lies off that of the disc with the diameter squared.
     offset = (pixels - residuals) - camera.pixels(normalised)
     return View(

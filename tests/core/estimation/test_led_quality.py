@@ -1,14 +1,16 @@
 """Each LED's fit: a displaced one is named, a good one is not."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from lightpen.estimation.geometry import fit_geometry
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.joint import fit_joint
-from lightpen.estimation.led_quality import LedQuality, measure_leds
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.led_quality import LedQuality
+from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.simulator.swings import (
     drop_centers,
@@ -33,12 +35,8 @@ def quality(measured: Pen, n_missing: int = 0) -> LedQuality:
 
 
 def quality_of(measured: Pen, pixels: FloatArray) -> LedQuality:
-    joint = fit_joint(
-        CAMERA, measured, pixels, SWING.rotations, SWING.tip_pen, SWING.cone_cam
-    )
-    return measure_leds(
-        CAMERA, measured, pixels, fit_geometry(CAMERA, measured, pixels, joint)
-    )
+    centers = Centers(np.arange(len(pixels)), pixels, Path("simulated"))
+    return calibrate(CAMERA, measured, observe_centers(centers, CAMERA, measured)).leds
 
 
 @pytest.mark.parametrize("led", [1, 4, 7, 10])

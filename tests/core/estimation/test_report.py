@@ -1,6 +1,7 @@
 """The record and the text of a calibration hold all of it, and nothing unreadable."""
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import Verdict, judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.observation_files import Centers
+from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
@@ -50,6 +52,17 @@ def calibration() -> Calibration:
     pixels[:, 9] = np.nan
     centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
     return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+
+def of_camera(file: Camera) -> Calibration:
+    """Return a calibration of good images by a camera file that may be wrong."""
+    rng = np.random.default_rng(3)
+    swing = swing_poses(40, rng)
+    pixels = simulate_centers(
+        CAMERA, PEN, swing.rotations, swing.translations, 0.02, rng
+    )
+    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
+    return calibrate(file, PEN, observe_centers(centers, file, PEN))
 
 
 def verdict() -> Verdict:
@@ -125,6 +138,68 @@ def test_the_record_holds_the_verdict_and_the_limits_that_it_was_judged_by() -> 
         "next_step": "capture more",
         "limits": {"max_uncertainty_mm": 0.0987, "min_images": 41, "min_per_field": 2},
     }
+
+
+def test_the_record_holds_each_share_of_the_uncertainty() -> None:
+    found, budget = record()["uncertainty"], calibration().budget
+
+    names = [share["name"] for share in found["shares"]]
+    assert names == [share.name.value for share in budget.shares]
+    assert {"noise", "pen scale", "disc diameter", "camera"} <= set(names)
+    squares = np.sum(
+        [np.square(share["standard_uncertainty_mm"]) for share in found["shares"]],
+        axis=0,
+    )
+    np.testing.assert_allclose(
+        2 * np.sqrt(squares), record()["expanded_uncertainty_mm"]
+    )
+    assert not any(share["assumed"] for share in found["shares"])
+    assert np.shape(found["independent_noise_mm"]) == (3,)
+    assert np.shape(found["blocks_mm"]) == (3,)
+
+
+def test_the_record_holds_what_the_images_made_of_the_camera_and_the_discs() -> None:
+    found = record()["adjusted"]
+    names = ["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"]
+
+    assert list(found["intrinsics"]) == names
+    for name, true in zip(names[:8], CAMERA.intrinsics, strict=False):
+        entry = found["intrinsics"][name]
+        assert abs(entry["value"] - true) < 4 * entry["standard_uncertainty"]
+    assert abs(found["disc_diameter_mm"] - 10) < 0.1
+    assert found["contradictions"] == []
+
+
+def test_what_is_assumed_is_marked_in_record_and_text() -> None:
+    camera = replace(CAMERA, covariance=None)
+    result = of_camera(camera)
+    written = json_bytes(calibration_record(result, INPUTS, "joint", LIMITS))
+    text = calibration_text(result, "joint", None, judge(result, LIMITS))
+
+    shares = json.loads(written)["uncertainty"]["shares"]
+    assert [share["name"] for share in shares if share["assumed"]] == ["camera"]
+    assert "U from camera, assumed" in text
+    assert text.count(", assumed") == 1
+
+
+def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:
+    intrinsics_off = replace(CAMERA, fx=1.01 * CAMERA.fx, fy=1.01 * CAMERA.fy)
+    result = of_camera(intrinsics_off)
+    written = json_bytes(calibration_record(result, INPUTS, "joint", LIMITS))
+    found = json.loads(written)
+    text = calibration_text(result, "joint", None, judge(result, LIMITS))
+
+    (entry,) = (
+        each
+        for each in found["adjusted"]["contradictions"]
+        if each["what"] == "focal length"
+    )
+    assert entry["unit"] == "px"
+    assert entry["stated"] == pytest.approx(1.01 * CAMERA.fx, rel=1e-3)
+    assert entry["wanted"] == pytest.approx(CAMERA.fx, rel=1e-3)
+    codes = [warning["code"] for warning in found["warnings"]]
+    assert "warning.camera-file-contradicted" in codes
+    assert "The images contradict the camera file: they want the focal length" in text
 
 
 def test_words_among_the_values_of_a_verdict_have_codes_and_text() -> None:

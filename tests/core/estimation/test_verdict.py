@@ -9,7 +9,8 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.uncertainty import Halves
+from lightpen.estimation.uncertainty import Halves, Share, ShareName
+from lightpen.estimation.variance_components import Component
 from lightpen.estimation.verdict import (
     Change,
     Grade,
@@ -30,7 +31,9 @@ from lightpen.messages import (
     too_few_images,
     too_little_tilt,
 )
+from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
 from lightpen.sentences import Sentence
 from lightpen.simulator.postures import Postures
 from lightpen.simulator.swings import (
@@ -45,13 +48,15 @@ from lightpen.simulator.swings import (
 CAMERA, PEN = paper_camera(), paper_pen()
 
 
-def calibrated(swing: Swing, sigma: float = 0.05) -> Calibration:
+def calibrated(
+    swing: Swing, sigma: float = 0.05, camera: Camera = CAMERA, pen: Pen = PEN
+) -> Calibration:
     rng = np.random.default_rng(1)
     pixels: FloatArray = simulate_centers(
         CAMERA, PEN, swing.rotations, swing.translations, sigma, rng
     )
     centers = Centers(np.arange(len(swing)), pixels, Path("simulated"))
-    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen))
 
 
 @pytest.fixture(scope="module")
@@ -115,20 +120,87 @@ def test_leds_that_do_not_fit_are_checked() -> None:
     assert verdict.reason.values["sigma"] == noisy.joint.sigma
 
 
-def test_an_uncertainty_by_the_led_file_is_told_as_such(good: Calibration) -> None:
-    budget = replace(good.budget, leds=np.diag([0.0, 0.01**2, 0.0, 0.0, 0.0, 0.0]))
-    off = replace(good, budget=budget, geometry=replace(good.geometry, led_sigma=0.1))
-    assert budget.led_uncertainty == pytest.approx(0.02)
+def with_share(
+    calibration: Calibration, name: ShareName, u: float, *, assumed: bool = False
+) -> Calibration:
+    """Return a calibration with one more share, of so large a U (k = 2) along y."""
+    along_y = np.diag([0.0, (u / 2) ** 2, 0.0, 0.0, 0.0, 0.0])
+    kept = tuple(each for each in calibration.budget.shares if each.name is not name)
+    shares = (*kept, Share(name, along_y, assumed))
+    return replace(calibration, budget=replace(calibration.budget, shares=shares))
+
+
+def with_led_sigma(calibration: Calibration, sigma: float) -> Calibration:
+    bundle = calibration.bundle
+    components = bundle.components._replace(leds=Component(sigma, 100.0))
+    return replace(calibration, bundle=replace(bundle, components=components))
+
+
+def test_an_uncertainty_by_leds_that_are_off_is_told_as_such(good: Calibration) -> None:
+    off = with_led_sigma(with_share(good, ShareName.LEDS, 0.02), 0.1)
+    by_leds = off.budget.weakest_share(off.budget.largest_share)
+    assert by_leds == pytest.approx(0.02, rel=1e-2)
 
     verdict = judge(off, SwingLimits(max_uncertainty=0.015))
     assert verdict.grade is Grade.CHECK
-    assert verdict.reason == leds_off(0.1, budget.led_uncertainty)
+    assert verdict.reason == leds_off(0.1, by_leds)
     assert judge(off, SwingLimits(max_uncertainty=0.005)).grade is Grade.REPEAT
     assert judge(off, SwingLimits(max_uncertainty=0.025)).reason.code == Code.GOOD
 
-    exact = replace(off, geometry=replace(good.geometry, led_sigma=0.01))
-    verdict = judge(exact, SwingLimits(max_uncertainty=0.015))
+    small = with_led_sigma(off, 0.01)
+    verdict = judge(small, SwingLimits(max_uncertainty=0.015))
+    assert verdict.reason.code == Code.FILE_UNCERTAIN
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        (ShareName.CAMERA, "the camera file. Calibrate the camera"),
+        (ShareName.LEDS, "the LED file. Measure the LEDs better"),
+        (ShareName.SCALE, "the scale of the LED file. State its uncertainty"),
+        (ShareName.DIAMETER, "the diameter of the LED discs. State it"),
+        (ShareName.EXTRINSICS, "where the cameras stand. Calibrate the rig"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("assumed", "how"), [(True, "of it is assumed, for"), (False, "of it comes from")]
+)
+def test_the_reason_names_the_largest_share_and_what_would_shrink_it(
+    good: Calibration, name: ShareName, words: str, assumed: bool, how: str
+) -> None:
+    large = with_share(good, name, 0.02, assumed=assumed)
+    verdict = judge(large, SwingLimits(max_uncertainty=0.015))
+
+    assert verdict.grade is Grade.CHECK
+    assert verdict.next_step is NextStep.CHECK_FILES
+    assert f"{how} {words}" in str(verdict.reason)
+    assert "More images hardly help." in str(verdict.reason)
+
+
+@pytest.mark.parametrize("name", [ShareName.NOISE, ShareName.SEAT, ShareName.DRIFT])
+def test_what_more_images_shrink_asks_for_more_of_them(
+    good: Calibration, name: ShareName
+) -> None:
+    large = with_share(good, name, 0.02)
+    verdict = judge(large, SwingLimits(max_uncertainty=0.015))
+
     assert verdict.reason.code == Code.UNCERTAIN
+    assert verdict.next_step is NextStep.CAPTURE_MORE
+
+
+def test_a_tip_by_assumptions_alone_passes_only_within_the_limit_with_them() -> None:
+    unknown = replace(CAMERA, covariance=None)
+    bare = replace(PEN, scale_sigma=None, diameter_sigma=None)
+    swing = swing_poses(150, np.random.default_rng(0))
+    result = calibrated(swing, camera=unknown, pen=bare)
+    uncertainty = result.budget.weakest_uncertainty
+    stated = calibrated(swing).budget.weakest_uncertainty
+
+    assert uncertainty > stated
+    between = SwingLimits(max_uncertainty=(stated + uncertainty) / 2)
+    assert judge(result, between).grade is not Grade.PASS
+    within = SwingLimits(max_uncertainty=1.01 * uncertainty)
+    assert judge(result, within).grade is Grade.PASS
 
 
 def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
@@ -206,6 +278,8 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         (Code.LEDS_MISFIT, NextStep.CHECK_FILES),
         (Code.LEDS_OFF, NextStep.CHECK_FILES),
         (Code.LED_DISPLACED, NextStep.CHECK_FILES),
+        (Code.FILE_UNCERTAIN, NextStep.CHECK_FILES),
+        (Code.FILE_CONTRADICTED, NextStep.CHECK_FILES),
     ],
 )
 def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:

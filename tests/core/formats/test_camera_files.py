@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError, LightpenError, UsageError
-from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.camera_files import FOCAL_CORRELATION, read_camera, write_camera
 from lightpen.model.camera import Camera
 
 DISTORTION = np.array([-0.082, 0.105, 3e-4, -2e-4, 1 / 3])
@@ -271,7 +271,9 @@ def test_thin_prism_terms_of_zero_are_dropped(tmp_path: Path, count: int) -> Non
     )
     found = read_camera(saved(tmp_path, text))
     np.testing.assert_array_equal(found.distortion, coefficients[:8])
-    np.testing.assert_array_equal(found.covariance, 0.25 * np.eye(12))
+    expected = 0.25 * np.eye(12)
+    expected[0, 1] = expected[1, 0] = 0.25 * FOCAL_CORRELATION
+    np.testing.assert_array_equal(found.covariance, expected)
 
 
 @pytest.mark.parametrize("suffix", ["yaml", "xml", "json"])
@@ -289,9 +291,26 @@ def test_standard_deviations_of_opencv_are_kept(tmp_path: Path, suffix: str) -> 
             "std_deviations_intrinsics": deviations,
         },
     )
-    np.testing.assert_array_equal(
-        read_camera(path).covariance, np.diag(deviations[:9, 0] ** 2)
-    )
+    covariance = read_camera(path).covariance
+    assert covariance is not None
+    np.testing.assert_array_equal(np.diag(covariance), deviations[:9, 0] ** 2)
+    # Both focal lengths go with the distance of the board; files with the whole
+    # covariance have 0.99 for them.
+    assert covariance[0, 1] == covariance[1, 0] == pytest.approx(0.99 * 0.3**2)
+    covariance[[0, 1], [1, 0]] = 0.0
+    np.testing.assert_array_equal(covariance, np.diag(np.diag(covariance)))
+
+
+def test_standard_deviations_leave_the_ratio_of_the_focal_lengths_well_known(
+    tmp_path: Path,
+) -> None:
+    text = f"{OPENCV}std_deviations_intrinsics: {[5.0, 5.0] + [1e-3] * 7}\n"
+    covariance = read_camera(saved(tmp_path, text)).covariance
+    assert covariance is not None
+
+    difference = np.array([1.0, -1.0])
+    assert np.sqrt(difference @ covariance[:2, :2] @ difference) < 1.0  # px, of 7
+    assert np.linalg.eigvalsh(covariance).min() > 0
 
 
 @pytest.mark.parametrize(

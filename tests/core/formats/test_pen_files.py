@@ -61,11 +61,16 @@ def refusal(folder: Path, text: str, **options: Any) -> str:
     return str(info.value)
 
 
+def sigmas(pen: Pen) -> tuple[float | None, ...]:
+    return pen.led_sigma, pen.scale_sigma, pen.diameter_sigma
+
+
 def assert_same(found: Pen, expected: Pen) -> None:
     np.testing.assert_array_equal(found.leds, expected.leds)
     np.testing.assert_array_equal(found.normals, expected.normals)
     assert found.diameter == expected.diameter
     assert found.name == expected.name
+    assert sigmas(found) == sigmas(expected)
     if expected.nominal_tip is None:
         assert found.nominal_tip is None
     else:
@@ -255,6 +260,97 @@ def test_discs_of_different_width_are_refused(tmp_path: Path) -> None:
     assert "Line 6 of leds.csv: the diameter is 9 where the first LED has 10" in text
 
 
+SIGMAS = "led_sigma_mm,scale_sigma,diameter_sigma_mm"
+
+
+def with_columns(header: str, *cells: str) -> str:
+    """Return a table with further columns, filled row by row or all alike."""
+    lines = table(header=f"led,x_mm,y_mm,z_mm,{header}").splitlines()
+    rows = cells if len(cells) > 1 else cells * (len(lines) - 1)
+    added = [f"{line},{cell}" for line, cell in zip(lines[1:], rows, strict=True)]
+    return "\n".join([lines[0], *added, ""])
+
+
+def test_uncertainties_that_a_file_does_not_state_are_unknown(tmp_path: Path) -> None:
+    assert sigmas(read_pen(saved(tmp_path, table()))) == (None, None, None)
+    assert sigmas(read_pen(saved(tmp_path, document()))) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("header", "cells"),
+    [
+        (SIGMAS, "0.003,1e-5,0.02"),
+        ("LED_sigma [um],Scale_Sigma,Diameter_sigma (um)", "3,1e-5,20"),
+        ("diameter_sigma,scale_sigma,led_sigma", "0.02,1e-5,0.003"),
+    ],
+)
+def test_uncertainties_of_a_table_are_read_in_their_units(
+    tmp_path: Path, header: str, cells: str
+) -> None:
+    pen = read_pen(saved(tmp_path, with_columns(header, cells)))
+    assert sigmas(pen) == pytest.approx((0.003, 1e-5, 0.02))
+
+
+def test_uncertainties_of_a_json_file_are_in_its_units_but_that_of_the_scale(
+    tmp_path: Path,
+) -> None:
+    entries = json.loads(
+        document(units="cm", led_sigma=3e-4, scale_sigma=1e-5, diameter_sigma=2e-3)
+    )
+    for led in entries["leds"]:
+        led.update({axis: led[axis] / 10 for axis in "xyz"})
+    pen = read_pen(saved(tmp_path, json.dumps(entries)))
+    assert sigmas(pen) == pytest.approx((0.003, 1e-5, 0.02))
+
+
+@pytest.mark.parametrize("suffix", ["csv", "json"])
+def test_only_uncertainties_that_are_known_are_written(
+    tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"pen.{suffix}"
+    write_pen(Pen(LEDS, FACING, scale_sigma=2e-5), path)
+    text = path.read_text("utf-8")
+    assert "scale_sigma" in text
+    assert "led_sigma" not in text
+    assert "diameter_sigma" not in text
+
+
+@pytest.mark.parametrize("what", ["led_sigma", "scale_sigma", "diameter_sigma"])
+@pytest.mark.parametrize("value", ["0", "-0.001", "11"])
+def test_what_is_no_standard_uncertainty_is_refused(
+    tmp_path: Path, what: str, value: str
+) -> None:
+    for text in (with_columns(what, value), document(**{what: float(value)})):
+        sentence = refusal(tmp_path, text)
+        assert f"leds.csv has the {what} {value}." in sentence
+        assert "leave it away if it is not known" in sentence
+
+
+def test_a_scale_that_may_be_off_by_more_than_a_hundredth_is_refused(
+    tmp_path: Path,
+) -> None:
+    assert "up to 0.01 is needed" in refusal(
+        tmp_path, with_columns("scale_sigma", "0.02")
+    )
+
+
+@pytest.mark.parametrize("what", ["led_sigma", "scale_sigma", "diameter_sigma"])
+def test_an_uncertainty_that_differs_from_led_to_led_is_refused(
+    tmp_path: Path, what: str
+) -> None:
+    cells = ["0.003"] * 4 + ["0.004"] + ["0.003"] * 5
+    sentence = refusal(tmp_path, with_columns(what, *cells))
+    assert f"Line 6 of leds.csv: the {what} is 0.004 where the first" in sentence
+
+
+@pytest.mark.parametrize("value", ["", "small", "nan"])
+def test_an_uncertainty_that_is_no_number_is_refused(
+    tmp_path: Path, value: str
+) -> None:
+    cells = ["0.003"] * 4 + [value] + ["0.003"] * 5
+    assert "Line 6 of leds.csv" in refusal(tmp_path, with_columns("led_sigma", *cells))
+
+
 @pytest.mark.parametrize(
     ("leds", "sentence"),
     [
@@ -332,7 +428,14 @@ def pens(draw: st.DrawFn) -> Pen:
     normals = rng.normal(size=leds.shape)
     normals[:, 2] = np.abs(normals[:, 2]) + 0.1
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Pen(leds, normals, float(rng.uniform(1, 20)))
+    return Pen(
+        leds,
+        normals,
+        float(rng.uniform(1, 20)),
+        led_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
+        scale_sigma=draw(st.none() | st.floats(1e-9, 0.01)),
+        diameter_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
+    )
 
 
 @given(pens(), st.sampled_from(["csv", "json"]))

@@ -1,0 +1,84 @@
+"""How large errors of a kind are: found where they are, and none invented."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.variance_components import find_component, find_jitter
+
+N_RUNS = 40
+
+
+def observed(
+    n: int, sigma: float, seed: int, noise: float = 0.01
+) -> tuple[FloatArray, FloatArray]:
+    """Return what images say of n errors of one size: information and right side."""
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((2 * n, n)) / noise
+    errors = sigma * rng.standard_normal(n)
+    return A.T @ A, A.T @ (A @ errors + rng.standard_normal(2 * n))
+
+
+def shaken(
+    n_images: int, root: FloatArray, seed: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what each image says of a vector that is ``root`` times normal numbers."""
+    rng = np.random.default_rng(seed)
+    A = rng.standard_normal((n_images, 8, 3)) / 0.005
+    vectors = rng.standard_normal((n_images, 3)) @ root.T
+    seen = np.einsum("nki,ni->nk", A, vectors) + rng.standard_normal((n_images, 8))
+    transposed = np.swapaxes(A, 1, 2)
+    right = np.einsum("nki,nk->ni", A, seen)
+    return transposed @ A, right, np.zeros((n_images, 3, 3))
+
+
+def test_the_size_of_errors_is_found() -> None:
+    found = [find_component(*observed(24, 0.02, seed)).sigma for seed in range(N_RUNS)]
+
+    # 40 draws of 24 errors fix a standard deviation to 2.3 %, a grid of 6 % apart.
+    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(0.02, rel=0.08)
+
+
+def test_errors_far_above_the_noise_are_significant_and_none_hardly_ever() -> None:
+    for seed in range(N_RUNS):
+        assert find_component(*observed(24, 0.05, seed)).is_significant
+    by_chance = [find_component(*observed(24, 0.0, seed)) for seed in range(N_RUNS)]
+    assert sum(each.is_significant for each in by_chance) <= 1  # one in a thousand
+
+
+def test_errors_are_judged_beside_what_the_file_states() -> None:
+    for seed in range(N_RUNS):
+        stated = find_component(*observed(24, 0.02, seed), stated=0.02)
+        assert not stated.is_significant
+        assert find_component(*observed(24, 0.1, seed), stated=0.02).is_significant
+
+
+def test_what_no_image_sees_is_no_evidence() -> None:
+    S, right = np.zeros((4, 4)), np.zeros(4)
+    S[0, 0], right[0] = 1e4, 0.0
+
+    assert find_component(S, right) == (0.0, 0.0)
+
+
+def test_a_jitter_is_found_with_its_directions() -> None:
+    root = np.array([[0.01, 0.0, 0.0], [0.0, 0.002, 0.0], [0.006, 0.0, 0.008]])
+    found = np.zeros((3, 3))
+    for seed in range(N_RUNS):
+        jitter = find_jitter(*shaken(60, root, seed))
+        assert jitter is not None
+        found += jitter / N_RUNS
+
+    # 2400 vectors fix a variance to 2.9 %; the noise of each image adds to it.
+    scale = np.sqrt(np.diag(root @ root.T))
+    np.testing.assert_allclose(
+        found / np.outer(scale, scale),
+        root @ root.T / np.outer(scale, scale),
+        atol=0.15,
+    )
+
+
+def test_a_still_seat_has_no_jitter() -> None:
+    still = np.zeros((3, 3))
+    found = [find_jitter(*shaken(60, still, seed)) for seed in range(N_RUNS)]
+
+    assert sum(jitter is not None for jitter in found) <= 1
