@@ -485,7 +485,8 @@ def _simulate(options: argparse.Namespace) -> None:
     )
     if options.led_diameter != DISC_DIAMETER:
         print(
-            f"leds.csv does not say it: give --led-diameter {options.led_diameter:g}."
+            "leds.csv does not say the size of the LEDs: calibrate with "
+            f"--led-diameter {options.led_diameter:g}."
         )
 
 
