@@ -802,7 +802,16 @@ def test_a_new_set_holds_no_images_of_an_old_one(
 
 
 @pytest.mark.parametrize(
-    "options", ["--images 0", "--images -5", "--seed -1", "--images 2.5"]
+    "options",
+    [
+        "--images 0",
+        "--images -5",
+        "--seed -1",
+        "--images 2.5",
+        "--leds square",
+        "--led-diameter 0",
+        "--blur nan",
+    ],
 )
 def test_a_senseless_simulation_is_refused(
     options: str, lightpen: Run, tmp_path: Path

@@ -41,6 +41,7 @@ from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import DISC_DIAMETER
 from lightpen.record.reading import (
     is_record,
     missing_parts,
@@ -55,6 +56,8 @@ from lightpen.sentences import Sentence, sentence
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
+MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
+MIN_BLUR, MAX_BLUR = 0.3, 8.0  # px, of simulated optics
 MAX_NAMED = 3  # images; of more the first is named
 MAX_RENDERED = 30_000  # images
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
@@ -204,6 +207,22 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
         default="field",
         help="how the pen moves",
     )
+    parser.add_argument(
+        "--leds",
+        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost"),
+        default="even",
+        help="how the LEDs look inside and round their rims",
+    )
+    parser.add_argument(
+        "--led-diameter", type=_led_diameter, default=DISC_DIAMETER, metavar="MM"
+    )
+    parser.add_argument(
+        "--blur",
+        type=_blur,
+        default=0.8,
+        metavar="PX",
+        help="standard deviation of the optics' blur",
+    )
     parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
     parser.add_argument(
         "--pen",
@@ -217,6 +236,25 @@ def _whole_number(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more.")
     return int(text)
+
+
+def _led_diameter(text: str) -> float:
+    diameter = _finite(text)
+    if not MIN_LED_DIAMETER <= diameter <= MAX_LED_DIAMETER:
+        raise argparse.ArgumentTypeError(
+            f"{text} mm is no diameter from {MIN_LED_DIAMETER:g} to "
+            f"{MAX_LED_DIAMETER:g} mm."
+        )
+    return diameter
+
+
+def _blur(text: str) -> float:
+    sigma = _finite(text)
+    if not MIN_BLUR <= sigma <= MAX_BLUR:
+        raise argparse.ArgumentTypeError(
+            f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
+        )
+    return sigma
 
 
 def _n_images(text: str) -> int:
@@ -475,8 +513,10 @@ def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen.simulator.sample_pens import SAMPLE_PENS
     from lightpen.simulator.scene_files import write_scene
-    from lightpen.simulator.scenes import SCENES, Scene
+    from lightpen.simulator.scenes import LEDS, SCENES, Scene
     from lightpen.simulator.sensor import Sensor
+
+    looks = LEDS[options.leds]
 
     scene = Scene(
         n_images=options.images,
@@ -484,7 +524,9 @@ def _simulate(options: argparse.Namespace) -> None:
         swing=options.swing,
         disturbances=SCENES[options.scene],
         sensor=Sensor(bits=options.bits),
-        pen=SAMPLE_PENS[options.pen](),
+        faces=looks.faces,
+        optics=replace(looks.optics, psf_sigma=options.blur),
+        pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
     with _progress("Rendering") as report:
         x, y, z = write_scene(scene, options.out, report)
@@ -495,6 +537,11 @@ def _simulate(options: argparse.Namespace) -> None:
             f"{z:.4f} mm in the frame of leds.csv."
         )
     )
+    if options.led_diameter != DISC_DIAMETER:
+        print(
+            "leds.csv does not say the size of the LEDs: calibrate with "
+            f"--led-diameter {options.led_diameter:g}."
+        )
 
 
 @_printing

@@ -15,6 +15,7 @@ import numpy as np
 from cv2.typing import MatLike
 
 from lightpen.arrays import Image
+from lightpen.detection.rim import Rim, fit_rim
 
 # Narrower than this samples the rim too coarsely: 20 to 80 % doubles the error.
 LOW = 0.1
@@ -44,6 +45,14 @@ VARIANCE_GAIN = 0.30
 LEAST_SHADED = 4.0
 LEAST_INNER = 0.3  # of the area
 BESIDE = np.ones((3, 3), np.uint8)
+
+# Beyond these the light of a disc tells that it is not evenly lit.
+UNEVEN_AMOUNT = 0.1  # of the light that its area would have at the level of its plateau
+FLAT = 0.5  # width of the rim over the radius up to which a disc has a plateau
+UNEVEN_CENTER = 0.002  # of the radius: the outline is 0.01 px off at a sharp rim
+CORRECTED_CENTER = 0.007  # of the radius, where shading is corrected to first order
+NOISE_SIGMAS = 3.0
+MIN_OUTLINE = 0.97  # of the area of an ellipse with the same second moments
 
 # How far a whole ellipse strays from roundness 1 and skewness 0 by sampling, blur and
 # noise, found on rendered discs of 6 to 100 px at signal-to-noise ratios down to 12.
@@ -137,6 +146,16 @@ class Moments(NamedTuple):
     roundness: float
     skewness: float
     edge_width: float
+
+    @property
+    def radius(self) -> float:
+        """Of the circle of the same area, px."""
+        return sqrt(self.area / pi)
+
+    @property
+    def rim_width(self) -> float:
+        """Width of the rim over its whole height, px."""
+        return self.edge_width / (HIGH - LOW)
 
     @property
     def axes(self) -> tuple[float, float]:
@@ -242,11 +261,15 @@ def _measure_window(
         or (region.right == frame.right < width)
         or (region.bottom == frame.bottom < height)
     )
-    is_whole = (
-        not leaves_image
-        and not leaves_window
-        and _is_ellipse(moments, noise / contrast)
-    )
+    is_inside = not (leaves_image or leaves_window)
+    is_whole = is_inside and _is_ellipse(moments, noise / contrast)
+    if is_inside and not (
+        is_whole and _is_even(moments, window, soft, frame, levels, noise / contrast)
+    ):
+        rim = _rim(image, soft, frame)
+        if rim is not None and rim.is_whole:
+            is_whole = True
+            moments = _moments_of(rim)
     return Disc(
         moments,
         levels,
@@ -274,7 +297,7 @@ def _separate(soft: MatLike, box: Box, frame: Box) -> tuple[list[Box], MatLike]:
 
 
 def _is_ellipse(moments: Moments, relative_noise: float) -> bool:
-    radius = sqrt(moments.area / pi)
+    radius = moments.radius
     _, minor = moments.axes
     loss = ROUNDNESS_LOSS + ROUNDNESS_LOSS_BY_BLUR * (moments.edge_width / minor) ** 2
     skewness = (
@@ -283,6 +306,58 @@ def _is_ellipse(moments: Moments, relative_noise: float) -> bool:
         + SKEWNESS_BY_NOISE * relative_noise / radius**1.5
     )
     return moments.roundness > 1.0 - loss and moments.skewness < skewness
+
+
+def _is_even(
+    moments: Moments,
+    window: Image,
+    soft: MatLike,
+    frame: Box,
+    levels: Levels,
+    relative_noise: float,
+) -> bool:
+    """Tell whether the light of a disc has the centroid and the amount of its area."""
+    background = round(levels.background)
+    light = cv2.moments(cv2.copyTo(np.maximum(window, background) - background, soft))
+    amount = light["m00"] / (moments.area * levels.contrast)
+    x = frame.left + light["m10"] / light["m00"] - moments.x
+    y = frame.top + light["m01"] / light["m00"] - moments.y
+    if abs(amount - 1) > UNEVEN_AMOUNT and moments.rim_width < FLAT * moments.radius:
+        return False
+    # Where the brightness rises by the share g from the centre to the rim, the light's
+    # centroid is g / 4 radii off, the outline g / 2 times the width of the rim.
+    allowed = CORRECTED_CENTER if _corrects_shading(moments) else UNEVEN_CENTER
+    allowed += NOISE_SIGMAS * relative_noise / (2.0 * sqrt(moments.area))
+    return hypot(x, y) < allowed * moments.radius
+
+
+def _corrects_shading(moments: Moments) -> bool:
+    """Tell whether the inside of a disc is large enough to measure its shading."""
+    return moments.radius >= LEAST_SHADED * moments.rim_width
+
+
+def _rim(image: Image, soft: MatLike, frame: Box) -> Rim | None:
+    """Return the rim of a region, if its outline is somewhat like an ellipse."""
+    contours, _ = cv2.findContours(soft, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    m = cv2.moments(contours[0])
+    if m["m00"] < MIN_AREA:
+        return None
+    shape = np.array([[m["mu20"], m["mu11"]], [m["mu11"], m["mu02"]]]) / m["m00"]
+    determinant = float(np.linalg.det(shape))
+    if determinant <= 0 or m["m00"] < MIN_OUTLINE * 4 * pi * sqrt(determinant):
+        return None
+    center = np.array(
+        [frame.left + m["m10"] / m["m00"], frame.top + m["m01"] / m["m00"]]
+    )
+    return fit_rim(image, center, shape)
+
+
+def _moments_of(rim: Rim) -> Moments:
+    (var_x, cov_xy), (_, var_y) = rim.shape.tolist()
+    area = 4.0 * pi * sqrt(var_x * var_y - cov_xy**2)
+    x, y = rim.center.tolist()
+    edge_width = GAUSSIAN_RISE * rim.sigma
+    return Moments(area, x, y, var_x, cov_xy, var_y, 1.0, 0.0, edge_width)
 
 
 def bounding_box(contour: MatLike, step: int = 1) -> Box:
@@ -354,9 +429,7 @@ def _unshaded(
     the outline lies further out there by g / 2 times the width of the rim, the mean of
     all levels; the centroid of the inner pixels tells g.
     """
-    radius = sqrt(moments.area / pi)
-    rim = moments.edge_width / (HIGH - LOW)
-    if radius < LEAST_SHADED * rim:
+    if not _corrects_shading(moments):
         return moments
     _, inner = cv2.threshold(cv2.erode(soft, BESIDE), 254, 255, cv2.THRESH_BINARY)
     place = cv2.moments(inner)
@@ -364,7 +437,8 @@ def _unshaded(
     area = place["m00"] / 255.0
     if area < LEAST_INNER * moments.area:
         return moments
-    factor = 2.0 * pi * rim * radius / area * levels.plateau / levels.contrast
+    reach = moments.rim_width * moments.radius
+    factor = 2.0 * pi * reach / area * levels.plateau / levels.contrast
     x, y = (
         factor * (weighted[m] / weighted["m00"] - place[m] / place["m00"])
         for m in ("m10", "m01")

@@ -30,7 +30,7 @@ from lightpen.cameras.protocol import (
 from lightpen.sentences import sentence
 from lightpen.simulator.faults import Faults
 from lightpen.simulator.hand import Held, Operator
-from lightpen.simulator.image_plans import ImagePlan, led_gains, render_plan
+from lightpen.simulator.image_plans import ImagePlan, led_faces, led_gains, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera
 from lightpen.simulator.view import Lamp, View
@@ -84,6 +84,7 @@ class SimulatedCamera:
         self._lamps = lamps
         self._serial = serial
         self._gains = led_gains(self.scene)
+        self._faces = led_faces(self.scene)
         self._settings = self._usual_settings
         self._stats = Stats()
         self._next_seq = 0
@@ -339,7 +340,7 @@ class SimulatedCamera:
             shown = _poses(scene, self.operator.held(between))
         gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
         gains[[led - 1 for led in held.covered]] = 0
-        view = View(*shown, gains, self._lamps)
+        view = View(*shown, gains, self._lamps, faces=self._faces)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
 
 

@@ -14,6 +14,7 @@ from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import vector_from_rotation
 from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
+from lightpen.simulator.faces import Dome, Face, HotSpot, Ring
 from lightpen.simulator.postures import operator_postures
 from lightpen.simulator.render import render_view
 from lightpen.simulator.scenes import Scene
@@ -30,6 +31,11 @@ from lightpen.simulator.view import Optics, View, moving_poses
 
 LED_DECIMALS = 5  # of a measuring machine's millimetres
 MIN_GAIN = 0.93  # of the dimmest LED against the brightest
+HOT_DISTANCE = (0.15, 0.45)  # of a hot spot from the middle, in radii
+HOT_WIDTH = (0.3, 0.5)
+HOT_SHARE = (0.3, 0.7)
+DOME_HEIGHT, DOME_DARKENING = 0.35, 0.75
+RING_INNER, RING_SOFTNESS, RING_MIDDLE = 0.55, 0.12, 0.15
 MAX_MISSING = 4
 MOTION = (2.0, 12.0)  # px moved during the exposure
 DEFOCUS = (2.0, 5.0)  # px, radius of the blur disc
@@ -42,7 +48,8 @@ MAX_TIMES = 128  # poses through one exposure
 
 STILL = 0.02  # px moved during the exposure that blur hides
 
-_SWING, _GEOMETRY, _GAINS, _FRAME, _NOISE = range(5)  # independent streams of a seed
+# Independent streams of a seed.
+_SWING, _GEOMETRY, _GAINS, _FRAME, _NOISE, _FACES = range(6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +163,26 @@ def led_gains(scene: Scene) -> FloatArray:
     """Return how bright each LED of the scene's pen is, 1 at most."""
     rng = _stream(scene, _GAINS)
     return rng.uniform(MIN_GAIN, 1, scene.pen.n_leds)
+
+
+def led_faces(scene: Scene) -> tuple[Face, ...]:
+    """Return how each LED of the scene's pen looks, nothing if all are evenly lit."""
+    rng = _stream(scene, _FACES)
+    match scene.faces:
+        case "even":
+            return ()
+        case "hot-spot":
+            return tuple(_random_hot_spot(rng) for _ in scene.pen.leds)
+        case "dome":
+            return (Dome(DOME_HEIGHT, DOME_DARKENING),) * scene.pen.n_leds
+        case "ring":
+            return (Ring(RING_INNER, RING_SOFTNESS, RING_MIDDLE),) * scene.pen.n_leds
+
+
+def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
+    distance, direction = rng.uniform(*HOT_DISTANCE), rng.uniform(0, 2 * np.pi)
+    place = distance * np.cos(direction), distance * np.sin(direction)
+    return HotSpot(place, rng.uniform(*HOT_WIDTH), rng.uniform(*HOT_SHARE))
 
 
 def _stream(scene: Scene, *path: int) -> np.random.Generator:
@@ -302,5 +329,5 @@ def _plan_in_motion(
     rotations, translations = moving_poses(
         rotation, translation, scene.tip_pen, turn, n_times
     )
-    view = View(rotations, translations, led_gains(scene))
+    view = View(rotations, translations, led_gains(scene), faces=led_faces(scene))
     return ImagePlan(index, view, scene.optics, rotation, translation)

@@ -12,21 +12,23 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen.simulator.faces import face_patches
 from lightpen.simulator.rims import (
     LightArray,
     Patch,
-    Rims,
     blurred_insides,
     disc_rims,
     ellipse_rim,
 )
 from lightpen.simulator.swings import faces_camera, leds_in_camera
-from lightpen.simulator.view import Finger, Glare, Lamp, Optics, View
+from lightpen.simulator.view import GHOST_OFFSET, Finger, Glare, Lamp, Optics, View
 
 OUTLINE_BITS = 6  # fraction bits of OpenCV's polygon corners
 HIDDEN_SAMPLES = 8  # per pixel and axis
 POLYGON_SAMPLES = 4
 DEFOCUS_SAMPLES = 9  # per pixel and axis, of the defocus kernel
+HALO_SIGMA = 15.0  # px
+HALO_REACH = 3.0  # standard deviations after which it is nil
 
 
 class Window(NamedTuple):
@@ -131,21 +133,42 @@ def _led_patches(camera: Camera, pen: Pen, view: View, optics: Optics) -> list[P
     lit = np.flatnonzero(levels)
     if len(lit) == 0:
         return []
-    rims = disc_rims(
-        camera, leds[:, lit], normals[:, lit], pen.diameter / 2, optics.psf_sigma
-    )
-    return _shining(rims, levels[lit], optics)
+    margin = _margin(optics)
+    if view.faces:
+        patches = face_patches(
+            camera,
+            pen,
+            view.rotations,
+            view.translations,
+            view.faces,
+            lit.tolist(),
+            optics.psf_sigma,
+            margin,
+        )
+    else:
+        rims = disc_rims(
+            camera, leds[:, lit], normals[:, lit], pen.diameter / 2, optics.psf_sigma
+        )
+        patches = blurred_insides(rims, optics.psf_sigma, margin)
+    return _scattered(_shining(patches, levels[lit], optics), optics)
 
 
 def _lamp_patches(lamp: Lamp, optics: Optics) -> list[Patch]:
     rim = ellipse_rim(lamp.center, lamp.semi_axes, lamp.angle, optics.psf_sigma)
-    return _shining(rim, np.array([lamp.level * optics.exposure]), optics)
+    patches = blurred_insides(rim, optics.psf_sigma, _margin(optics))
+    return _shining(patches, np.array([lamp.level * optics.exposure]), optics)
 
 
-def _shining(rims: Rims, levels: FloatArray, optics: Optics) -> list[Patch]:
-    """Return the insides of rims at their levels, defocused."""
+def _margin(optics: Optics) -> int:
+    """Return how far light strays from a blurred disc, px."""
+    halo = HALO_REACH * HALO_SIGMA if optics.halo > 0 else 0.0
+    ghost = max(GHOST_OFFSET) if optics.ghost > 0 else 0
+    return int(np.ceil(optics.defocus_radius + max(halo, ghost)))
+
+
+def _shining(patches: list[Patch], levels: FloatArray, optics: Optics) -> list[Patch]:
+    """Return patches at their levels, defocused."""
     radius = optics.defocus_radius
-    patches = blurred_insides(rims, optics.psf_sigma, margin=int(np.ceil(radius)))
     for patch, level in zip(patches, levels, strict=True):
         patch.levels[:] *= np.float32(level)
         if radius > 0:
@@ -153,6 +176,24 @@ def _shining(rims: Rims, levels: FloatArray, optics: Optics) -> list[Patch]:
             patch.levels[:] = cv2.filter2D(
                 patch.levels, -1, kernel, borderType=cv2.BORDER_CONSTANT
             )
+    return patches
+
+
+def _scattered(patches: list[Patch], optics: Optics) -> list[Patch]:
+    """Return patches with their halo and their ghost."""
+    if optics.halo == 0 and optics.ghost == 0:
+        return patches
+    across, down = GHOST_OFFSET
+    for patch in patches:
+        sharp = patch.levels.copy()
+        patch.levels[:] *= np.float32(1 - optics.halo - optics.ghost)
+        if optics.halo > 0:
+            patch.levels[:] += np.float32(optics.halo) * cv2.GaussianBlur(
+                sharp, (0, 0), HALO_SIGMA, borderType=cv2.BORDER_CONSTANT
+            )
+        patch.levels[down:, across:] += (
+            np.float32(optics.ghost) * sharp[:-down, :-across]
+        )
     return patches
 
 

@@ -98,7 +98,7 @@ def disc_rims(
     n_times = len(centers_cam)
     longest = 2 * np.pi * camera.fx * radius / centers_cam[..., 2].min()
     angles = _node_angles(longest, sigma)
-    across = _orthogonal(normals_cam)[..., None, :]
+    across = orthogonal(normals_cam)[..., None, :]
     along = np.cross(normals_cam[..., None, :], across)
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
     spokes = radius * (across * cosine + along * sine)
@@ -230,8 +230,8 @@ def _node_angles(longest: float, sigma: float) -> FloatArray:
     return np.asarray(np.arange(n_nodes) * (2 * np.pi / n_nodes))
 
 
-def _orthogonal(normals: FloatArray) -> FloatArray:
-    """Return a unit vector in the plane of each disc."""
+def orthogonal(normals: FloatArray) -> FloatArray:
+    """Return a unit vector (..., 3) in the plane of each disc, by its unit normal."""
     flat = np.abs(normals[..., :1]) < 0.9
     helper = np.where(flat, np.array([1.0, 0, 0]), np.array([0, 1.0, 0]))
     across = np.cross(normals, helper)

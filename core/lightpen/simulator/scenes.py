@@ -1,6 +1,7 @@
 """Scenes: what a simulated set of images shows, and how much goes wrong in it."""
 
 from dataclasses import dataclass, field, fields
+from typing import Literal, TypeAlias
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
@@ -71,6 +72,27 @@ HARD = Disturbances(
 SCENES = {"clean": CLEAN, "hard": HARD}
 
 
+FaceKind: TypeAlias = Literal["even", "hot-spot", "dome", "ring"]
+
+
+@dataclass(frozen=True)
+class Leds:
+    """How LEDs look inside their rims, and how the optics scatters their light."""
+
+    faces: FaceKind = "even"
+    optics: Optics = field(default_factory=Optics)
+
+
+LEDS = {
+    "even": Leds(),
+    "hot-spot": Leds("hot-spot"),
+    "dome": Leds("dome"),
+    "ring": Leds("ring"),
+    "halo": Leds(optics=Optics(halo=0.15)),
+    "ghost": Leds(optics=Optics(ghost=0.03)),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """What a simulated set of images shows.
@@ -79,6 +101,10 @@ class Scene:
     ----------
     swing : str
         Kind of swing, see `lightpen.simulator.postures.draw_postures`.
+    faces : str
+        What the LEDs look like inside their rims: evenly lit, a hot spot off the middle
+        in each its own way, a dome whose bright part moves with the view, or a dark
+        middle.
     led_noise : float
         Standard deviation of the measured LED coordinates about the truth, mm.
     pen : Pen
@@ -93,6 +119,7 @@ class Scene:
     disturbances: Disturbances = CLEAN
     optics: Optics = field(default_factory=Optics)
     sensor: Sensor = field(default_factory=Sensor)
+    faces: FaceKind = "even"
     led_noise: float = 0.002
     pen: Pen = field(default_factory=paper_pen)
     camera: Camera = field(default_factory=paper_camera)

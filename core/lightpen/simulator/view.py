@@ -7,9 +7,11 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.faces import Face
 from lightpen.simulator.rims import MIN_SIGMA
 
 PEAK = 205 / 255
+GHOST_OFFSET = (9, 4)  # px, right and down
 CAP_STEPS = 16  # corners of a round finger end
 
 
@@ -34,6 +36,11 @@ class Optics:
         Level where nothing shines, fraction of full scale.
     gradient : tuple of float
         Change of the background over the width and over the height of the image.
+    halo : float
+        Share of the light of each LED that is scattered round it.
+    ghost : float
+        Share of it that is seen again `GHOST_OFFSET` beside, by reflection in the
+        filter.
     """
 
     peak: float = PEAK
@@ -43,6 +50,8 @@ class Optics:
     defocus_radius: float = 0.0
     background: float = 0.0
     gradient: tuple[float, float] = (0.0, 0.0)
+    halo: float = 0.0
+    ghost: float = 0.0
 
     def __post_init__(self) -> None:
         if self.psf_sigma < MIN_SIGMA:
@@ -133,6 +142,8 @@ class View:
         Brightness of each LED, 0 if it is off.
     lamps, glares, fingers : tuple
         Whatever else is in the picture; fingers hide what is behind them.
+    faces : tuple of Face
+        How each LED looks inside its rim; empty for evenly lit ones.
     """
 
     rotations: FloatArray
@@ -141,6 +152,7 @@ class View:
     lamps: tuple[Lamp, ...] = ()
     glares: tuple[Glare, ...] = ()
     fingers: tuple[Finger, ...] = ()
+    faces: tuple[Face, ...] = ()
 
 
 def still_view(pen: Pen, rotation: FloatArray, translation: FloatArray) -> View:

@@ -11,6 +11,7 @@ from lightpen.model.pen import MIN_LEDS, Pen
 from lightpen.model.rigid import fit_rigid
 
 MIN_CERTAIN_LEDS = 6  # leave 6 equations over to check the 6 unknowns of a pose
+FEWEST_LEDS = 5  # that are believed where nothing else explains them
 MIN_HEIGHT = 0.05  # of a triangle over its longest side; flatter ones fix no pose
 LOOKALIKE = 0.025  # of the pen's size, within which an LED stands in for another
 MAX_TRIANGLES = 120  # whose copies are sought in the pen
@@ -54,18 +55,20 @@ class Constellation:
 
 
 def certain_leds(pen: Pen) -> int:
-    """Return how many LEDs of a pen must be seen to be labelled with certainty."""
+    """Return how many LEDs of a pen must be seen to be labelled among other spots."""
     return min(MIN_CERTAIN_LEDS, pen.n_leds)
 
 
 @lru_cache(maxsize=16)
-def constellation_of(pen: Pen) -> Constellation:
+def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation:
     """Return the constellation of a pen.
 
     Parameters
     ----------
     pen : Pen
         With at least four LEDs, not all on one line.
+    certain : int
+        LEDs to be explained before a labelling is believed, if it has that many.
     """
     if pen.n_leds < MIN_LEDS:
         raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")
@@ -75,7 +78,7 @@ def constellation_of(pen: Pen) -> Constellation:
     if not triangles.any():
         raise ValueError("`pen` must not have all its LEDs on one line.")
     triples, sides = triples[triangles], sides[triangles]
-    min_leds = certain_leds(pen)
+    min_leds = min(certain, pen.n_leds)
     rotations, translations = _self_motions(pen, triples, sides, min_leds)
     return Constellation(
         leds=pen.leds,

@@ -5,6 +5,10 @@ distance, which orders the suppositions by plausibility. Each fixes a pose (P3P)
 predicts the other LEDs. A pose is believed when it explains at least six spots at the
 noise level, when chance would hardly do as well, and when no other labelling comes near
 it; else the image is refused. More and more triples are tried until one is believed.
+
+Five spots are enough where there are no others, and no other labelling of four or more
+of them is found among all that a few triples allow; or where the pose before leads to
+them.
 """
 
 from collections.abc import Sequence
@@ -14,7 +18,13 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.labelling.constellation import Constellation, constellation_of
+from lightpen.detection.labelling.constellation import (
+    FEWEST_LEDS,
+    MIN_CERTAIN_LEDS,
+    Constellation,
+    certain_leds,
+    constellation_of,
+)
 from lightpen.detection.labelling.hypotheses import (
     Effort,
     first_of_each,
@@ -43,7 +53,8 @@ from lightpen.model.pen import Pen
 MAX_LOG_FALSE_ALARMS = -4.0
 MAX_RMS = 1.0  # px
 # Where no more LEDs than necessary are seen, one of them could be a stray spot that
-# happens to lie near the place of a hidden LED, the more so among other stray spots.
+# happens to lie near the place of a hidden LED, the more so among other stray spots, or
+# where there are only five, which a pose can follow farther.
 MAX_RMS_OF_FEWEST = 0.3  # px
 MAX_RMS_OF_FEWEST_AMONG_OTHERS = 0.1  # px
 RIVAL_SIGMA = 0.1  # px, at least, when two labellings are compared
@@ -108,6 +119,10 @@ EFFORTS = (
     Effort(n_triples=4, n_hypotheses=700, n_poses=100, n_settled=8, sized=False),
 )
 MODERATE = EFFORTS[:3]
+# Every triple of LEDs for a few triples of spots: a second answer is among them.
+ALL_ANSWERS = (
+    Effort(n_triples=4, n_hypotheses=700, n_poses=300, n_settled=24, sized=False),
+)
 
 
 def label_images(
@@ -147,6 +162,16 @@ def label_images(
     )
     for i, found in zip(again, retried, strict=True):
         labels[i] = found
+    five = [i for i, s in enumerate(spots) if _is_five(s, labels[i], constellation)]
+    found_five = _label_whole(
+        [spots[i] for i in five],
+        camera,
+        constellation_of(pen, FEWEST_LEDS),
+        ALL_ANSWERS,
+    )
+    for i, found in zip(five, found_five, strict=True):
+        if found.reason is LabelStatus.LABELLED:
+            labels[i] = found
     return _with_displaced(labels, spots, camera, pen)
 
 
@@ -176,7 +201,7 @@ def track_spots(
     Labels
         Refused where the prediction does not lead to a believable labelling.
     """
-    constellation = constellation_of(pen)
+    constellation = constellation_of(pen, FEWEST_LEDS)
     n_whole = int(np.count_nonzero(spots.flaws & UNWHOLE == 0))
     if n_whole < constellation.min_leds:
         return _refused(
@@ -186,10 +211,19 @@ def track_spots(
     candidates = shifted_poses(sight, constellation, R, t)
     settled = settle(sight, constellation, candidates)
     best = _best(sight, constellation, settled)
+    if np.any(settled.n_explained[best] < certain_leds(pen)):
+        settled, best = _with_lookalikes(sight, constellation, settled)
     label = _judge(sight, constellation, settled, best, [spots])[0]
     if np.sum(label.R * R) < 1 + 2 * np.cos(MAX_PREDICTION_ERROR):
         return _refused(pen.n_leds, LabelStatus.NO_FIT)
     return label
+
+
+def _is_five(spots: Spots, labels: Labels, pen: Constellation) -> bool:
+    """Tell whether an image that was refused shows five whole spots and no others."""
+    refused = labels.reason in (LabelStatus.TOO_FEW, LabelStatus.NO_FIT)
+    n_whole = np.count_nonzero(spots.flaws & UNWHOLE == 0)
+    return bool(refused and n_whole == FEWEST_LEDS < pen.min_leds)
 
 
 def _label_whole(
@@ -261,15 +295,21 @@ def _search(
     sight: SpotArrays, pen: Constellation, effort: Effort, spots: Sequence[Spots]
 ) -> list[Labels]:
     candidates = poses_from_triples(sight, pen, effort)
-    settled = settle(sight, pen, candidates)
-    best = _best(sight, pen, settled)
-    if not len(best):
-        return [_refused(len(pen.leds), LabelStatus.NO_FIT) for _ in spots]
-    rivals = lookalike_poses(sight, pen, settled.of(best))
-    if len(rivals):
-        settled = join([settled, settle(sight, pen, rivals)])
-        best = _best(sight, pen, settled)
+    settled, best = _with_lookalikes(sight, pen, settle(sight, pen, candidates))
     return _judge(sight, pen, settled, best, spots)
+
+
+def _with_lookalikes(
+    sight: SpotArrays, pen: Constellation, settled: Candidates
+) -> tuple[Candidates, IntArray]:
+    """Return candidates with the lookalikes of the best, and the best of all."""
+    best = _best(sight, pen, settled)
+    if len(best):
+        rivals = lookalike_poses(sight, pen, settled.of(best))
+        if len(rivals):
+            settled = join([settled, settle(sight, pen, rivals)])
+            best = _best(sight, pen, settled)
+    return settled, best
 
 
 def _best(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> IntArray:
@@ -278,8 +318,10 @@ def _best(sight: SpotArrays, pen: Constellation, candidates: Candidates) -> IntA
     low, high = AREA_RANGE
     n = candidates.n_explained
     alone = n == sight.usable.sum(axis=1)[candidates.image]
-    strict = np.where(alone, MAX_RMS_OF_FEWEST, MAX_RMS_OF_FEWEST_AMONG_OTHERS)
-    max_rms = np.where(n > pen.min_leds, MAX_RMS, strict)
+    certain = min(MIN_CERTAIN_LEDS, len(pen.leds))
+    spared = alone & (n >= certain)
+    strict = np.where(spared, MAX_RMS_OF_FEWEST, MAX_RMS_OF_FEWEST_AMONG_OTHERS)
+    max_rms = np.where(n > certain, MAX_RMS, strict)
     credible = (n >= pen.min_leds) & (candidates.rms < max_rms)
     credible &= (candidates.area_ratio > low) & (candidates.area_ratio < high)
     which = np.flatnonzero(credible & (logs < MAX_LOG_FALSE_ALARMS))

@@ -338,9 +338,23 @@ def test_an_image_without_spots_is_refused() -> None:
     assert np.isnan(label.R).all()
 
 
-def test_fewer_than_six_leds_are_refused() -> None:
-    view = random_view(np.random.default_rng(40), n_missing=5)
+def test_fewer_than_five_leds_are_refused() -> None:
+    view = random_view(np.random.default_rng(40), n_missing=6)
     assert label_spots(view.spots, CAMERA, PEN).reason is LabelStatus.TOO_FEW
+
+
+@pytest.mark.parametrize("name", ["paper", "six", "eight", "near-symmetric"])
+def test_five_leds_alone_are_labelled_if_they_fit_one_way_only(name: str) -> None:
+    pen = SAMPLE_PENS[name]()
+    n_missing = pen.n_leds - 5
+    found = outcomes(lambda rng: random_view(rng, pen, n_missing), pen, 30, seed=46)
+    assert set(found) <= {"right", str(LabelStatus.TOO_FEW), str(LabelStatus.NO_FIT)}
+    assert found["right"] >= 15
+
+
+def test_four_leds_and_a_lamp_are_not_taken_for_five() -> None:
+    found = outcomes(lambda rng: random_view(rng, PEN, 6, 1), PEN, 30, seed=47)
+    assert found == {str(LabelStatus.TOO_FEW): 30}
 
 
 @pytest.mark.parametrize("n_lamps", [6, 10, 15, 30])
@@ -539,6 +553,27 @@ def test_tracking_agrees_with_a_start_from_nothing() -> None:
     tracked = track_spots(view.spots, CAMERA, PEN, start.R, start.t)
     np.testing.assert_array_equal(tracked.spot, start.spot)
     np.testing.assert_allclose(tracked.R, start.R, atol=1e-6)
+
+
+def test_five_leds_among_lamps_are_labelled_where_the_pose_is_predicted() -> None:
+    rng = np.random.default_rng(83)
+    found: Counter[str] = Counter()
+    for _ in range(40):
+        view = random_view(rng, PEN, 5, 3)
+        guess = beside(view, PEN, rng, px=30, rad=0.04)
+        label = track_spots(view.spots, CAMERA, PEN, guess.R, guess.t)
+        found[outcome(label, view)] += 1
+    assert found["WRONG"] == 0
+    assert found["right"] >= 38
+
+
+def test_a_prediction_does_not_make_four_leds_and_lamps_five() -> None:
+    rng = np.random.default_rng(84)
+    for _ in range(20):
+        view = random_view(rng, PEN, 6, 2)
+        guess = beside(view, PEN, rng, px=30, rad=0.04)
+        label = track_spots(view.spots, CAMERA, PEN, guess.R, guess.t)
+        assert label.reason is not LabelStatus.LABELLED
 
 
 def test_a_prediction_far_off_is_refused() -> None:
