@@ -28,9 +28,9 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.linearised import (
     N_CONE,
     N_TURN,
+    BundleState,
+    CameraView,
     Eliminated,
-    State,
-    View,
     eliminate,
     views_at,
 )
@@ -62,7 +62,7 @@ class Bundle:
 
     Attributes
     ----------
-    state : State
+    state : BundleState
         With the cameras and the pen as the images and the files together have them.
     values : (p,) array
         Deviations from the files; tip and cone are 0.
@@ -85,7 +85,7 @@ class Bundle:
     """
 
     unknowns: Unknowns
-    state: State
+    state: BundleState
     values: FloatArray
     columns: Columns
     components: Components
@@ -128,7 +128,7 @@ class Bundle:
 
 def fit_bundle(
     pixels: FloatArray,
-    start: State,
+    start: BundleState,
     priors: Priors,
     lean: FloatArray,
     inflation: float = 1.0,
@@ -139,7 +139,7 @@ def fit_bundle(
     ----------
     pixels : (N, C, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    start : State
+    start : BundleState
         With cameras and pen as their files have them.
     lean : (N, F) array
         Forms in which the seat may follow the pen's lean, each of mean square 1.
@@ -242,7 +242,7 @@ def sigma_of(squares: float, n_free: float) -> float:
     return float(np.sqrt(squares / n_free))
 
 
-def _stacked(views: tuple[View, ...]) -> FloatArray:
+def _stacked(views: tuple[CameraView, ...]) -> FloatArray:
     return np.stack([view.residuals for view in views], axis=1)
 
 
@@ -259,7 +259,10 @@ def _follow(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArra
 
 
 def _left_over(
-    views: tuple[View, ...], step: FloatArray, shifts: FloatArray, unknown: FloatArray
+    views: tuple[CameraView, ...],
+    step: FloatArray,
+    shifts: FloatArray,
+    unknown: FloatArray,
 ) -> FloatArray:
     """Return the residuals after a step, (N, C, L, 2), the jitter being an error."""
     n_leds = views[0].residuals.shape[1]

@@ -16,7 +16,7 @@ from lightpen.estimation.bundle import Bundle, fit_bundle
 from lightpen.estimation.contradictions import Contradiction, find_contradictions
 from lightpen.estimation.joint import JointFit, fit_joint, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
-from lightpen.estimation.linearised import State
+from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.pivot import fit_pivot
 from lightpen.estimation.priors import Priors, priors_of
@@ -231,7 +231,7 @@ def _adjust(
 ) -> _Adjusted:
     """Adjust all that the files may have wrong; let go what the images contradict."""
     rig = rig_of(camera)
-    state = State(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
+    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
     priors = priors_of(rig, pen, assumptions)
     lean, seen = lean_forms(start.rotations), pixels[:, None]
     bundle = fit_bundle(seen, state, priors, lean)

@@ -26,7 +26,7 @@ N_CONE = 3
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class BundleState:
     """What the images of a swing depend on.
 
     Attributes
@@ -47,7 +47,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class CameraView:
     """The images of one camera around a state.
 
     Attributes
@@ -72,12 +72,12 @@ class View:
     diameter: FloatArray
 
 
-def views_at(state: State, pixels: FloatArray) -> tuple[View, ...]:
+def views_at(state: BundleState, pixels: FloatArray) -> tuple[CameraView, ...]:
     """Return what each camera sees around a state; pixels (N, C, L, 2)."""
     return tuple(_view(state, c, pixels[:, c]) for c in range(state.rig.n_cameras))
 
 
-def _view(state: State, c: int, pixels: FloatArray) -> View:
+def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
     rig, pen = state.rig, state.pen
     camera, R_c, t_c = rig.cameras[c], rig.rotations[c], rig.translations[c]
     R = R_c @ state.rotations
@@ -95,7 +95,7 @@ def _view(state: State, c: int, pixels: FloatArray) -> View:
         own = np.concatenate([own, by_turn, by_point], axis=3)
     # The centre of a disc's image lies off that of the disc with the diameter squared.
     offset = (pixels - residuals) - camera.pixels(normalised)
-    return View(
+    return CameraView(
         residuals=residuals,
         turn=J[..., :3] @ R_c,
         cone=by_point @ R_c,
@@ -137,7 +137,7 @@ class Eliminated:
 
 
 def eliminate(
-    views: tuple[View, ...],
+    views: tuple[CameraView, ...],
     used: BoolArray,
     sigma: float,
     jitter: FloatArray | None = None,

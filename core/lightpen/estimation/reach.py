@@ -12,7 +12,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import JointFit
-from lightpen.estimation.linearised import State, eliminate, views_at
+from lightpen.estimation.linearised import BundleState, eliminate, views_at
 from lightpen.estimation.priors import priors_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.unknowns import FORMS, NONE, Components, Unknowns, inverse
@@ -56,7 +56,7 @@ class Reach:
             Noise of one image coordinate, px.
         """
         rig = rig_of(camera)
-        state = State(rig, pen, np.zeros(3), np.zeros(3), np.empty((0, 3, 3)))
+        state = BundleState(rig, pen, np.zeros(3), np.zeros(3), np.empty((0, 3, 3)))
         lean = np.empty((0, sum(FORMS)))
         unknowns = Unknowns.of(state, priors_of(rig, pen, USUAL), lean)
         none = Components(NONE, (NONE,) * len(FORMS), NONE, None)
@@ -99,7 +99,7 @@ def reach_of(
 def _counted(
     camera: Camera, pen: Pen, pixels: FloatArray, joint: JointFit, first: int
 ) -> FloatArray:
-    state = State(
+    state = BundleState(
         rig_of(camera), pen, joint.tip_pen, joint.cone_cam, joint.rotations[first:]
     )
     views = views_at(state, pixels[first:, None])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.linearised import N_CONE, Eliminated, State
+from lightpen.estimation.linearised import N_CONE, BundleState, Eliminated
 from lightpen.estimation.priors import Prior, Priors
 from lightpen.estimation.variance_components import LIKELY, Component, find_component
 from lightpen.model.camera import Camera
@@ -109,7 +109,7 @@ class Unknowns:
     priors: Priors
 
     @classmethod
-    def of(cls, start: State, priors: Priors, lean: FloatArray) -> "Unknowns":
+    def of(cls, start: BundleState, priors: Priors, lean: FloatArray) -> "Unknowns":
         """Return the unknowns of a fit that starts there."""
         rig, pen = start.rig, start.pen
         n_leds = pen.n_leds
@@ -257,8 +257,12 @@ class Unknowns:
         return NONE
 
     def moved(
-        self, start: State, now: State, values: FloatArray, turns: FloatArray
-    ) -> State:
+        self,
+        start: BundleState,
+        now: BundleState,
+        values: FloatArray,
+        turns: FloatArray,
+    ) -> BundleState:
         """Return the state by new values and the turn of each image, (N, 3)."""
         at, rig = self.columns, start.rig
         cameras = tuple(
@@ -267,7 +271,7 @@ class Unknowns:
         )
         places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
         leds = self.basis @ values[at.leds] + self.scaling * values[at.scale]
-        return State(
+        return BundleState(
             rig=replace(
                 rig,
                 cameras=cameras,

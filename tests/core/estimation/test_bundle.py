@@ -13,8 +13,8 @@ from lightpen.estimation.linearised import (
     N_CONE,
     N_TURN,
     TURN_RIDGE,
-    State,
-    View,
+    BundleState,
+    CameraView,
     eliminate,
     views_at,
 )
@@ -71,7 +71,7 @@ def seen_by(
 
 
 def adjusted(rig: Rig, pen: Pen, swing: Swing, pixels: FloatArray) -> Bundle:
-    start = State(rig, pen, swing.tip_pen, swing.cone_cam, swing.rotations)
+    start = BundleState(rig, pen, swing.tip_pen, swing.cone_cam, swing.rotations)
     priors = priors_of(rig, pen, USUAL)
     return fit_bundle(pixels, start, priors, lean_forms(swing.rotations))
 
@@ -88,29 +88,29 @@ def with_intrinsics(camera: Camera, intrinsics: FloatArray) -> Camera:
 
 
 # How a state moves by one column of a view; ``k`` counts within its kind.
-Move = Callable[[State, int, float], State]
+Move = Callable[[BundleState, int, float], BundleState]
 
 
-def turned(state: State, k: int, step: float) -> State:
+def turned(state: BundleState, k: int, step: float) -> BundleState:
     turn = rotation_from_vector(step * np.eye(3)[k])
     return replace(state, rotations=turn @ state.rotations)
 
 
-def cone_moved(state: State, k: int, step: float) -> State:
+def cone_moved(state: BundleState, k: int, step: float) -> BundleState:
     return replace(state, cone_rig=state.cone_rig + step * np.eye(3)[k])
 
 
-def led_moved(state: State, k: int, step: float) -> State:
+def led_moved(state: BundleState, k: int, step: float) -> BundleState:
     leds = state.pen.leds + step * np.eye(3)[k]
     return replace(state, pen=replace(state.pen, leds=leds))
 
 
-def widened(state: State, k: int, step: float) -> State:
+def widened(state: BundleState, k: int, step: float) -> BundleState:
     pen = replace(state.pen, diameter=state.pen.diameter + step)
     return replace(state, pen=pen)
 
 
-def camera_changed(state: State, k: int, step: float) -> State:
+def camera_changed(state: BundleState, k: int, step: float) -> BundleState:
     """Return the state with its second camera changed in the k-th of its own."""
     rig = state.rig
     camera = rig.cameras[1]
@@ -154,9 +154,9 @@ def _agree_with_differences(
     c: int, move: Move, columns: str, steps: list[float]
 ) -> None:
     swing = swing_poses(4, np.random.default_rng(0))
-    state = State(pair(), PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
+    state = BundleState(pair(), PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
     pixels = np.full((4, 2, PEN.n_leds, 2), 1000.0)
-    view: View = views_at(state, pixels)[c]
+    view: CameraView = views_at(state, pixels)[c]
     found = getattr(view, columns)
     found = found.reshape(*found.shape[:3], -1)
     assert found.shape[-1] == len(steps)
@@ -172,7 +172,7 @@ def _agree_with_differences(
 
 
 def dense(
-    views: tuple[View, ...],
+    views: tuple[CameraView, ...],
     used: BoolArray,
     sigma: float,
     jitter: FloatArray | None,
@@ -223,7 +223,7 @@ def test_elimination_is_the_schur_complement_of_the_normal_equations(
     rng = np.random.default_rng(1)
     swing = swing_poses(5, rng)
     pixels = seen_by(rig, PEN, swing, 0.05, rng)
-    state = State(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
+    state = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
     views = views_at(state, pixels)
     used = np.isfinite(pixels[..., 0]) & (rng.random(pixels.shape[:-1]) < 0.9)
     used[2] = False  # of an image of which no LED is used
