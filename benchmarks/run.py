@@ -40,6 +40,7 @@ SECTIONS: dict[str, Section] = {
     "tips": tip_rows,
     "repeat": repeat_rows,
     "bound": lambda workers, data: cramer_rao_rows(workers),
+    "files": lambda workers, data: wrong_file_rows(workers),
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
     "tracker": tracker_rows,

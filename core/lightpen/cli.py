@@ -183,7 +183,7 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         "--scale-sigma",
         type=_share,
         metavar="SHARE",
-        help="standard uncertainty of the pen's scale, such as 30e-6, where the pen "
+        help="standard uncertainty of the pen's scale, such as 20e-6, where the pen "
         "file states none",
     )
     parser.add_argument("--method", choices=METHODS, default="joint")

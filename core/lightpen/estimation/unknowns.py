@@ -134,7 +134,7 @@ class Unknowns:
             seat=tuple(seat),
             drift=drift,
         )
-        scaling = (pen.leds - _anchor(pen.leds)).ravel()
+        scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
         K = N_CONE + sum(sizes) + n_extrinsics + 1 + 3 * n_leds
         mixing = np.zeros((K, columns.leds.stop))
         at_leds = slice(K - 3 * n_leds, K)
@@ -295,11 +295,6 @@ def led_basis(leds: FloatArray) -> FloatArray:
     turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
     whole = np.concatenate([shifts, turns], axis=1)
     return np.asarray(np.linalg.qr(whole, mode="complete")[0][:, 6:])
-
-
-def _anchor(leds: FloatArray) -> FloatArray:
-    """Return what a scale leaves in place: the point of the pen nearest its origin."""
-    return np.asarray(np.clip(0.0, leds.min(axis=0), leds.max(axis=0)))
 
 
 def _with_intrinsics(camera: Camera, intrinsics: FloatArray) -> Camera:

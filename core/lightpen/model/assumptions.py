@@ -9,8 +9,8 @@ class Assumptions:
     """Standard uncertainties that stand in for what a file leaves out.
 
     Those of the camera are what a lens that was calibrated once, and mounted and
-    focused again since, was seen to be off by; that of the scale holds 20 ppm of a
-    measuring machine and 1 K of an aluminium pen (23 ppm).
+    focused again since, was seen to be off by; that of the scale is what some K
+    between its measurement and its use make of a pen: 2 to 23 ppm each.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Assumptions:
     k1: float = 0.02
     k2: float = 0.1
     tangential: float = 0.0003
-    scale: float = 3e-5
+    scale: float = 2e-5
     diameter: float = 0.02
     rotation: float = 0.02
     translation: float = 20.0
