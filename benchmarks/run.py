@@ -30,6 +30,7 @@ from benchmarks.tracker import tracker_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
+from benchmarks.wrong_files import wrong_file_rows
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"

@@ -231,8 +231,9 @@ def test_the_scale_of_the_pen_moves_the_tip_as_much_as_it_may_be_off() -> None:
     budget = calibrated(0.03 * noise(6, n_images=40), pen=loose).budget
 
     found = np.sqrt(variance_of(budget, ShareName.SCALE)[:3])
-    # The origin stays: a tip 90 mm below it moves by 9 um.
-    np.testing.assert_allclose(found, 1e-4 * np.abs(FEW.tip_pen), rtol=0.05, atol=1e-4)
+    # The middle of the LEDs stays: a tip 180 mm below it moves by 18 um.
+    lever = np.abs(FEW.tip_pen - loose.leds.mean(axis=0))
+    np.testing.assert_allclose(found, 1e-4 * lever, rtol=0.05, atol=1e-4)
 
 
 def test_too_few_images_for_blocks_are_said_so() -> None:
