@@ -93,6 +93,7 @@ _SHARES: dict[ShareName, str] = {
     ShareName.DIAMETER: QT_TRANSLATE_NOOP("phrases", "discs"),
     ShareName.CAMERA: QT_TRANSLATE_NOOP("phrases", "camera"),
     ShareName.EXTRINSICS: QT_TRANSLATE_NOOP("phrases", "rig"),
+    ShareName.HELD_BACK: QT_TRANSLATE_NOOP("phrases", "doubt"),
 }
 _LACKS: dict[Lack, str] = {
     Lack.STATION: QT_TRANSLATE_NOOP("phrases", "Enter the name of the station."),

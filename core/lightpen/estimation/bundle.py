@@ -44,7 +44,7 @@ from lightpen.estimation.unknowns import (
     inverse,
     led_basis,
 )
-from lightpen.estimation.variance_components import find_jitter
+from lightpen.estimation.variance_components import FITTED, find_jitter
 from lightpen.sentences import sentence
 
 LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
@@ -132,6 +132,7 @@ def fit_bundle(
     priors: Priors,
     lean: FloatArray,
     inflation: float = 1.0,
+    least_gain: float = FITTED,
 ) -> Bundle:
     """Fit tip, cone and all that the files may have wrong to the LED centres.
 
@@ -146,6 +147,8 @@ def fit_bundle(
     inflation : float
         How many times the variance of the noise counts beside the priors, as it does
         not average out.
+    least_gain : float
+        From which on an error of the seat or a drift is taken for one.
 
     Raises
     ------
@@ -167,7 +170,7 @@ def fit_bundle(
         right = gradient + information @ taken_up
         finding = 0 < n_pass <= FINDING_PASSES
         if finding:
-            components = unknowns.found(information, right, components)
+            components = unknowns.found(information, right, components, least_gain)
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior)
         values = covariance @ right

@@ -12,26 +12,23 @@ from lightpen.detection.observations import (
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
-from lightpen.estimation.bundle import Bundle, fit_bundle
-from lightpen.estimation.contradictions import Contradiction, find_contradictions
+from lightpen.estimation.adjustment import adjust
+from lightpen.estimation.bundle import Bundle
+from lightpen.estimation.contradictions import Contradiction
 from lightpen.estimation.joint import JointFit, fit_joint, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
-from lightpen.estimation.linearised import BundleState
-from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.pivot import fit_pivot
-from lightpen.estimation.priors import Priors, priors_of
+from lightpen.estimation.priors import Priors
 from lightpen.estimation.two_stage import (
     TwoStageFit,
     fit_two_stage,
     propagated_covariance,
 )
 from lightpen.estimation.uncertainty import Budget, Halves, combine, compare_halves
-from lightpen.estimation.unknowns import lean_forms
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
 from lightpen.sentences import Sentence, sentence
 
 MIN_IMAGES = 6  # the paper starts from six
@@ -41,7 +38,6 @@ USUAL_SIGMA = 0.1  # px
 # pose of a blurred image by some hundredths of a millimetre; more is a slip.
 MAX_SMEAR = 0.15  # mm
 SMEARED = 1.25  # times the usual width of the LEDs' rims
-RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
 
 
@@ -159,7 +155,7 @@ def calibrate(
         camera, pen, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam
     )
     _require_fit(start.sigma)
-    adjusted = _adjust(camera, pen, pixels, start, assumptions)
+    adjusted = adjust(camera, pen, pixels, start, assumptions)
     bundle, fitted = adjusted.bundle, adjusted.bundle.state
     fitted_camera = fitted.rig.cameras[0]
     joint = joint_at(
@@ -207,47 +203,11 @@ def calibrate(
         two_stage_covariance=propagated_covariance(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
-        budget=combine(bundle, joint, adjusted.priors, adjusted.correlation),
+        budget=combine(adjusted, joint),
         halves=compare_halves(joint),
         leds=measure_leds(fitted_camera, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Adjusted:
-    bundle: Bundle
-    priors: Priors
-    contradictions: tuple[Contradiction, ...]
-    correlation: Correlation
-
-
-def _adjust(
-    camera: Camera,
-    pen: Pen,
-    pixels: FloatArray,
-    start: JointFit,
-    assumptions: Assumptions,
-) -> _Adjusted:
-    """Adjust all that the files may have wrong; let go what the images contradict."""
-    rig = rig_of(camera)
-    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
-    priors = priors_of(rig, pen, assumptions)
-    lean, seen = lean_forms(start.rotations), pixels[:, None]
-    bundle = fit_bundle(seen, state, priors, lean)
-    contradictions, freed = find_contradictions(rig, bundle, priors)
-    if contradictions:
-        bundle = fit_bundle(seen, state, freed, lean)
-    correlation = measure_correlation(bundle, seen)
-    if correlation.factor > RELATED:
-        # Noise that lasts contradicts a file by chance more often.
-        factor = correlation.factor
-        bundle = fit_bundle(seen, state, priors, lean, factor)
-        contradictions, freed = find_contradictions(rig, bundle, priors)
-        if contradictions:
-            bundle = fit_bundle(seen, state, freed, lean, factor)
-        correlation = measure_correlation(bundle, seen)
-    return _Adjusted(bundle, freed, contradictions, correlation)
 
 
 def _smeared(observations: Observations) -> BoolArray:

@@ -19,10 +19,9 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.bundle import Z_99, Bundle
+from lightpen.estimation.adjustment import Adjustment
+from lightpen.estimation.bundle import Z_99
 from lightpen.estimation.joint import JointFit
-from lightpen.estimation.noise_correlation import Correlation
-from lightpen.estimation.priors import Priors
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
@@ -41,6 +40,7 @@ class ShareName(StrEnum):
     DIAMETER = "disc diameter"
     CAMERA = "camera"
     EXTRINSICS = "rig"
+    HELD_BACK = "not followed"  # what may be so, but is not certain enough
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,19 +145,19 @@ class Halves:
     expanded_uncertainty: FloatArray
 
 
-def combine(
-    bundle: Bundle, joint: JointFit, priors: Priors, correlation: Correlation
-) -> Budget:
-    """Combine the parts of the tip's uncertainty."""
+def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
+    """Combine the parts of the tip's uncertainty; ``joint`` at the estimate."""
+    bundle, priors = adjustment.allowed, adjustment.priors
+    correlation = adjustment.correlation
+    held_back = np.outer(adjustment.held_back, adjustment.held_back)
     independent = bundle.independent_noise
     blocks, ratio, blocks_count = _block_scatter(joint, joint.covariance)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     at = bundle.columns
-    one_wave, *others = at.seat
     jitter = bundle.carried(bundle.jitter_information)
     shares = [
         Share(ShareName.NOISE, raised * correlation.noise),
-        Share(ShareName.SEAT, jitter + bundle.part(one_wave, *others)),
+        Share(ShareName.SEAT, jitter + bundle.part(*at.seat)),
         Share(ShareName.DRIFT, bundle.part(at.drift)),
         Share(ShareName.LEDS, bundle.part(at.leds)),
         Share(ShareName.SCALE, bundle.part(at.scale), priors.scale.assumed),
@@ -171,6 +171,7 @@ def combine(
     if priors.extrinsics is not None:
         rig = bundle.part(at.extrinsics)
         shares.append(Share(ShareName.EXTRINSICS, rig, priors.extrinsics.assumed))
+    shares.append(Share(ShareName.HELD_BACK, held_back))
     return Budget(
         shares=tuple(
             share for share in shares if share.standard_uncertainty.max() > NEGLIGIBLE

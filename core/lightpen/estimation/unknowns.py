@@ -14,7 +14,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.linearised import N_CONE, BundleState, Eliminated
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.variance_components import LIKELY, Component, find_component
+from lightpen.estimation.variance_components import Component, find_component
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, skew
 
@@ -219,16 +219,27 @@ class Unknowns:
         ]
 
     def found(
-        self, information: FloatArray, right: FloatArray, before: Components
+        self,
+        information: FloatArray,
+        right: FloatArray,
+        before: Components,
+        least_gain: float,
     ) -> Components:
-        """Return the components, each found beside the others."""
+        """Return the components, each found beside the others.
+
+        Those of seat and drift count that gain at least so much.
+        """
         now = before
         for _ in range(ROUNDS):
-            now = self._found_once(information, right, now)
+            now = self._found_once(information, right, now, least_gain)
         return now
 
     def _found_once(
-        self, information: FloatArray, right: FloatArray, before: Components
+        self,
+        information: FloatArray,
+        right: FloatArray,
+        before: Components,
+        least_gain: float,
     ) -> Components:
         at, prior = self.columns, self.prior_information(before)
         covariance = inverse(information + prior)
@@ -241,7 +252,7 @@ class Unknowns:
 
         def likely(place: slice) -> Component:
             component = find(place)
-            return component if component.gain > LIKELY else NONE
+            return component if component.gain > least_gain else NONE
 
         return before._replace(
             leds=self._found_leds(find),

@@ -34,7 +34,12 @@ FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
 USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
 
 
-IMAGES_SHRINK = (ShareName.NOISE, ShareName.SEAT, ShareName.DRIFT)
+IMAGES_SHRINK = (
+    ShareName.NOISE,
+    ShareName.SEAT,
+    ShareName.DRIFT,
+    ShareName.HELD_BACK,
+)
 _ADVICE = {
     ShareName.LEDS: sentence(
         "share.leds", "the LED file. Measure the LEDs better, and state how well"

@@ -3774,6 +3774,10 @@
         <translation>相机组</translation>
     </message>
     <message>
+        <source>doubt</source>
+        <translation>存疑</translation>
+    </message>
+    <message>
         <source>Enter the name of the station.</source>
         <translation>请填写工位名称。</translation>
     </message>

@@ -227,6 +227,7 @@ def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
     of_many_images = {Reason.MISFIT, Reason.SLIPPED, Reason.TAKEN_OUT}
     elsewhere = {
         Reason.UNREADABLE,  # a file; a live image comes whole or not at all
+        Reason.UNHANDLED,  # a mistake of the program, made in the tests of both ways
         Reason.AMBIGUOUS,  # a pen that looks the same when it is turned, below
     }
     assert reasons == set(Reason) - of_many_images - elsewhere

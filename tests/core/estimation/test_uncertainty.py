@@ -8,9 +8,9 @@ import pytest
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
+from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.joint import JointFit, fit_joint
-from lightpen.estimation.noise_correlation import measure_correlation
 from lightpen.estimation.uncertainty import (
     Budget,
     ShareName,
@@ -18,6 +18,7 @@ from lightpen.estimation.uncertainty import (
     compare_halves,
 )
 from lightpen.formats.observation_files import Centers
+from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.simulator.swings import (
@@ -86,9 +87,8 @@ def of_images(joint: JointFit, some: slice) -> JointFit:
 
 def budget_of(calibration: Calibration, joint: JointFit) -> Budget:
     """Return the budget with the blocks of another fit."""
-    pixels = calibration.observations.pixels[calibration.used][:, None]
-    correlation = measure_correlation(calibration.bundle, pixels)
-    return combine(calibration.bundle, joint, calibration.priors, correlation)
+    pixels = calibration.observations.pixels[calibration.used]
+    return combine(adjust(CAMERA, PEN, pixels, calibration.joint, USUAL), joint)
 
 
 def variance_of(budget: Budget, name: ShareName) -> FloatArray:

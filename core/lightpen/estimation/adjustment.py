@@ -1,0 +1,130 @@
+"""The whole adjustment: files that the images deny, noise that lasts, doubt.
+
+Where a camera file states no uncertainty, the assumption must allow for a bad file. A
+file that the images do not show to be off at all is then better than what one swing
+makes of it: the estimate keeps to it as far as the images have it right (empirical
+Bayes). So it is with a seat or a drift that is likely but not certain. The uncertainty
+stays that of all that is allowed, and holds what holding back changed.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.bundle import Bundle, fit_bundle
+from lightpen.estimation.contradictions import Contradiction, find_contradictions
+from lightpen.estimation.joint import JointFit
+from lightpen.estimation.linearised import BundleState
+from lightpen.estimation.noise_correlation import Correlation, measure_correlation
+from lightpen.estimation.priors import Prior, Priors, priors_of
+from lightpen.estimation.unknowns import inverse, lean_forms
+from lightpen.estimation.variance_components import COUNTED, FITTED, find_component
+from lightpen.model.assumptions import Assumptions
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
+
+RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
+HELD = 0.01  # of what is assumed of a camera, where its images show nothing of it
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustment:
+    """An adjustment of all that the files may have wrong.
+
+    Attributes
+    ----------
+    bundle : Bundle
+        The estimate.
+    allowed : Bundle
+        The same with all that is assumed allowed; its covariance counts.
+    priors : Priors
+        Of ``allowed``, without what the images contradict.
+    """
+
+    bundle: Bundle
+    allowed: Bundle
+    priors: Priors
+    contradictions: tuple[Contradiction, ...]
+    correlation: Correlation
+
+    @property
+    def held_back(self) -> FloatArray:
+        """What holding back from what is allowed changed in tip and cone, (6,), mm."""
+        one, other = self.bundle.state, self.allowed.state
+        return np.concatenate(
+            [one.tip_pen - other.tip_pen, one.cone_rig - other.cone_rig]
+        )
+
+
+def adjust(
+    camera: Camera,
+    pen: Pen,
+    pixels: FloatArray,
+    start: JointFit,
+    assumptions: Assumptions,
+) -> Adjustment:
+    """Adjust all that the files may have wrong; let go what the images contradict.
+
+    Parameters
+    ----------
+    pixels : (N, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    start : JointFit
+        With the files held as they are.
+
+    Raises
+    ------
+    CalibrationError
+        The iteration does not settle.
+    """
+    rig = rig_of(camera)
+    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
+    priors = priors_of(rig, pen, assumptions)
+    lean, seen = lean_forms(start.rotations), pixels[:, None]
+    factor = 1.0
+    allowed = fit_bundle(seen, state, priors, lean, 1.0, COUNTED)
+    contradictions, freed = find_contradictions(rig, allowed, priors)
+    if contradictions:
+        allowed = fit_bundle(seen, state, freed, lean, 1.0, COUNTED)
+    correlation = measure_correlation(allowed, seen)
+    if correlation.factor > RELATED:
+        # Noise that lasts contradicts a file by chance more often.
+        factor = correlation.factor
+        allowed = fit_bundle(seen, state, priors, lean, factor, COUNTED)
+        contradictions, freed = find_contradictions(rig, allowed, priors)
+        if contradictions:
+            allowed = fit_bundle(seen, state, freed, lean, factor, COUNTED)
+        correlation = measure_correlation(allowed, seen)
+    held = _held_to_files(allowed, freed)
+    bundle = allowed
+    if held is not freed or _is_doubtful(allowed):
+        bundle = fit_bundle(seen, state, held, lean, factor)
+    return Adjustment(bundle, allowed, freed, contradictions, correlation)
+
+
+def _is_doubtful(bundle: Bundle) -> bool:
+    """Return whether something is counted that is not likely enough to be fitted."""
+    found = bundle.components
+    return any(0 < each.gain < FITTED for each in (*found.seat, found.drift))
+
+
+def _held_to_files(bundle: Bundle, priors: Priors) -> Priors:
+    """Return priors that allow an assumed camera no more than its images show."""
+    cameras = list(priors.cameras)
+    for c, place in enumerate(bundle.columns.cameras):
+        if not cameras[c].assumed:
+            continue
+        known = inverse(bundle.covariance[place, place])
+        own = known - bundle.prior_information[place, place]
+        right = known @ bundle.values[place]
+        values, vectors = np.linalg.eigh(cameras[c].covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        found = find_component(root.T @ own @ root, root.T @ right)
+        share = max(found.sigma if found.gain > COUNTED else 0.0, HELD)
+        if share < 1:
+            cameras[c] = Prior(share**2 * cameras[c].covariance, assumed=True)
+    if all(new is old for new, old in zip(cameras, priors.cameras, strict=True)):
+        return priors
+    return replace(priors, cameras=tuple(cameras))
