@@ -39,7 +39,7 @@ TIMER_MS = 10
 SAMPLE_MS = 1000
 NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
 # Never reached, so that each swing goes on to its last image.
-LIMITS = SwingLimits(max_uncertainty=1e-9)
+LIMITS = SwingLimits(min_images=300, max_images=300)
 
 
 class Soak(QObject):

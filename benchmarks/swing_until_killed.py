@@ -31,7 +31,7 @@ from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
 NAMES = Names("Bench", "Bench", "SIM-1", "T-1", "C-1", 10.0)
-ENDLESS = SwingLimits(max_uncertainty=1e-9, max_images=100_000)
+ENDLESS = SwingLimits(min_images=100_000, max_images=100_000)
 
 
 def main() -> int:

@@ -47,7 +47,7 @@ from lightpen_app.work.settings import Settings
 
 SPEED = 8
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
-ENDLESS = SwingLimits(max_uncertainty=1e-9, max_images=100_000)
+ENDLESS = SwingLimits(min_images=100_000, max_images=100_000)
 
 class HastyClock:
     is_real = True

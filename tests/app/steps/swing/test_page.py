@@ -54,7 +54,7 @@ NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 SHORT = SwingLimits(
     max_uncertainty=0.015, min_images=12, max_images=50, min_per_field=0
 )
-LONG = SwingLimits(max_uncertainty=1e-5, max_images=5000)
+LONG = SwingLimits(min_images=5000, max_images=5000)
 VERDICTS = {"PASS", "CHECK", "REPEAT", "NO TIP"}
 UPRIGHT = Posture(0.0, 0.0, 0.0)
 PATIENCE_MS = 120_000
