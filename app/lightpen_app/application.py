@@ -31,6 +31,7 @@ from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.steps.page import Page
+from lightpen_app.work.garbage import GarbageCollector
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.workbench import Workbench
@@ -110,6 +111,7 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     application = QApplication(list(arguments))
     application.setApplicationName("lightpen")
     application.setApplicationDisplayName("Lightpen")
+    GarbageCollector(application)
     return application
 
 

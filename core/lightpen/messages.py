@@ -39,6 +39,7 @@ class Code(StrEnum):
     LED_DISPLACED = "verdict.led-displaced"
     LEDS_MISFIT = "verdict.leds-misfit"
     FILE_UNCERTAIN = "verdict.file-uncertain"
+    FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
@@ -186,7 +187,7 @@ def file_uncertain(
     """
     if assumed:
         return sentence(
-            Code.FILE_UNCERTAIN,
+            Code.FILE_ASSUMED,
             "U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. "
             "{share:.4f} mm of it is assumed, for {advice}. More images hardly help.",
             uncertainty=uncertainty,

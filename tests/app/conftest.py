@@ -1,5 +1,6 @@
 """Fixtures of the application's tests: its own look, whatever the machine has."""
 
+import gc
 import os
 import sys
 import time
@@ -45,6 +46,7 @@ from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.wizard_pages import make_pages
+from lightpen_app.work.garbage import collect_if_due
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -82,6 +84,20 @@ def dressed(qapp: QApplication) -> QApplication:
     QApplication.setStyle("Fusion")
     load_fonts()
     return qapp
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_to_one_thread() -> Iterator[None]:
+    """No other thread than that of the windows frees what tests leave behind."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def collected(kept_to_one_thread: None) -> Iterator[None]:
+    yield
+    collect_if_due()
 
 
 @pytest.fixture(autouse=True)

@@ -74,6 +74,7 @@ _SHORTS: dict[Code, str] = {
     Code.LED_DISPLACED: QT_TRANSLATE_NOOP("phrases", "LED out of place"),
     Code.LEDS_MISFIT: QT_TRANSLATE_NOOP("phrases", "LEDs do not fit"),
     Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
+    Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),

@@ -224,7 +224,7 @@ def fit_bundle(
             )
     raise CalibrationError(
         sentence(
-            "joint.not-settled",
+            "bundle.not-settled",
             "The joint fit did not settle in {n_steps} steps. The images may not be "
             "of this pen and camera: check both files.",
             n_steps=MAX_PASSES,

@@ -248,8 +248,17 @@ def test_recorded_images_have_no_exposure_to_set(
 
 def test_the_checks_of_the_intrinsics_are_shown(live: "Seen") -> None:
     assert "Fits the live images: 1224 x 1024" in live.words
-    assert "2319.10 and 2318.55 px" in live.words
+    assert "2319.10 \u00b1 0.26 and 2318.55 \u00b1 0.26 px" in live.words
     assert "k1 -0.082" in live.words
+    assert "no date" in live.words
+
+
+def test_intrinsics_without_an_uncertainty_are_said_to_be_so(
+    live: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    live.enter("Intrinsics file", str(intrinsics(workbench, tmp_path, covariance=None)))
+
+    live.wait("2319.10 and 2318.55 px")
     assert "no date, no uncertainty in the file" in live.words
 
 
