@@ -13,7 +13,7 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
 from lightpen.estimation.contradictions import COEFFICIENTS
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.local_time import local_now
@@ -332,6 +332,7 @@ def _methods(calibration: Calibration) -> dict[str, Any]:
 
 def _uncertainty(calibration: Calibration) -> dict[str, Any]:
     budget = calibration.budget
+    shares = {share.name: share for share in budget.shares}
 
     def std(covariance: FloatArray | None) -> FloatArray | None:
         return None if covariance is None else np.sqrt(np.diag(covariance)[:3])
@@ -346,6 +347,12 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
             }
             for share in budget.shares
         ],
+        **{
+            f"{name.value.replace(' ', '_')}_mm": (
+                shares[name].standard_uncertainty if name in shares else None
+            )
+            for name in ShareName
+        },
         "independent_noise_mm": std(budget.independent_noise),
         "blocks_mm": std(budget.blocks),
         "block_ratio": budget.block_ratio,

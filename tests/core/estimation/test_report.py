@@ -155,6 +155,10 @@ def test_the_record_holds_each_share_of_the_uncertainty() -> None:
     )
     assert not any(share["assumed"] for share in found["shares"])
     assert np.shape(found["independent_noise_mm"]) == (3,)
+    for share in found["shares"]:
+        by_name = found[f"{share['name'].replace(' ', '_')}_mm"]
+        assert by_name == share["standard_uncertainty_mm"]
+    assert found["rig_mm"] is None  # one camera has none
     assert np.shape(found["blocks_mm"]) == (3,)
 
 
