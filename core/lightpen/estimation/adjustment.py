@@ -83,20 +83,22 @@ def adjust(
     state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
     priors = priors_of(rig, pen, assumptions)
     lean, seen = lean_forms(start.rotations), pixels[:, None]
+
+    def all_allowed(
+        factor: float,
+    ) -> tuple[Bundle, tuple[Contradiction, ...], Priors, Correlation]:
+        bundle = fit_bundle(seen, state, priors, lean, factor, COUNTED)
+        contradictions, freed = find_contradictions(rig, bundle, priors)
+        if contradictions:
+            bundle = fit_bundle(seen, state, freed, lean, factor, COUNTED)
+        return bundle, contradictions, freed, measure_correlation(bundle, seen)
+
     factor = 1.0
-    allowed = fit_bundle(seen, state, priors, lean, 1.0, COUNTED)
-    contradictions, freed = find_contradictions(rig, allowed, priors)
-    if contradictions:
-        allowed = fit_bundle(seen, state, freed, lean, 1.0, COUNTED)
-    correlation = measure_correlation(allowed, seen)
+    allowed, contradictions, freed, correlation = all_allowed(factor)
     if correlation.factor > RELATED:
         # Noise that lasts contradicts a file by chance more often.
         factor = correlation.factor
-        allowed = fit_bundle(seen, state, priors, lean, factor, COUNTED)
-        contradictions, freed = find_contradictions(rig, allowed, priors)
-        if contradictions:
-            allowed = fit_bundle(seen, state, freed, lean, factor, COUNTED)
-        correlation = measure_correlation(allowed, seen)
+        allowed, contradictions, freed, correlation = all_allowed(factor)
     held = _held_to_files(allowed, freed)
     bundle = allowed
     if held is not freed or _is_doubtful(allowed):

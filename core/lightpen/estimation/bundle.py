@@ -25,6 +25,7 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR, robust_sigma
 from lightpen.errors import CalibrationError
+from lightpen.estimation.joint import gate
 from lightpen.estimation.linearised import (
     N_CONE,
     N_TURN,
@@ -36,19 +37,15 @@ from lightpen.estimation.linearised import (
 )
 from lightpen.estimation.priors import Priors
 from lightpen.estimation.unknowns import (
-    FORMS,
-    NONE,
+    NO_COMPONENTS,
     Columns,
     Components,
     Unknowns,
     inverse,
-    led_basis,
 )
 from lightpen.estimation.variance_components import FITTED, find_jitter
 from lightpen.sentences import sentence
 
-LED_GATE = 5.0  # standard deviations; a 2-D normal vector passes it once in 270,000
-MIN_TURN_LEDS = 3  # in an image; fewer leave its rotation free
 CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
 FINDING_PASSES = 2  # in which standard deviations are found; then they stand
@@ -66,8 +63,6 @@ class Bundle:
         With the cameras and the pen as the images and the files together have them.
     values : (p,) array
         Deviations from the files; tip and cone are 0.
-    columns : Columns
-        Of ``values`` and of every matrix.
     residuals : (N, C, L, 2) array
         Observed minus modelled centres, px, the seat included; NaN where not seen.
     used : (N, C, L) array of bool
@@ -87,7 +82,6 @@ class Bundle:
     unknowns: Unknowns
     state: BundleState
     values: FloatArray
-    columns: Columns
     components: Components
     residuals: FloatArray
     used: BoolArray
@@ -99,10 +93,15 @@ class Bundle:
     covariance: FloatArray
 
     @property
+    def columns(self) -> Columns:
+        """Those of ``values`` and of every matrix."""
+        return self.unknowns.columns
+
+    @property
     def led_corrections(self) -> FloatArray:
         """What the LEDs of the file are off by, beside the scale, (L, 3), mm."""
-        basis = led_basis(self.state.pen.leds)
-        return np.asarray((basis @ self.values[self.columns.leds]).reshape(-1, 3))
+        moves = self.unknowns.basis @ self.values[self.columns.leds]
+        return np.asarray(moves.reshape(-1, 3))
 
     def part(self, *kinds: slice) -> FloatArray:
         """Return what the priors of some unknowns leave in tip and cone, (6, 6)."""
@@ -160,9 +159,9 @@ def fit_bundle(
     state, taken_up = start, np.zeros(unknowns.number)
     views = views_at(state, pixels)
     residuals = _stacked(views)
-    used = gated(residuals)
-    sigma = _robust_sigma(residuals)
-    components = Components(NONE, (NONE,) * len(FORMS), NONE, None)
+    used = gate(_together(residuals)).reshape(residuals.shape[:-1])
+    sigma = robust_sigma(_together(residuals), N_TURN)
+    components = NO_COMPONENTS
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(sigma * float(np.sqrt(inflation)), FINEST)
         eliminated = eliminate(views, used, weight_sigma, components.jitter)
@@ -182,7 +181,7 @@ def fit_bundle(
         )
         squares = np.where(used[..., None], residuals, 0.0) ** 2
         n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
-        sigma = max(sigma_of(squares.sum(), n_free), NOISE_FLOOR)
+        sigma = max(float(np.sqrt(squares.sum() / n_free)), NOISE_FLOOR)
         if finding:
             alone = (
                 eliminated
@@ -192,7 +191,7 @@ def fit_bundle(
             jitter = _jitter(unknowns, alone, used, step, shifts, covariance)
             components = components._replace(jitter=jitter)
         if n_pass in (1, FINDING_PASSES):
-            used = gated(residuals)
+            used = gate(_together(residuals)).reshape(used.shape)
         moved = np.abs((values - taken_up)[:6]).max()
         state = unknowns.moved(start, state, values, unknown[:, :N_TURN])
         taken_up = values.copy()
@@ -211,7 +210,6 @@ def fit_bundle(
                 unknowns=unknowns,
                 state=state,
                 values=values,
-                columns=at,
                 components=components,
                 residuals=residuals,
                 used=used,
@@ -232,25 +230,13 @@ def fit_bundle(
     )
 
 
-def gated(residuals: FloatArray) -> BoolArray:
-    """Return which LEDs are near enough to count, (N, C, L), of residuals in px."""
-    lengths = np.hypot(residuals[..., 0], residuals[..., 1])
-    near = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * _robust_sigma(residuals)
-    enough = near.sum(axis=(1, 2), keepdims=True) >= MIN_TURN_LEDS
-    return np.asarray(near & enough)
-
-
-def sigma_of(squares: float, n_free: float) -> float:
-    """Return a standard deviation from a sum of squares and its degrees of freedom."""
-    return float(np.sqrt(squares / n_free))
-
-
 def _stacked(views: tuple[CameraView, ...]) -> FloatArray:
     return np.stack([view.residuals for view in views], axis=1)
 
 
-def _robust_sigma(residuals: FloatArray) -> float:
-    return robust_sigma(residuals.reshape(len(residuals), -1, 2), N_TURN)
+def _together(residuals: FloatArray) -> FloatArray:
+    """Return residuals (N, C, L, 2) with the LEDs of all cameras in one row."""
+    return residuals.reshape(len(residuals), -1, 2)
 
 
 def _follow(each: Eliminated, step: FloatArray, shifts: FloatArray) -> FloatArray:

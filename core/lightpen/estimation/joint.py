@@ -132,9 +132,9 @@ def fit_joint(
     state = model.at(rotations, tip_pen, cone_cam)
     state = _descend(model, state, None, SETTLED)
     for _ in range(MAX_GATINGS):
-        used = _gate(state.residuals)
+        used = gate(state.residuals)
         state = _descend(model, state, used, CONVERGED)
-        if np.array_equal(_gate(state.residuals), used):
+        if np.array_equal(gate(state.residuals), used):
             break
     return _fit_from(state, used)
 
@@ -282,7 +282,11 @@ def _descend(
     )
 
 
-def _gate(residuals: FloatArray) -> BoolArray:
+def gate(residuals: FloatArray) -> BoolArray:
+    """Return which LEDs are near enough to count, (N, L), of residuals in px.
+
+    None of an image that has too few of them.
+    """
     lengths = np.hypot(residuals[..., 0], residuals[..., 1])
     within = np.nan_to_num(lengths, nan=np.inf) < LED_GATE * robust_sigma(residuals, 3)
     enough = within.sum(axis=1, keepdims=True) >= MIN_TURN_LEDS

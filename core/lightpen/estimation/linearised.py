@@ -17,10 +17,10 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import disc_residuals
+from lightpen.estimation.joint import TURN_RIDGE
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 
-TURN_RIDGE = 1e-6  # px^2/rad^2 beside some 1e6; an image may lose all its LEDs
 N_TURN = 3
 N_CONE = 3
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.estimation.bundle import Z_99, Bundle
-from lightpen.estimation.linearised import N_CONE, N_TURN, TURN_RIDGE, views_at
+from lightpen.estimation.linearised import N_CONE, eliminate, views_at
 
 TRIED = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 0.99])
 N_DRAWS = 8
@@ -85,8 +85,9 @@ def _rows_of(bundle: Bundle, pixels: FloatArray) -> _Rows:
     n_images, _, n_leds = used.shape
     mixing = unknowns.mixing
     by_leds = mixing[-3 * n_leds :].reshape(n_leds, 3, -1)
+    views = views_at(bundle.state, pixels)
     row, turns, cones, common = N_CONE, [], [], []
-    for c, view in enumerate(views_at(bundle.state, pixels)):
+    for c, view in enumerate(views):
         k = view.own.shape[-1]
         J = (
             np.einsum("nlik,lkp->nlip", view.led, by_leds, optimize=True)
@@ -110,11 +111,7 @@ def _rows_of(bundle: Bundle, pixels: FloatArray) -> _Rows:
     T, J = flat(turns), flat(common)
     if jitter is not None:
         T = np.concatenate([T, flat(cones)], axis=2)
-    inner = np.swapaxes(T, 1, 2) @ T
-    inner[:, range(N_TURN), range(N_TURN)] += TURN_RIDGE / bundle.weight_sigma**2
-    if jitter is not None:
-        inner[:, N_TURN:, N_TURN:] += np.linalg.inv(jitter)
-    left = np.asarray(np.linalg.inv(inner), dtype=np.float64)
+    left = eliminate(views, used, bundle.weight_sigma, jitter).left
     return _Rows(
         eliminated=T,
         left=left,

@@ -14,8 +14,6 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 
-TIGHT = 1e-9  # of what is taken as exact, in its own unit
-
 
 @dataclass(frozen=True, eq=False)
 class Prior:

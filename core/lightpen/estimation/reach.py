@@ -15,7 +15,7 @@ from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import BundleState, eliminate, views_at
 from lightpen.estimation.priors import priors_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.estimation.unknowns import FORMS, NONE, Components, Unknowns, inverse
+from lightpen.estimation.unknowns import FORMS, NO_COMPONENTS, Unknowns, inverse
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -59,10 +59,9 @@ class Reach:
         state = BundleState(rig, pen, np.zeros(3), np.zeros(3), np.empty((0, 3, 3)))
         lean = np.empty((0, sum(FORMS)))
         unknowns = Unknowns.of(state, priors_of(rig, pen, USUAL), lean)
-        none = Components(NONE, (NONE,) * len(FORMS), NONE, None)
         mixing = unknowns.mixing
         n = mixing.shape[1]
-        prior = unknowns.prior_information(none)[:n, :n]
+        prior = unknowns.prior_information(NO_COMPONENTS)[:n, :n]
         known = mixing.T @ self.information @ mixing / sigma**2
         now, at_last = (
             float(np.linalg.eigvalsh(inverse(times * known + prior)[:3, :3])[-1])

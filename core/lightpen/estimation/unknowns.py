@@ -61,6 +61,9 @@ class Components(NamedTuple):
     jitter: FloatArray | None
 
 
+NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, None)
+
+
 def lean_forms(rotations: FloatArray) -> FloatArray:
     """Return the forms in which a seat may follow the lean of a pen, (N, 7).
 

@@ -9,10 +9,10 @@ import pytest
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.estimation.bundle import Bundle, fit_bundle
+from lightpen.estimation.joint import TURN_RIDGE
 from lightpen.estimation.linearised import (
     N_CONE,
     N_TURN,
-    TURN_RIDGE,
     BundleState,
     CameraView,
     eliminate,
