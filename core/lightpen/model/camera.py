@@ -153,7 +153,7 @@ class Camera:
         """
         x, y = normalised[..., 0], normalised[..., 1]
         r2 = x * x + y * y
-        p1, p2 = self.distortion[2:4]
+        p1, p2 = self.distortion[2:4].tolist()
         gain = _radial_gain(self.distortion, r2)
         slope = 2 * _radial_slope(self.distortion, r2, gain)
         pixels = self._distorted_pixels(x, y, r2, gain)
@@ -168,7 +168,7 @@ class Camera:
     def _distorted_pixels(
         self, x: FloatArray, y: FloatArray, r2: FloatArray, gain: FloatArray
     ) -> FloatArray:
-        p1, p2 = self.distortion[2:4]
+        p1, p2 = self.distortion[2:4].tolist()
         pixels = np.empty((*x.shape, 2))
         pixels[..., 0] = (
             self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
@@ -279,10 +279,10 @@ def _rational(distortion: FloatArray) -> FloatArray:
 
 
 def _radial_gain(distortion: FloatArray, r2: FloatArray) -> FloatArray:
-    k1, k2, _, _, k3 = distortion[:5]
+    k1, k2, _, _, k3 = distortion[:5].tolist()
     gain = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
     if len(distortion) == 8:
-        k4, k5, k6 = distortion[5:8]
+        k4, k5, k6 = distortion[5:8].tolist()
         gain = gain / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
     return np.asarray(gain)
 
@@ -291,10 +291,10 @@ def _radial_slope(
     distortion: FloatArray, r2: FloatArray, gain: FloatArray
 ) -> FloatArray:
     """Return d gain / d r2."""
-    k1, k2, _, _, k3 = distortion[:5]
+    k1, k2, _, _, k3 = distortion[:5].tolist()
     slope = k1 + r2 * (2 * k2 + r2 * 3 * k3)
     if len(distortion) == 8:
-        k4, k5, k6 = distortion[5:8]
+        k4, k5, k6 = distortion[5:8].tolist()
         denominator = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
         slope = (slope - gain * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / denominator
     return np.asarray(slope)

@@ -4,6 +4,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 
+IDENTITY = np.eye(3)
+TINY = 1e-200  # rad^2; added to no angle that differs from 0
+
 
 def rotation_from_vector(vectors: FloatArray) -> FloatArray:
     """Return the rotation matrices of rotation vectors (Rodrigues' formula).
@@ -18,12 +21,13 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray:
     (..., 3, 3) array
     """
     angle_squared = np.einsum("...i,...i->...", vectors, vectors)
-    angle = np.sqrt(angle_squared)
-    a = np.sinc(angle / np.pi)
-    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    half = 0.5 * np.sqrt(angle_squared + TINY)
+    sinc_half = np.sin(half) / half
+    a = sinc_half * np.cos(half)  # sin(angle) / angle
+    b = 0.5 * sinc_half**2  # (1 - cos(angle)) / angle^2
     K = skew(vectors)
     rotations: FloatArray = (
-        np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+        IDENTITY + a[..., None, None] * K + b[..., None, None] * (K @ K)
     )
     return rotations
 
@@ -80,7 +84,7 @@ def vector_from_rotation(rotations: FloatArray) -> FloatArray:
 def skew(vectors: FloatArray) -> FloatArray:
     """Return the matrices K with ``K @ p = v x p``, shape (..., 3, 3)."""
     K = np.zeros((*vectors.shape, 3))
-    x, y, z = np.moveaxis(vectors, -1, 0)
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
     K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
     return K
