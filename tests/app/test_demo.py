@@ -1,5 +1,6 @@
 """`lightpen --demo` plays a calibration by itself; `lightpen` alone needs a screen."""
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 Run = Callable[..., CompletedProcess[str]]
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "QT_QPA_PLATFORM": ""}
+MOST_MEMORY = 1_500_000 * 1024  # bytes of addresses, as `ulimit -v 1500000` leaves
 LONGEST_S = 400  # on a machine that does other things besides
 JOINT = re.compile(r"^ *joint +(\S+) +(\S+) +(\S+)$", re.MULTILINE)
 
@@ -28,16 +30,28 @@ def newcomer(script: Run, tmp_path: Path) -> Run:
     """Return a function that runs the program for somebody who has no settings yet."""
     homes = {name: str(tmp_path) for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME")}
 
-    def run(*arguments: str) -> CompletedProcess[str]:
-        return script(*arguments, environment=NO_SCREEN | homes, timeout=LONGEST_S)
+    def run(
+        *arguments: str, before: Callable[[], None] | None = None
+    ) -> CompletedProcess[str]:
+        surroundings = NO_SCREEN | homes
+        return script(
+            *arguments, environment=surroundings, before=before, timeout=LONGEST_S
+        )
 
     return run
 
 
-def test_the_demo_plays_without_a_screen_and_prints_the_tip(
+def keep_within_memory() -> None:
+    """Leave the process about to start no more than `MOST_MEMORY`."""
+    import resource  # not on Windows
+
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
+
+
+def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
     newcomer: Run, tmp_path: Path
 ) -> None:
-    outcome = newcomer("--demo")
+    outcome = newcomer("--demo", before=keep_within_memory if os.name != "nt" else None)
 
     assert outcome.returncode == 0, outcome.stderr
     assert outcome.stdout.count("Demo: ") == 5  # one for each step

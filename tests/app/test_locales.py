@@ -20,23 +20,34 @@ import lightpen_app
 
 LOCALES = ("tr_TR", "de_DE", "fa_IR", "C")
 
-START = """
+DEMO = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
+from lightpen.cameras.clock import SkippingClock
+from lightpen.live.sources import Surroundings
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
+from lightpen_app.demo import NAMES, Demo
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.settings import Settings
+from lightpen_app.work.settings import Settings, Station
 
 folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
-wizard = Wizard(application, make_pages, settings, folder)
+settings.set_station(
+    NAMES.station, Station(max_uncertainty=0.05, min_images=12, max_images=30)
+)
+around = Surroundings(Scene(camera=paper_camera(binning=2)), SkippingClock())
+wizard = Wizard(application, make_pages, settings, folder, around)
+demo = Demo(wizard.window, wizard.workbench, is_watched=False)
+demo.ended.connect(wizard.window.close_unasked)
 wizard.window.show()
 wizard.workbench.start()
-QTimer.singleShot(0, wizard.window.close_unasked)
+QTimer.singleShot(0, demo.start)
 application.exec()
-print(QLocale.system().name(), wizard.workbench.shut_down(60.0))
+print(QLocale.system().name(), demo.is_accepted, wizard.workbench.shut_down(60.0))
 """
 
 TIMER_BY_KEYWORD = """
@@ -89,13 +100,13 @@ def properties_by_keyword(source: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", LOCALES)
-def test_the_window_opens_in_any_locale(
+def test_the_demo_opens_the_window_and_plays_in_any_locale(
     environment_of: Callable[[str], dict[str, str]], tmp_path: Path, name: str
 ) -> None:
-    outcome = run(START, environment_of(name), str(tmp_path))
+    outcome = run(DEMO, environment_of(name), str(tmp_path))
 
     assert outcome.returncode == 0, outcome.stderr
-    assert outcome.stdout.split() == [name, "True"]
+    assert outcome.stdout.split() == [name, "True", "True"]
 
 
 def test_a_calibration_gives_the_same_tip_in_any_locale(

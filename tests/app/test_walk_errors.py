@@ -154,12 +154,14 @@ def picture_in(folder: Path) -> Path:
 
 def test_a_picture_is_refused_as_intrinsics(prepared: "Walker", tmp_path: Path) -> None:
     go_to(prepared, "Camera")
-    before = prepared.workbench.preparation.camera_file
+    workbench = prepared.workbench
+    prepared.until(lambda: not workbench.preparation.camera_lacks())
+    before = workbench.preparation.camera_file
 
     give_path(prepared, "Intrinsics file", picture_in(tmp_path))
 
     prepared.until_tells("picture.png is not text")
-    assert prepared.workbench.preparation.camera_file is before
+    assert workbench.preparation.camera_file is before
 
 
 def test_intrinsics_of_another_size_are_told_and_close_the_next_steps(

@@ -222,7 +222,7 @@ def _look_up(table: LightArray, nodes: FloatArray, size: int) -> LightArray:
     scaled = np.rint(nodes * STEPS_PER_PIXEL).astype(np.int32)
     pixels = np.arange(size, dtype=np.int32) * STEPS_PER_PIXEL + len(table) // 2
     index = pixels[:, None] - scaled
-    return np.asarray(table[np.clip(index, 0, len(table) - 1, out=index)])
+    return table.take(index, mode="clip")
 
 
 def _node_angles(longest: float, sigma: float) -> FloatArray:

@@ -118,15 +118,17 @@ def _self_motions(
     # A triangle that fixes the motion well; all of them where the pen has few.
     bases = bases[np.argsort(-heights, kind="stable")][:MAX_TRIANGLES]
     reach = LOOKALIKE * sides.max()
-    difference = np.abs(_sides(pen.leds[bases])[:, None] - sides[None])
-    base, copy = np.nonzero((difference < 2 * reach).all(axis=-1))
+    own = _sides(pen.leds[bases])
+    close = [np.abs(own[:, k, None] - sides[:, k]) < 2 * reach for k in range(3)]
+    base, copy = np.nonzero(close[0] & close[1] & close[2])
     moved = (bases[base] != triples[copy]).any(axis=1)
     base, copy = base[moved], copy[moved]
     seen: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
     R, t = fit_rigid(pen.leds[bases[base]], pen.leds[triples[copy]])
     there = pen.leds @ np.swapaxes(R, 1, 2) + t[:, None]
-    gaps = np.linalg.norm(there[:, :, None] - pen.leds, axis=-1)
-    partner = np.where(gaps.min(axis=2) < reach, gaps.argmin(axis=2), -1)
+    squares = np.einsum("mli,mli->ml", there, there)[..., None] - 2 * there @ pen.leds.T
+    squares += np.einsum("li,li->l", pen.leds, pen.leds)
+    partner = np.where(squares.min(axis=2) < reach**2, squares.argmin(axis=2), -1)
     normals = pen.normals @ np.swapaxes(R, 1, 2)
     alike = np.einsum("mli,mli->ml", normals, pen.normals[partner]) > ALIKE_NORMALS
     partner = np.where(alike, partner, -1)
