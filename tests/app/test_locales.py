@@ -24,6 +24,7 @@ DEMO = """
 import sys
 from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
+import lightpen.simulator.camera
 from lightpen.cameras.clock import SkippingClock
 from lightpen.live.sources import Surroundings
 from lightpen.simulator.scenes import Scene
@@ -33,6 +34,7 @@ from lightpen_app.demo import NAMES, Demo
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings, Station
 
+lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
 folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
