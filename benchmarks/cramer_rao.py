@@ -101,7 +101,7 @@ def cramer_rao_bound(
     exact = simulate_centers(
         camera, pen, swing.rotations, swing.translations, 0.0, np.random.default_rng(0)
     )
-    model = ContactModel(camera, pen, exact)
+    model = ContactModel.of(camera, pen, exact)
     state = model.at(swing.rotations, swing.tip_pen, swing.cone_cam)
     information = reduce(state, np.isfinite(exact[..., 0]).astype(float)).S.sum(axis=0)
     return sigma**2 * np.asarray(np.linalg.inv(information))

@@ -41,6 +41,7 @@ class Code(StrEnum):
     FILE_UNCERTAIN = "verdict.file-uncertain"
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
+    NOT_SIMULTANEOUS = "verdict.not-simultaneous"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
 
@@ -209,6 +210,29 @@ def file_uncertain(
 def file_contradicted(why: Sentence) -> Sentence:
     """Tell what the images say against a file."""
     return sentence(Code.FILE_CONTRADICTED, "{why}", why=why)
+
+
+def not_simultaneous(camera: str, lag: float) -> Sentence:
+    """Tell by which part of the time between two images a camera is late."""
+    if lag > 0:
+        return sentence(
+            Code.NOT_SIMULTANEOUS,
+            "Camera {camera} takes its images some {lag:.2f} of the time between two "
+            "images later than the first camera. That moves the tip, and other "
+            "warnings may come of it. Trigger all cameras by one signal, or hold the "
+            "pen still for each image.",
+            camera=camera,
+            lag=lag,
+        )
+    return sentence(
+        Code.NOT_SIMULTANEOUS,
+        "Camera {camera} takes its images some {lag:.2f} of the time between two "
+        "images earlier than the first camera. That moves the tip, and other warnings "
+        "may come of it. Trigger all cameras by one signal, or hold the pen still for "
+        "each image.",
+        camera=camera,
+        lag=-lag,
+    )
 
 
 def halves_differ(difference: float, usual: float) -> Sentence:

@@ -26,6 +26,8 @@ class Reason(StrEnum):
     MISFIT = "LEDs do not fit"
     SLIPPED = "tip slipped"
     TAKEN_OUT = "taken out"  # by the user
+    OTHER_MOMENT = "not of the same moment"  # as that of another camera
+    ABSENT = "no image"  # of one camera at a moment that another saw
 
     @property
     def words(self) -> Sentence:
@@ -45,6 +47,8 @@ _WORDS = {
     Reason.MISFIT: sentence("reason.misfit", "LEDs do not fit"),
     Reason.SLIPPED: sentence("reason.slipped", "tip slipped"),
     Reason.TAKEN_OUT: sentence("reason.taken-out", "taken out"),
+    Reason.OTHER_MOMENT: sentence("reason.other-moment", "not of the same moment"),
+    Reason.ABSENT: sentence("reason.absent", "no image"),
 }
 
 

@@ -8,6 +8,7 @@ stays that of all that is allowed, and holds what holding back changed.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,11 +22,11 @@ from lightpen.estimation.priors import Prior, Priors, priors_of
 from lightpen.estimation.unknowns import inverse, lean_forms
 from lightpen.estimation.variance_components import COUNTED, FITTED, find_component
 from lightpen.model.assumptions import Assumptions
-from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rig import Rig
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
+MAX_DENIED = 8  # files, or numbers of a rig's file, that are let go
 HELD = 0.01  # of what is assumed of a camera, where its images show nothing of it
 
 
@@ -59,39 +60,48 @@ class Adjustment:
 
 
 def adjust(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     pixels: FloatArray,
     start: JointFit,
     assumptions: Assumptions,
+    places: FloatArray | None = None,
 ) -> Adjustment:
     """Adjust all that the files may have wrong; let go what the images contradict.
 
     Parameters
     ----------
-    pixels : (N, L, 2) array
+    pixels : (N, C, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     start : JointFit
         With the files held as they are.
+    places : (6 (C - 1),) array, optional
+        By which the cameras of ``start`` stood off the file of the rig, in the order
+        of `Rig.covariance`.
 
     Raises
     ------
     CalibrationError
         The iteration does not settle.
     """
-    rig = rig_of(camera)
     state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
     priors = priors_of(rig, pen, assumptions)
-    lean, seen = lean_forms(start.rotations), pixels[:, None]
+    lean = lean_forms(start.rotations)
+    fit = partial(fit_bundle, pixels, state, lean=lean, places=places)
 
     def all_allowed(
         factor: float,
     ) -> tuple[Bundle, tuple[Contradiction, ...], Priors, Correlation]:
-        bundle = fit_bundle(seen, state, priors, lean, factor, COUNTED)
-        contradictions, freed = find_contradictions(rig, bundle, priors)
-        if contradictions:
-            bundle = fit_bundle(seen, state, freed, lean, factor, COUNTED)
-        return bundle, contradictions, freed, measure_correlation(bundle, seen)
+        bundle = fit(priors, inflation=factor, least_gain=COUNTED)
+        found: tuple[Contradiction, ...] = ()
+        freed = priors
+        for _ in range(1 if rig.n_cameras == 1 else MAX_DENIED):
+            denied, freed = find_contradictions(rig, bundle, freed)
+            if not denied:
+                break
+            found += denied
+            bundle = fit(freed, inflation=factor, least_gain=COUNTED)
+        return bundle, found, freed, measure_correlation(bundle, pixels)
 
     factor = 1.0
     allowed, contradictions, freed, correlation = all_allowed(factor)
@@ -102,7 +112,7 @@ def adjust(
     held = _held_to_files(allowed, freed)
     bundle = allowed
     if held is not freed or _is_doubtful(allowed):
-        bundle = fit_bundle(seen, state, held, lean, factor)
+        bundle = fit(held, inflation=factor)
     return Adjustment(bundle, allowed, freed, contradictions, correlation)
 
 

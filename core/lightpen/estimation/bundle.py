@@ -132,6 +132,7 @@ def fit_bundle(
     lean: FloatArray,
     inflation: float = 1.0,
     least_gain: float = FITTED,
+    places: FloatArray | None = None,
 ) -> Bundle:
     """Fit tip, cone and all that the files may have wrong to the LED centres.
 
@@ -148,6 +149,8 @@ def fit_bundle(
         not average out.
     least_gain : float
         From which on an error of the seat or a drift is taken for one.
+    places : (6 (C - 1),) array, optional
+        Off the file of the rig, from where the cameras' places begin; 0 unless given.
 
     Raises
     ------
@@ -157,6 +160,9 @@ def fit_bundle(
     unknowns = Unknowns.of(start, priors, lean)
     at = unknowns.columns
     state, taken_up = start, np.zeros(unknowns.number)
+    if places is not None:
+        taken_up[at.extrinsics] = places
+        state = unknowns.moved(start, start, taken_up, np.zeros((len(pixels), N_TURN)))
     views = views_at(state, pixels)
     residuals = _stacked(views)
     used = gate(_together(residuals)).reshape(residuals.shape[:-1])

@@ -1,24 +1,33 @@
 """The calibration of a probe tip: from observations to the tip and what it is worth."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.observations import (
-    Observations,
-)
-from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_paper_poses, fit_poses
+from lightpen.detection.observations import Observations
+from lightpen.detection.pose import Poses, fit_paper_poses, fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.contradictions import Contradiction
-from lightpen.estimation.joint import JointFit, fit_joint, joint_at
+from lightpen.estimation.joint import ContactModel, JointFit, fit_contact, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
-from lightpen.estimation.pivot import fit_pivot
+from lightpen.estimation.placing import place_cameras
 from lightpen.estimation.priors import Priors
+from lightpen.estimation.rig_poses import RigPoses, join_poses
+from lightpen.estimation.rig_readings import require_usual_rig
+from lightpen.estimation.single_images import (
+    PosedImages,
+    pose_images,
+    require_fit,
+    require_images,
+)
+from lightpen.estimation.synchrony import Lag
 from lightpen.estimation.two_stage import (
     TwoStageFit,
     fit_two_stage,
@@ -29,16 +38,34 @@ from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
 from lightpen.model.pen import Pen
-from lightpen.sentences import Sentence, sentence
+from lightpen.model.rig import Rig, of_camera, rig_of
 
-MIN_IMAGES = 6  # the paper starts from six
-MAX_SIGMA = 1.0  # px, of one image coordinate; LED errors of 0.3 mm make this
-USUAL_SIGMA = 0.1  # px
-# An LED that runs along an arc during the exposure appears inside it, which moves the
-# pose of a blurred image by some hundredths of a millimetre; more is a slip.
-MAX_SMEAR = 0.15  # mm
-SMEARED = 1.25  # times the usual width of the LEDs' rims
-TRUSTED_WEIGHT = 0.2  # of the Cauchy loss, at eight standard deviations
+
+@dataclass(frozen=True, eq=False)
+class CameraImages:
+    """The images of one camera in a calibration, one at each of the N moments.
+
+    Attributes
+    ----------
+    reasons : tuple of Reason
+        Why an image was left out; `Reason.NONE` for the used ones.
+    rms : (N,) array
+        Root mean square residual of each image, px; NaN without a pose.
+    leds_used : (N, L) array of bool
+    total_rms : float
+        Of all LEDs that are used, px.
+    """
+
+    observations: Observations
+    reasons: tuple[Reason, ...]
+    rms: FloatArray
+    leds_used: BoolArray
+    total_rms: float
+
+    @property
+    def used(self) -> BoolArray:
+        """Images that take part, (N,)."""
+        return np.array([reason is Reason.NONE for reason in self.reasons])
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +74,13 @@ class Calibration:
 
     The arrays over images hold all N images of the observations; the fits hold the
     M images that entered them, in the same order. An image of which the joint fit
-    could use no LED is among these M and not among the used ones.
+    could use no LED is among these M and not among the used ones. Of a rig, its images
+    of one moment count as one here, and the camera frame is that of the first camera.
 
     Attributes
     ----------
+    cameras : tuple of CameraImages
+        What became of the images of each camera.
     reasons : tuple of Reason
         Why an image was left out; `Reason.NONE` for the used ones.
     used : (N,) array of bool
@@ -59,7 +89,6 @@ class Calibration:
     rms : (N,) array
         Root mean square residual of each image, px: of a used one in the joint fit, of
         another about its own pose; NaN without a pose.
-    leds_used : (N, L) array of bool
     joint : JointFit
         Tip, cone and rotations, with all else as the bundle adjustment has it.
     bundle : Bundle
@@ -69,17 +98,18 @@ class Calibration:
     contradictions : tuple of Contradiction
         What the images say against the files.
     two_stage : TwoStageFit
-        The paper's method on the same images.
+        The paper's method on the same images, of the first camera.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
+    lags : tuple of Lag or None
+        Of each camera of a rig but the first.
     """
 
-    observations: Observations
+    cameras: tuple[CameraImages, ...]
     reasons: tuple[Reason, ...]
     used: BoolArray
     tips_cam: FloatArray
     rms: FloatArray
-    leds_used: BoolArray
     joint: JointFit
     bundle: Bundle
     priors: Priors
@@ -90,6 +120,17 @@ class Calibration:
     halves: Halves
     leds: LedQuality
     coverage: Coverage
+    lags: tuple[Lag | None, ...] = ()
+
+    @property
+    def observations(self) -> Observations:
+        """What the images of the first camera show."""
+        return self.cameras[0].observations
+
+    @property
+    def leds_used(self) -> BoolArray:
+        """Which LEDs of its images take part, (N, L)."""
+        return self.cameras[0].leds_used
 
     @property
     def led_sigma(self) -> float:
@@ -123,78 +164,105 @@ def calibrate(
     CalibrationError
         The images do not determine the tip; the text says what is missing.
     """
-    reasons = np.array(observations.reasons, dtype=object)
-    posed = np.flatnonzero(reasons == Reason.NONE)
-    _require_images(posed, reasons, observations.advice)
-    all_poses = fit_poses(
-        camera,
-        pen,
-        observations.pixels[posed],
-        observations.rotations[posed],
-        observations.translations[posed],
-    )
-    _require_fit(all_poses.sigma)
-    fitting = _fitting(all_poses)
-    reasons[posed[~fitting]] = Reason.MISFIT
-    _require_images(posed[fitting], reasons, observations.advice)
-    pivot = fit_pivot(
-        all_poses.rotations[fitting],
-        all_poses.translations[fitting],
-        all_poses.covariances[fitting],
-    )
-    gated = posed[fitting][~pivot.used]
-    distances = np.linalg.norm(pivot.residuals[~pivot.used], axis=1)
-    smeared = _smeared(observations)[gated] & (distances < MAX_SMEAR)
-    reasons[gated[smeared]] = Reason.BLURRED
-    reasons[gated[~smeared]] = Reason.SLIPPED
-    kept = np.flatnonzero(fitting)[pivot.used]
-    chosen, poses = posed[kept], all_poses.of(kept)
+    return calibrate_rig(rig_of(camera), pen, (observations,), assumptions)
 
-    pixels = observations.pixels[chosen]
-    start = fit_joint(
-        camera, pen, pixels, poses.rotations, pivot.tip_pen, pivot.pivot_cam
+
+def calibrate_rig(
+    rig: Rig,
+    pen: Pen,
+    observations: Sequence[Observations],
+    assumptions: Assumptions = USUAL,
+) -> Calibration:
+    """Calibrate the tip of a pen that several cameras see at once; see `calibrate`.
+
+    Each camera judges its images by itself. Where they put the cameras, the fit of all
+    begins, whatever the file of the rig says; it enters with its uncertainty.
+
+    Parameters
+    ----------
+    observations : sequence of Observations
+        Of each camera, all of the same N moments.
+    """
+    parts = [
+        _of_camera(rig, c, partial(pose_images, camera, pen, seen))
+        for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
+    ]
+    reasons = _with_slips(parts)
+    seen_by_all = np.stack([seen.pixels for seen in observations], axis=1)
+    there, places = rig, None
+    lags: tuple[Lag | None, ...] = ()
+    if rig.n_cameras > 1:
+        placed = place_cameras(rig, parts)
+        require_usual_rig(rig, placed, pen, seen_by_all, parts)
+        there, places, lags = placed.rig, placed.deviations(rig), placed.lags
+        for c, each in enumerate(reasons):
+            each[placed.apart[:, c]] = Reason.OTHER_MOMENT
+    kept = np.stack([each == Reason.NONE for each in reasons], axis=1)
+    chosen, of_first = np.flatnonzero(kept.any(axis=1)), np.flatnonzero(kept[:, 0])
+    require_images(of_first, reasons[0], observations[0].advice)
+    pixels = np.where(kept[..., None, None], seen_by_all, np.nan)[chosen]
+    telling = _telling(parts, kept)
+    posed = [part.posed[some] for part, some in zip(parts, telling, strict=True)]
+
+    def joined(of: Rig, poses: Sequence[Poses]) -> RigPoses:
+        some = [each.of(i) for each, i in zip(poses, telling, strict=True)]
+        return join_poses(of, len(kept), posed, some)
+
+    alone = joined(there, [part.poses for part in parts])
+    start = fit_contact(
+        ContactModel(there, pen, pixels),
+        alone.rotations[chosen],
+        parts[0].pivot.tip_pen,
+        parts[0].pivot.pivot_cam,
     )
-    _require_fit(start.sigma)
-    adjusted = adjust(camera, pen, pixels, start, assumptions)
+    require_fit(start.sigma)
+    adjusted = adjust(rig, pen, pixels, start, assumptions, places)
     bundle, fitted = adjusted.bundle, adjusted.bundle.state
-    fitted_camera = fitted.rig.cameras[0]
     joint = joint_at(
-        fitted_camera,
-        fitted.pen,
-        pixels,
+        ContactModel(fitted.rig, fitted.pen, pixels),
         fitted.rotations,
         fitted.tip_pen,
         fitted.cone_rig,
-        bundle.used[:, 0],
+        bundle.used.reshape(len(chosen), -1),
     )
-    reasons[chosen[~joint.used.any(axis=1)]] = Reason.MISFIT
+    poses = parts[0].poses.of(np.searchsorted(parts[0].posed, of_first))
     paper_poses = fit_paper_poses(
-        camera, pen, pixels, poses.rotations, poses.translations
+        rig.cameras[0],
+        pen,
+        seen_by_all[of_first, 0],
+        poses.rotations,
+        poses.translations,
     )
     two_stage = fit_two_stage(paper_poses.rotations, paper_poses.translations)
-
-    n_images, n_leds = observations.pixels.shape[:2]
-    tips_cam = np.full((n_images, 3), np.nan)
-    refined = fit_poses(
-        fitted_camera,
-        fitted.pen,
-        observations.pixels[posed],
-        all_poses.rotations,
-        all_poses.translations,
+    refined = [
+        fit_poses(
+            fitted.rig.cameras[c],
+            fitted.pen,
+            seen_by_all[part.posed, c],
+            part.poses.rotations,
+            part.poses.translations,
+        )
+        for c, part in enumerate(parts)
+    ]
+    single = joined(fitted.rig, refined)
+    cameras = tuple(
+        _images_of_camera(
+            observations[c],
+            reasons[c],
+            part,
+            refined[c],
+            joint.of_camera(c, pen.n_leds),
+            chosen,
+        )
+        for c, part in enumerate(parts)
     )
-    tips_cam[posed] = refined.rotations @ joint.tip_pen + refined.translations
-    rms = np.full(n_images, np.nan)
-    rms[posed] = refined.rms
-    rms[chosen] = joint.image_rms
-    leds_used = np.zeros((n_images, n_leds), dtype=bool)
-    leds_used[chosen] = joint.used
+    moments = _moments(cameras)
     return Calibration(
-        observations=observations,
-        reasons=tuple(reasons),
-        used=reasons == Reason.NONE,
-        tips_cam=tips_cam,
-        rms=rms,
-        leds_used=leds_used,
+        cameras=cameras,
+        reasons=moments,
+        used=np.array([reason is Reason.NONE for reason in moments]),
+        tips_cam=single.rotations @ joint.tip_pen + single.translations,
+        rms=_rms_of_moments(cameras),
         joint=joint,
         bundle=bundle,
         priors=adjusted.priors,
@@ -205,75 +273,90 @@ def calibrate(
         ),
         budget=combine(adjusted, joint),
         halves=compare_halves(joint),
-        leds=measure_leds(fitted_camera, pen, pixels, joint),
+        leds=measure_leds(fitted.rig, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),
+        lags=lags,
     )
 
 
-def _smeared(observations: Observations) -> BoolArray:
-    """Return which images have clearly wider LED rims than most."""
-    widths = observations.edge_widths
-    known = widths[np.isfinite(widths)]
-    usual = np.median(known) if len(known) else np.inf
-    return np.asarray(np.nan_to_num(widths) > SMEARED * usual)
+def _images_of_camera(
+    observations: Observations,
+    reasons: npt.NDArray[np.object_],
+    part: PosedImages,
+    refined: Poses,
+    own: JointFit,
+    chosen: IntArray,
+) -> CameraImages:
+    """Return what became of a camera's images.
 
-
-def _require_fit(sigma: float) -> None:
-    if sigma > MAX_SIGMA:
-        raise CalibrationError(
-            sentence(
-                "calibrate.leds-do-not-fit",
-                "The LED positions do not fit the images: {sigma:.1f} px, {usual} "
-                "px or less is usual. Check that the pen file is of this pen with "
-                "its LEDs in order, and the camera file of this camera.",
-                sigma=sigma,
-                usual=USUAL_SIGMA,
-            )
-        )
-
-
-def _fitting(poses: Poses) -> BoolArray:
-    """Return which images have a pose that most of their LEDs agree with."""
-    n_seen = (poses.weights > 0).sum(axis=1)
-    n_trusted = (poses.weights > TRUSTED_WEIGHT).sum(axis=1)
-    return np.asarray((n_trusted >= MIN_POSE_LEDS) & (2 * n_trusted > n_seen))
-
-
-def _require_images(
-    chosen: IntArray, reasons: npt.NDArray[np.object_], advice: Sentence | None
-) -> None:
-    if len(chosen) >= MIN_IMAGES:
-        return
-    left_out = tuple(
-        sentence(
-            "calibrate.images-of-a-reason",
-            "{n_images} {reason}",
-            n_images=int(np.sum(reasons == reason)),
-            reason=reason.words,
-        )
-        for reason in Reason
-        if reason and np.any(reasons == reason)
+    ``own`` is the joint fit, of the moments ``chosen``, with this camera's residuals;
+    an image that was kept but of which it uses no LED is put down as a misfit.
+    """
+    kept = reasons[chosen] == Reason.NONE
+    reasons[chosen[kept & ~own.used.any(axis=1)]] = Reason.MISFIT
+    rms = np.full(len(reasons), np.nan)
+    rms[part.posed] = refined.rms
+    rms[chosen[kept]] = own.image_rms[kept]
+    leds_used = np.zeros(observations.pixels.shape[:2], dtype=bool)
+    leds_used[chosen] = own.used
+    return CameraImages(
+        observations=observations,
+        reasons=tuple(reasons),
+        rms=rms,
+        leds_used=leds_used,
+        total_rms=own.rms if own.used.any() else float("nan"),
     )
-    usable = sentence(
-        "calibrate.images-usable",
-        "{n_usable} of {n_images} images are usable",
-        n_usable=len(chosen),
-        n_images=len(reasons),
-    )
-    if left_out:
-        usable = sentence(
-            "calibrate.images-left-out",
-            "{usable} (left out: {left_out})",
-            usable=usable,
-            left_out=left_out,
-        )
-    more = sentence("calibrate.capture-more", "Capture more images.")
-    raise CalibrationError(
-        sentence(
-            "calibrate.too-few-images",
-            "{usable}; the tip needs at least {needed}. {advice}",
-            usable=usable,
-            needed=MIN_IMAGES,
-            advice=advice or more,
-        )
-    )
+
+
+def _telling(parts: Sequence[PosedImages], kept: BoolArray) -> list[IntArray]:
+    """Return which poses of each camera tell that of a moment.
+
+    Those of images that were left out do only where no other image of the moment takes
+    part.
+    """
+    none_kept = ~kept.any(axis=1)
+    return [
+        np.flatnonzero(kept[part.posed, c] | none_kept[part.posed])
+        for c, part in enumerate(parts)
+    ]
+
+
+def _of_camera(rig: Rig, c: int, work: Callable[[], PosedImages]) -> PosedImages:
+    """Return what the work on one camera's images gives; an error names the camera."""
+    try:
+        return work()
+    except CalibrationError as error:
+        if rig.n_cameras == 1:
+            raise
+        raise CalibrationError(of_camera(rig.names[c], error.sentence)) from error
+
+
+def _with_slips(parts: Sequence[PosedImages]) -> list[npt.NDArray[np.object_]]:
+    """Return the reasons of each camera's images: a tip slips before all of them."""
+    reasons = [part.reasons.copy() for part in parts]
+    slipped = np.any([each == Reason.SLIPPED for each in reasons], axis=0)
+    for each in reasons:
+        each[slipped & (each == Reason.NONE)] = Reason.SLIPPED
+    return reasons
+
+
+def _moments(cameras: Sequence[CameraImages]) -> tuple[Reason, ...]:
+    """Return why each moment is left out; NONE where a camera's image takes part."""
+    found = []
+    for reasons in zip(*(each.reasons for each in cameras), strict=True):
+        there = [reason for reason in reasons if reason is not Reason.ABSENT]
+        found.append(Reason.NONE if Reason.NONE in there else there[0])
+    return tuple(found)
+
+
+def _rms_of_moments(cameras: Sequence[CameraImages]) -> FloatArray:
+    """Return the rms residual of the images of each moment, px, (N,)."""
+    rms = np.stack([each.rms for each in cameras], axis=1)
+    known = np.isfinite(rms)
+    seen = np.stack([each.observations.pixels[..., 0] for each in cameras], axis=1)
+    counts = np.where(known, np.isfinite(seen).sum(axis=2), 0)
+    clean = np.where(known, rms, 0.0)
+    mean = np.sum(counts * clean**2, axis=1) / np.maximum(counts.sum(axis=1), 1)
+    alone = known.sum(axis=1) == 1
+    together = np.where(alone, clean.sum(axis=1), np.sqrt(mean))
+    return np.where(known.any(axis=1), together, np.nan)

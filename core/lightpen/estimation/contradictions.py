@@ -43,6 +43,10 @@ class Contradiction:
         What the images say without it, likewise.
     deviations : float
         How many standard deviations lie between them.
+    camera : str
+        Of a rig, which the file is about; empty of a camera alone.
+    of_rig : bool
+        Whether it is the rig's file that says so, and not the camera's.
     """
 
     what: Sentence
@@ -52,30 +56,56 @@ class Contradiction:
     wanted: float
     wanted_uncertainty: float
     deviations: float
+    camera: str = ""
+    of_rig: bool = False
 
     @property
     def sentence(self) -> Sentence:
         """It in words, with what to do."""
+        said: dict[str, Sentence | str | float] = {
+            "what": self.what,
+            "wanted": self.wanted,
+            "wanted_u": self.wanted_uncertainty,
+            "stated": self.stated,
+            "stated_u": self.stated_uncertainty,
+            "unit": f" {self.unit}" if self.unit else "",
+        }
+        if not self.camera:
+            return sentence(
+                "warning.camera-file-contradicted",
+                "The images contradict the camera file: they want the {what} to be "
+                "{wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says {stated:.6g} "
+                "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this camera, "
+                "lens and focus, or calibrate the camera again.",
+                **said,
+            )
+        if not self.of_rig:
+            return sentence(
+                "warning.camera-file-of-rig-contradicted",
+                "The images contradict the file of camera {camera}: they want the "
+                "{what} to be {wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says "
+                "{stated:.6g} \u00b1 {stated_u:.2g}{unit}. Check that the file is of "
+                "this camera, lens and focus, or calibrate the camera again.",
+                camera=self.camera,
+                **said,
+            )
         return sentence(
-            "warning.camera-file-contradicted",
-            "The images contradict the camera file: they want the {what} to be "
-            "{wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says {stated:.6g} "
-            "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this camera, lens "
-            "and focus, or calibrate the camera again.",
-            what=self.what,
-            wanted=self.wanted,
-            wanted_u=self.wanted_uncertainty,
-            stated=self.stated,
-            stated_u=self.stated_uncertainty,
-            unit=f" {self.unit}" if self.unit else "",
+            "warning.rig-file-contradicted",
+            "The images contradict the rig file: of camera {camera} they want the "
+            "{what} to be {wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says "
+            "{stated:.6g} \u00b1 {stated_u:.2g}{unit}. Check that no camera was moved "
+            "since, or calibrate the rig again.",
+            camera=self.camera,
+            **said,
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _Entry:
-    """A combination of intrinsics that people know by a name.
+    """A combination of unknowns that people know by a name.
 
-    ``by`` takes it from intrinsics, ``along`` moves them by one unit of it; (n,) each.
+    ``by`` takes it from the unknowns, ``along`` moves them by one of it, (n,) each;
+    ``size`` is what that is in its unit.
     """
 
     what: Sentence
@@ -83,12 +113,17 @@ class _Entry:
     value: float
     by: FloatArray
     along: FloatArray
+    size: float = 1.0
+    camera: str = ""  # of the rig, if its file says so
 
 
 def find_contradictions(
     rig: Rig, bundle: Bundle, priors: Priors
 ) -> tuple[tuple[Contradiction, ...], Priors]:
-    """Find what the images say against the intrinsics of each camera.
+    """Find what the images say against the file of a camera, or of the rig.
+
+    Of several files that are contradicted it is the one that is so most, and of a rig's
+    the one number: it may be what moves the others.
 
     Returns
     -------
@@ -97,43 +132,108 @@ def find_contradictions(
     priors : Priors
         Without what was contradicted.
     """
-    found: list[Contradiction] = []
-    cameras = list(priors.cameras)
-    for c, (camera, place) in enumerate(
-        zip(rig.cameras, bundle.columns.cameras, strict=True)
-    ):
-        # As it was fitted with: what a file has as exact is let be off by rounding.
-        prior = inverse(bundle.prior_information[place, place])
-        posterior = bundle.covariance[place, place]
-        for entry in _entries(camera):
-            before = float(entry.by @ prior @ entry.by)
-            after = float(entry.by @ posterior @ entry.by)
-            learned = before - after
-            if learned <= 1e-6 * before:
-                continue
-            change = float(entry.by @ bundle.values[place])
-            deviations = abs(change) / np.sqrt(learned)
-            if deviations <= LIMIT:
-                continue
-            own = before * after / learned  # variance by the images alone
-            wanted = entry.value + change * before / learned
-            found.append(
-                Contradiction(
-                    what=entry.what,
-                    unit=entry.unit,
-                    stated=entry.value,
-                    stated_uncertainty=2 * float(np.sqrt(before)),
-                    wanted=wanted,
-                    wanted_uncertainty=2 * float(np.sqrt(own)),
-                    deviations=float(deviations),
-                )
+    files = [_of_camera(rig, c, bundle, priors) for c in range(rig.n_cameras)]
+    if priors.extrinsics is not None:
+        place, stated = bundle.columns.extrinsics, priors.extrinsics
+        each = [_denied([entry], bundle, place, stated) for entry in _places(rig)]
+        denied, extrinsics = max(each, key=_most)
+        files.append((denied, replace(priors, extrinsics=extrinsics)))
+    found, freed = max(files, key=_most)
+    return tuple(found), freed
+
+
+def _most(denied: tuple[list[Contradiction], object]) -> float:
+    """Return by how many standard deviations something is contradicted at most."""
+    return max((each.deviations for each in denied[0]), default=0.0)
+
+
+def _of_camera(
+    rig: Rig, c: int, bundle: Bundle, priors: Priors
+) -> tuple[list[Contradiction], Priors]:
+    """Return what is contradicted of a camera's file, and the priors without it."""
+    place, cameras = bundle.columns.cameras[c], list(priors.cameras)
+    denied, cameras[c] = _denied(_entries(rig.cameras[c]), bundle, place, cameras[c])
+    name = rig.names[c] if rig.names else ""
+    named = [replace(each, camera=name) for each in denied]
+    return named, replace(priors, cameras=tuple(cameras))
+
+
+def _denied(
+    entries: list[_Entry], bundle: Bundle, place: slice, stated: Prior
+) -> tuple[list[Contradiction], Prior]:
+    """Return what is contradicted of unknowns, and their prior that lets go of it."""
+    # As it was fitted with: what a file has as exact is let be off by rounding.
+    prior = inverse(bundle.prior_information[place, place])
+    posterior = bundle.covariance[place, place]
+    found = []
+    for entry in entries:
+        before = float(entry.by @ prior @ entry.by)
+        after = float(entry.by @ posterior @ entry.by)
+        learned = before - after
+        if learned <= 1e-6 * before:
+            continue
+        change = float(entry.by @ bundle.values[place])
+        deviations = abs(change) / np.sqrt(learned)
+        if deviations <= LIMIT:
+            continue
+        own = before * after / learned  # variance by the images alone
+        wanted = entry.value + entry.size * change * before / learned
+        found.append(
+            Contradiction(
+                what=entry.what,
+                unit=entry.unit,
+                stated=entry.value,
+                stated_uncertainty=2 * entry.size * float(np.sqrt(before)),
+                wanted=wanted,
+                wanted_uncertainty=2 * entry.size * float(np.sqrt(own)),
+                deviations=float(deviations),
+                camera=entry.camera,
+                of_rig=bool(entry.camera),
             )
-            freed = (RELEASED * (wanted - entry.value)) ** 2
-            freed_covariance = freed * np.outer(entry.along, entry.along)
-            cameras[c] = Prior(
-                cameras[c].covariance + freed_covariance, cameras[c].assumed
-            )
-    return tuple(found), replace(priors, cameras=tuple(cameras))
+        )
+        freed = (RELEASED * (wanted - entry.value) / entry.size) ** 2
+        freed_covariance = freed * np.outer(entry.along, entry.along)
+        stated = replace(stated, covariance=stated.covariance + freed_covariance)
+    return found, stated
+
+
+def _places(rig: Rig) -> list[_Entry]:
+    """Return what the rig's file says of all cameras but the first."""
+    n = 6 * (rig.n_cameras - 1)
+    unit = np.eye(n)
+    entries = []
+    for c in range(1, rig.n_cameras):
+        for k, axis in enumerate("xyz"):
+            row = 6 * (c - 1) + k
+            turn, shift = unit[row], unit[row + 3]
+            entries += [
+                _Entry(
+                    sentence(
+                        "file.rig-turn",
+                        "further turn of cam_from_rig about {axis}",
+                        axis=axis,
+                    ),
+                    "deg",
+                    0.0,
+                    turn,
+                    turn,
+                    size=float(np.degrees(1.0)),
+                    camera=rig.names[c],
+                ),
+                _Entry(
+                    sentence(
+                        "file.rig-translation",
+                        "translation of cam_from_rig along {axis}",
+                        axis=axis,
+                    ),
+                    "mm",
+                    float(rig.translations[c, k]),
+                    shift,
+                    shift,
+                    camera=rig.names[c],
+                ),
+            ]
+    return entries
 
 
 def _entries(camera: Camera) -> list[_Entry]:

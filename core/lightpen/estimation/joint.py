@@ -5,10 +5,11 @@ rotation an image. LED j of image i lies at
 
     X_ij = R_i (x_j - x0) + u0
 
-so the contact of tip and cone is built in and an image costs three unknowns, not six.
-The reprojection errors of the ellipse centres are minimised by Gauss-Newton. The
-rotations are eliminated image by image (Schur complement [1]_), which leaves a system
-of six equations and, from each image, what it says of tip and cone.
+in the frame of the camera, or of the rig where several cameras look at once. So the
+contact of tip and cone is built in and an image costs three unknowns, not six. The
+reprojection errors of the ellipse centres are minimised by Gauss-Newton. The rotations
+are eliminated image by image (Schur complement [1]_), which leaves a system of six
+equations and, from each image, what it says of tip and cone.
 
 LEDs are weighed by a Cauchy loss until the iteration settles; it ends as least squares
 on the LEDs within the gate, which loses nothing on normal noise.
@@ -19,7 +20,7 @@ References
    298-372, section 6.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from lightpen.detection.pose import (
 from lightpen.errors import CalibrationError
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.sentences import sentence
 
@@ -55,11 +57,12 @@ class JointFit:
     tip_pen : (3,) array
         Tip in the pen frame, mm.
     cone_cam : (3,) array
-        Cone point in the camera frame, mm.
+        Cone point in the frame of the camera, or of the rig, mm.
     rotations : (N, 3, 3) array
-        Of cam_from_pen.
+        Of cam_from_pen, or rig_from_pen.
     residuals : (N, L, 2) array
-        Observed minus modelled ellipse centres, px; NaN where an LED was not seen.
+        Observed minus modelled ellipse centres, px; NaN where an LED was not seen. Of
+        C cameras (N, C L, 2): the LEDs of one camera after those of the other.
     used : (N, L) array of bool
         LEDs within the gate; none of an image that has fewer than three.
     sigma : float
@@ -98,6 +101,11 @@ class JointFit:
         means = squares.sum(axis=1) / np.maximum(n_used, 1)
         return np.where(n_used > 0, np.sqrt(means), np.nan)
 
+    def of_camera(self, c: int, n_leds: int) -> "JointFit":
+        """Return the fit with the residuals of the c-th camera alone."""
+        own = slice(c * n_leds, (c + 1) * n_leds)
+        return replace(self, residuals=self.residuals[:, own], used=self.used[:, own])
+
     @property
     def translations(self) -> FloatArray:
         """Translations of cam_from_pen that put the tip into the cone, (N, 3), mm."""
@@ -128,8 +136,18 @@ def fit_joint(
     CalibrationError
         The iteration does not settle.
     """
-    model = ContactModel(camera, pen, pixels)
-    state = model.at(rotations, tip_pen, cone_cam)
+    model = ContactModel.of(camera, pen, pixels)
+    return fit_contact(model, rotations, tip_pen, cone_cam)
+
+
+def fit_contact(
+    model: "ContactModel",
+    rotations: FloatArray,
+    tip_pen: FloatArray,
+    cone_rig: FloatArray,
+) -> JointFit:
+    """Fit tip and cone to what the cameras of a rig see; see `fit_joint`."""
+    state = model.at(rotations, tip_pen, cone_rig)
     state = _descend(model, state, None, SETTLED)
     for _ in range(MAX_GATINGS):
         used = gate(state.residuals)
@@ -140,27 +158,22 @@ def fit_joint(
 
 
 def joint_at(
-    camera: Camera,
-    pen: Pen,
-    pixels: FloatArray,
+    model: "ContactModel",
     rotations: FloatArray,
     tip_pen: FloatArray,
-    cone_cam: FloatArray,
+    cone_rig: FloatArray,
     used: BoolArray,
 ) -> JointFit:
     """Return what a joint fit is at a solution that was found otherwise.
 
     Parameters
     ----------
-    pixels : (N, L, 2) array
-        px; NaN where an LED was not seen.
-    rotations, tip_pen, cone_cam : (N, 3, 3), (3,) and (3,) array
+    rotations, tip_pen, cone_rig : (N, 3, 3), (3,) and (3,) array
         The solution.
-    used : (N, L) array of bool
+    used : (N, C L) array of bool
         LEDs that count.
     """
-    state = ContactModel(camera, pen, pixels).at(rotations, tip_pen, cone_cam)
-    return _fit_from(state, used)
+    return _fit_from(model.at(rotations, tip_pen, cone_rig), used)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +184,9 @@ class Linearised:
     ----------
     rotations, tip_pen, cone_cam : (N, 3, 3), (3,), (3,) array
         The state.
-    residuals : (N, L, 2) array
+    residuals : (N, C L, 2) array
         Observed minus modelled, px.
-    jacobian : (N, L, 2, 9) array
+    jacobian : (N, C L, 2, 9) array
         d pixel by the image's rotation vector (left), tip and cone; rad, mm.
     """
 
@@ -190,30 +203,53 @@ class ContactModel:
 
     Attributes
     ----------
-    pixels : (N, L, 2) array
+    pixels : (N, C, L, 2) array
         Observed ellipse centres, px; NaN where an LED was not seen.
     """
 
-    camera: Camera
+    rig: Rig
     pen: Pen
     pixels: FloatArray
 
+    @classmethod
+    def of(cls, camera: Camera, pen: Pen, pixels: FloatArray) -> "ContactModel":
+        """Return that of one camera, which saw pixels (N, L, 2)."""
+        return cls(rig_of(camera), pen, pixels[:, None])
+
     def at(
-        self, R: FloatArray, tip_pen: FloatArray, cone_cam: FloatArray
+        self, R: FloatArray, tip_pen: FloatArray, cone_rig: FloatArray
     ) -> Linearised:
         """Return the model around rotations (N, 3, 3), tip (3,) and cone (3,)."""
-        lever = (self.pen.leds - tip_pen) @ np.swapaxes(R, 1, 2)
-        residuals, J = disc_residuals(
-            self.camera,
-            lever,
-            lever + cone_cam,
-            self.pen.normals @ np.swapaxes(R, 1, 2),
-            self.pen.diameter / 2,
-            self.pixels,
+        views = [self._view(c, R, tip_pen, cone_rig) for c in range(self.rig.n_cameras)]
+        residuals, J = (
+            np.concatenate(parts, axis=1) for parts in zip(*views, strict=True)
         )
         by_tip = -J[..., 3:] @ R[:, None]
         jacobian = np.concatenate([J[..., :3], by_tip, J[..., 3:]], axis=3)
-        return Linearised(R, tip_pen, cone_cam, residuals, jacobian)
+        return Linearised(R, tip_pen, cone_rig, residuals, jacobian)
+
+    def _view(
+        self, c: int, R: FloatArray, tip_pen: FloatArray, cone_rig: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return residuals, and the Jacobian by rotation and cone of the rig."""
+        rig, cone = self.rig, cone_rig
+        if c > 0:
+            R = rig.rotations[c] @ R
+            cone = rig.rotations[c] @ cone_rig + rig.translations[c]
+        lever = (self.pen.leds - tip_pen) @ np.swapaxes(R, 1, 2)
+        residuals, J = disc_residuals(
+            rig.cameras[c],
+            lever,
+            lever + cone,
+            self.pen.normals @ np.swapaxes(R, 1, 2),
+            self.pen.diameter / 2,
+            self.pixels[:, c],
+        )
+        if c > 0:
+            J = np.concatenate(
+                [J[..., :3] @ rig.rotations[c], J[..., 3:] @ rig.rotations[c]], axis=3
+            )
+        return residuals, J
 
 
 @dataclass(frozen=True, eq=False)

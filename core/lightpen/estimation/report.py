@@ -1,7 +1,6 @@
 """A calibration as a JSON record."""
 
 import json
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -10,9 +9,16 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
-from lightpen.estimation.contradictions import COEFFICIENTS
+from lightpen.detection.reasons import Reason
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
+from lightpen.estimation.rig_report import (
+    count_dropped,
+    intrinsics_record,
+    rig_record,
+    rig_warnings,
+)
+from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
@@ -104,7 +110,7 @@ def calibration_record(
         "images": {
             "total": len(calibration.used),
             "used": int(calibration.used.sum()),
-            "dropped": dict(count_dropped(calibration)),
+            "dropped": dict(count_dropped(calibration.reasons)),
         },
         "methods": _methods(calibration),
         "verdict": _verdict(calibration, limits),
@@ -117,10 +123,12 @@ def calibration_record(
         },
         "coverage": _coverage(calibration),
         "leds": _leds(calibration),
+        **_rig(calibration),
         "inputs": {
             "camera": _input(inputs.camera),
             "pen": _input(inputs.pen),
             "observations": [_input(file) for file in inputs.observations],
+            **_rig_inputs(inputs),
         },
         "frames": _frames(calibration),
     }
@@ -195,6 +203,7 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
     """Return what the user should look into, one sentence or two each."""
     leds, sigma = calibration.leds, calibration.joint.sigma
     warnings = [
+        *rig_warnings(calibration),
         *(each.sentence for each in calibration.contradictions),
         *_seat_warnings(calibration),
     ]
@@ -282,17 +291,29 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     return warnings
 
 
-def count_dropped(calibration: Calibration) -> Counter[str]:
-    """Return how many images do not take part, by reason."""
-    return Counter(str(reason) for reason in calibration.reasons if reason)
-
-
 def _program() -> dict[str, str]:
     return {"name": "lightpen", "version": version("lightpen")}
 
 
 def _input(file: InputFile) -> dict[str, str]:
     return {"file": file.path.name, "sha256": file.sha256}
+
+
+def _rig_inputs(inputs: Inputs) -> dict[str, Any]:
+    """Return the further files of several cameras; nothing of one camera."""
+    if inputs.rig is None:
+        return {}
+    return {
+        "rig": _input(inputs.rig.rig),
+        "cameras": [_input(file) for file in inputs.rig.cameras],
+    }
+
+
+def _rig(calibration: Calibration) -> dict[str, Any]:
+    """Return what is told of each of several cameras; nothing of one camera."""
+    if len(calibration.cameras) == 1:
+        return {}
+    return {"rig": rig_record(calibration)}
 
 
 def _verdict(calibration: Calibration, limits: SwingLimits) -> dict[str, Any]:
@@ -366,27 +387,13 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
 
 def _adjusted(calibration: Calibration) -> dict[str, Any]:
     """Return what the images made of the files."""
-    fitted = calibration.bundle.state
-    camera, place = fitted.rig.cameras[0], calibration.bundle.columns.cameras[0]
-    deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
     prior = calibration.priors.cameras[0]
-    before = np.sqrt(np.diag(prior.covariance))
-    names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
     return {
-        "intrinsics": {
-            name: {
-                "value": value,
-                "standard_uncertainty": deviation,
-                "standard_uncertainty_before": known,
-            }
-            for name, value, deviation, known in zip(
-                names, camera.intrinsics, deviations, before, strict=False
-            )
-        },
+        "intrinsics": intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
         "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
-        "disc_diameter_mm": fitted.pen.diameter,
+        "disc_diameter_mm": calibration.bundle.state.pen.diameter,
         "contradictions": [
             {
                 "what": str(each.what),
@@ -396,6 +403,7 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
                 "wanted": each.wanted,
                 "wanted_expanded_uncertainty": each.wanted_uncertainty,
                 "standard_deviations": each.deviations,
+                **({"camera": each.camera} if each.camera else {}),
             }
             for each in calibration.contradictions
         ],
@@ -438,33 +446,39 @@ def _leds(calibration: Calibration) -> list[dict[str, Any]]:
 
 
 def _frames(calibration: Calibration) -> list[dict[str, Any]]:
-    observations = calibration.observations
-    seen = np.isfinite(observations.seen_pixels[..., 0]).tolist()
-    pixels = observations.seen_pixels.tolist()
-    leds_used = calibration.leds_used.tolist()
-    return [
-        {
-            "file": observations.names[i],
-            "used": used,
-            "reason": str(calibration.reasons[i]),
-            "detail": str(observations.details[i] or ""),
-            "rms_px": rms,
-            "tip_cam_mm": tip,
-            "leds": [
-                {"led": j + 1, "x_px": x, "y_px": y, "used": leds_used[i][j]}
-                for j, (x, y) in enumerate(pixels[i])
-                if seen[i][j]
-            ],
-        }
-        for i, (used, rms, tip) in enumerate(
-            zip(
-                calibration.used.tolist(),
-                calibration.rms.tolist(),
-                calibration.tips_cam.tolist(),
-                strict=True,
-            )
-        )
-    ]
+    frames = []
+    tips = calibration.tips_cam.tolist()
+    for c, images in enumerate(calibration.cameras):
+        observations = images.observations
+        seen = np.isfinite(observations.seen_pixels[..., 0]).tolist()
+        pixels = observations.seen_pixels.tolist()
+        leds_used = images.leds_used.tolist()
+        rms = images.rms.tolist()
+        frames += [
+            {
+                **_camera_of(calibration, c, i),
+                "file": observations.names[i],
+                "used": reason is Reason.NONE,
+                "reason": str(reason),
+                "detail": str(observations.details[i] or ""),
+                "rms_px": rms[i],
+                "tip_cam_mm": tips[i],
+                "leds": [
+                    {"led": j + 1, "x_px": x, "y_px": y, "used": leds_used[i][j]}
+                    for j, (x, y) in enumerate(pixels[i])
+                    if seen[i][j]
+                ],
+            }
+            for i, reason in enumerate(images.reasons)
+            if reason is not Reason.ABSENT
+        ]
+    return frames
+
+
+def _camera_of(calibration: Calibration, c: int, moment: int) -> dict[str, Any]:
+    """Return which of several cameras took an image, and when; nothing of one."""
+    names = calibration.bundle.state.rig.names
+    return {"camera": names[c], "moment": moment + 1} if names else {}
 
 
 def _dumps(value: Any) -> str:

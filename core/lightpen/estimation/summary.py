@@ -8,10 +8,10 @@ from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCal
 from lightpen.estimation.report import (
     METHODS,
     MethodResult,
-    count_dropped,
     result_of,
     warnings_of,
 )
+from lightpen.estimation.rig_report import count_dropped, named_images, rig_lines
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import Verdict
 
@@ -35,7 +35,9 @@ def calibration_text(
     if nominal_tip is not None:
         lines.append(_numbers("nominal", nominal_tip))
         lines.append(_numbers("change from nominal", chosen.tip_pen - nominal_tip))
-    lines += ["", _heading("Cone in the camera frame, mm", "uvw")]
+    names = calibration.bundle.state.rig.names
+    frame = f"frame of {names[0]}" if names else "camera frame"
+    lines += ["", _heading(f"Cone in the {frame}, mm", "uvw")]
     lines.append(_numbers(method, chosen.cone_cam))
     lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
     lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
@@ -77,17 +79,16 @@ def pivot_text(calibration: PivotCalibration) -> str:
 
 def _image_lines(calibration: Calibration) -> list[str]:
     n_used = int(calibration.used.sum())
-    lines = [f"Images       {n_used} of {len(calibration.used)} used"]
-    for reason, count in count_dropped(calibration).items():
-        names = [
-            name
-            for name, why in zip(
-                calibration.observations.names, calibration.reasons, strict=True
-            )
-            if why == reason
-        ]
-        shown = ", ".join(names[:5]) + (", ..." if count > 5 else "")
-        lines.append(f"  dropped    {count} {reason}: {shown}")
+    n_images = len(calibration.used)
+    if len(calibration.cameras) > 1:
+        moments = f"Moments      {n_used} of {n_images} used"
+        return [moments, *rig_lines(calibration)]
+    images = calibration.cameras[0]
+    lines = [f"Images       {n_used} of {n_images} used"]
+    lines += [
+        f"  dropped    {count} {reason}: {named_images(images, reason)}"
+        for reason, count in count_dropped(images.reasons).items()
+    ]
     return lines
 
 

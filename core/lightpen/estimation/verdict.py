@@ -6,8 +6,10 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.calibrate import USUAL_SIGMA, Calibration
+from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.led_quality import DISPLACED
+from lightpen.estimation.rig_report import late_cameras
+from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import Halves, ShareName
 from lightpen.messages import (
     Code,
@@ -132,6 +134,7 @@ _NEXT_STEPS = {
     Code.FILE_UNCERTAIN: NextStep.CHECK_FILES,
     Code.FILE_ASSUMED: NextStep.CHECK_FILES,
     Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
+    Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
 }
 
 
@@ -213,6 +216,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         usual = calibration.halves.expanded_uncertainty[worst]
         differ = halves_differ(float(differences[worst]), float(usual))
         return Verdict(Grade.CHECK, differ)
+    late = late_cameras(calibration)
+    if late:
+        return Verdict(Grade.CHECK, late[0])
     if calibration.contradictions:
         worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
         return Verdict(Grade.CHECK, file_contradicted(worst_one.sentence))

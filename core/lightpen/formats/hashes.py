@@ -17,12 +17,22 @@ class InputFile:
     sha256: str
 
 
+@dataclass(frozen=True)
+class RigInputs:
+    """The files of several cameras: that of the rig, and one a camera."""
+
+    rig: InputFile
+    cameras: tuple[InputFile, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Inputs:
     """What a calibration was made from.
 
     Attributes
     ----------
+    camera : InputFile
+        Of the first camera, if there are several.
     observations : tuple of InputFile
         The images, the video or the file of LED centres.
     nominal_tip : (3,) array or None
@@ -33,6 +43,7 @@ class Inputs:
     pen: InputFile
     observations: tuple[InputFile, ...]
     nominal_tip: FloatArray | None
+    rig: RigInputs | None = None
 
 
 def hashed(path: Path) -> InputFile:

@@ -56,7 +56,7 @@ def find_images(*places: str) -> ImageSource:
         There is nothing there, or no image, or it may not be looked at.
     """
     if len(places) > 1:
-        return image_files(sorted(map(Path, places), key=_natural_order))
+        return image_files(sorted(map(Path, places), key=_by_name))
     path = Path(places[0])
     try:
         return _images_at(path, places[0])
@@ -74,6 +74,12 @@ def image_files(files: list[Path]) -> ImageSource:
             yield partial(read_image, file)
 
     return ImageSource(tuple(file.name for file in files), tuple(files), loaders)
+
+
+def natural_order(name: str) -> list[tuple[int, str]]:
+    """Return what sorts names as people do: 2 before 10."""
+    parts = re.split(r"(?a:(\d+))", name)  # text and digits take turns
+    return [(int(part), "") if i % 2 else (-1, part) for i, part in enumerate(parts)]
 
 
 def _images_at(path: Path, where: str) -> ImageSource:
@@ -106,7 +112,7 @@ def _images_at(path: Path, where: str) -> ImageSource:
                     place=printable(where),
                 )
             )
-    return image_files(sorted(files, key=_natural_order))
+    return image_files(sorted(files, key=_by_name))
 
 
 def _image_files_in(folder: Path) -> list[Path]:
@@ -119,6 +125,5 @@ def _video(path: Path) -> ImageSource:
     return ImageSource(names, (path,), partial(frame_loaders, path, n_frames))
 
 
-def _natural_order(path: Path) -> list[tuple[int, str]]:
-    parts = re.split(r"(?a:(\d+))", path.name)  # text and digits take turns
-    return [(int(part), "") if i % 2 else (-1, part) for i, part in enumerate(parts)]
+def _by_name(path: Path) -> list[tuple[int, str]]:
+    return natural_order(path.name)

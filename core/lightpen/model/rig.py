@@ -4,12 +4,13 @@ The first camera is the reference: its frame is the frame of the rig. One camera
 is a rig of one.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
+from lightpen.sentences import Sentence, sentence
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,8 @@ class Rig:
     covariance : (6 (C - 1), 6 (C - 1)) array or None
         Of the rotation vectors (left, rad) and translations (mm) of all but the first
         camera, in this order camera by camera.
+    names : tuple of str
+        Of the cameras, for people; none of a camera alone.
 
     References
     ----------
@@ -37,6 +40,7 @@ class Rig:
     rotations: FloatArray
     translations: FloatArray
     covariance: FloatArray | None = None
+    names: tuple[str, ...] = ()
 
     @property
     def n_cameras(self) -> int:
@@ -47,3 +51,26 @@ class Rig:
 def rig_of(camera: Camera) -> Rig:
     """Return the rig of one camera alone."""
     return Rig((camera,), np.eye(3)[None], np.zeros((1, 3)))
+
+
+def from_first(rig: Rig) -> Rig:
+    """Return a rig that is given from elsewhere in the frame of its first camera.
+
+    Parameters
+    ----------
+    rig : Rig
+        Its cam_from_rig is cam_from_there; it has no covariance.
+    """
+    rotations = rig.rotations @ rig.rotations[0].T
+    return replace(
+        rig,
+        rotations=rotations,
+        translations=rig.translations - rotations @ rig.translations[0],
+    )
+
+
+def of_camera(name: str, trouble: Sentence) -> Sentence:
+    """Return what is wrong with a camera of a rig, its name before it."""
+    return sentence(
+        "rig.of-camera", "Camera {camera}: {trouble}", camera=name, trouble=trouble
+    )

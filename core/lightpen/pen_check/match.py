@@ -30,7 +30,7 @@ from lightpen.detection.pose import (
     robust_sigma,
 )
 from lightpen.detection.spots import Spots
-from lightpen.estimation.calibrate import USUAL_SIGMA
+from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen

@@ -179,7 +179,7 @@ def _all_residuals(
     others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):
         fitted = calibration.bundle.state
-        model = ContactModel(
+        model = ContactModel.of(
             fitted.rig.cameras[0], fitted.pen, observations.pixels[others]
         )
         residuals[others] = _turned_to_fit(
@@ -195,8 +195,8 @@ def _turned_to_fit(
     cone_cam: FloatArray,
 ) -> FloatArray:
     """Return the residuals of images turned about the tip until they fit best, px."""
-    weights = np.isfinite(model.pixels[..., 0]).astype(float)
     state = model.at(rotations, tip_pen, cone_cam)
+    weights = np.isfinite(state.residuals[..., 0]).astype(float)
     for _ in range(TURNS):
         turns = reduce(state, weights).turn
         rotations = rotation_from_vector(turns) @ rotations

@@ -4,8 +4,9 @@ Everything random comes from the generator the caller hands in, so that a seed g
 same data every time.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import disc_images, ellipse_centers
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
 from lightpen.simulator.postures import Postures, SwingKind, draw_postures
 
 PAPER_TIP = np.array([-1.3182, -90.4095, -23.8548])  # mm, the paper's result
@@ -133,6 +135,7 @@ def swing_poses(
     camera: Camera | None = None,
     tip_pen: FloatArray = PAPER_TIP,
     cone_cam: FloatArray = PAPER_CONE,
+    shows: Callable[[Swing], BoolArray] | None = None,
 ) -> Swing:
     """Return a swing with the tip in the cone.
 
@@ -147,9 +150,12 @@ def swing_poses(
         The paper's unless given.
     tip_pen, cone_cam : (3,) array
         Tip in the pen frame and bottom of the cone in the camera frame, mm.
+    shows : callable, optional
+        In which frames every LED is so; by default those that ``camera`` sees.
     """
     pen = pen or paper_pen()
     camera = camera or paper_camera()
+    shows = shows or partial(shows_all, camera, pen)
 
     def draw(n: int) -> Swing:
         return swing_from_postures(draw_postures(n, rng, kind), tip_pen, cone_cam)
@@ -159,7 +165,7 @@ def swing_poses(
     n_drawn = n_frames
     for _ in range(MAX_DOUBLINGS):
         swing = draw(n_drawn)
-        good = np.flatnonzero(_shows_all(camera, pen, swing))
+        good = np.flatnonzero(shows(swing))
         if len(good) >= n_frames:
             spread = good[np.arange(n_frames) * len(good) // max(n_frames, 1)]
             return select_frames(swing, spread)
@@ -206,6 +212,19 @@ def swing_from_postures(
         tips_cam = np.tile(cone_cam, (len(postures), 1))
     translations = tips_cam - rotations @ tip_pen
     return Swing(postures, rotations, translations, tip_pen, cone_cam, tips_cam)
+
+
+def seen_from(swing: Swing, R: FloatArray, t: FloatArray) -> Swing:
+    """Return the swing in the frame of another camera, in which p is at ``R p + t``."""
+    cone_cam = R @ swing.cone_cam + t
+    slipped = swing.tips_cam @ R.T + t
+    return replace(
+        swing,
+        rotations=R @ swing.rotations,
+        translations=swing.translations @ R.T + t,
+        cone_cam=cone_cam,
+        tips_cam=np.where(swing.slipped[:, None], slipped, cone_cam),
+    )
 
 
 def slip_tip(
@@ -285,6 +304,32 @@ def simulate_centers(
     seen = faces_camera(leds_cam, normals_cam) & _inside(camera, centers)
     noise = sigma * rng.standard_normal(centers.shape)
     return np.where(seen[..., None], centers + noise, np.nan)
+
+
+def simulate_rig_centers(
+    rig: Rig, pen: Pen, swing: Swing, sigma: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return measured centres of the LEDs in the images of several cameras.
+
+    Parameters
+    ----------
+    swing : Swing
+        In the frame that the rig is given from, F frames.
+    sigma : float
+        As for `simulate_centers`.
+
+    Returns
+    -------
+    (F, C, L, 2) array
+        px; NaN where missing.
+    """
+    views = []
+    stands = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
+    for camera, R, t in stands:
+        there = seen_from(swing, R, t)
+        poses = there.rotations, there.translations
+        views.append(simulate_centers(camera, pen, *poses, sigma, rng))
+    return np.stack(views, axis=1)
 
 
 def drop_centers(
@@ -386,7 +431,8 @@ def rim_gaps(
     return narrowest
 
 
-def _shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
+def shows_all(camera: Camera, pen: Pen, swing: Swing) -> BoolArray:
+    """Return in which frames every LED is whole and clear of the others, (F,)."""
     leds_cam, normals_cam = leds_in_camera(pen, swing.rotations, swing.translations)
     facing = faces_camera(leds_cam, normals_cam).all(axis=-1)
     radius = camera.fx * pen.diameter / 2 / leds_cam[..., 2].min()

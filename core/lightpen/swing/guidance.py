@@ -105,7 +105,7 @@ def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
         cam_from_pen.
     """
     none = np.zeros((len(rotations), outlook.pen.n_leds, 2))
-    model = ContactModel(outlook.camera, outlook.pen, none)
+    model = ContactModel.of(outlook.camera, outlook.pen, none)
     state = model.at(rotations, outlook.tip_pen, outlook.cone_cam)
     seen = usable_leds(outlook, rotations).astype(float)
     return np.asarray(reduce(state, seen).S / outlook.sigma**2)

@@ -30,7 +30,7 @@ from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
     perturbed_pen,
-    simulate_centers,
+    simulate_rig_centers,
     swing_poses,
 )
 
@@ -49,24 +49,6 @@ def pair(camera: Camera = CAMERA) -> Rig:
         np.stack([np.eye(3), turn]),
         np.stack([np.zeros(3), place]),
         np.diag(sigmas**2),
-    )
-
-
-def seen_by(
-    rig: Rig, pen: Pen, swing: Swing, sigma: float, rng: np.random.Generator
-) -> FloatArray:
-    """Return what each camera of a rig sees of a swing, (N, C, L, 2)."""
-    return np.stack(
-        [
-            simulate_centers(
-                *(camera, pen, R @ swing.rotations, swing.translations @ R.T + t),
-                *(sigma, rng),
-            )
-            for camera, R, t in zip(
-                rig.cameras, rig.rotations, rig.translations, strict=True
-            )
-        ],
-        axis=1,
     )
 
 
@@ -222,7 +204,7 @@ def test_elimination_is_the_schur_complement_of_the_normal_equations(
 ) -> None:
     rng = np.random.default_rng(1)
     swing = swing_poses(5, rng)
-    pixels = seen_by(rig, PEN, swing, 0.05, rng)
+    pixels = simulate_rig_centers(rig, PEN, swing, 0.05, rng)
     state = BundleState(rig, PEN, swing.tip_pen, swing.cone_cam, swing.rotations)
     views = views_at(state, pixels)
     used = np.isfinite(pixels[..., 0]) & (rng.random(pixels.shape[:-1]) < 0.9)
@@ -242,7 +224,7 @@ def test_elimination_is_the_schur_complement_of_the_normal_equations(
 def test_exact_centres_and_files_give_the_exact_tip(rig: Rig) -> None:
     rng = np.random.default_rng(2)
     swing = swing_poses(20, rng)
-    bundle = adjusted(rig, PEN, swing, seen_by(rig, PEN, swing, 0.0, rng))
+    bundle = adjusted(rig, PEN, swing, simulate_rig_centers(rig, PEN, swing, 0.0, rng))
 
     np.testing.assert_allclose(bundle.state.tip_pen, swing.tip_pen, atol=1e-6)
     np.testing.assert_allclose(bundle.state.cone_rig, swing.cone_cam, atol=1e-5)
@@ -256,7 +238,7 @@ def test_the_tip_and_the_cone_scatter_as_their_covariance_says() -> None:
     for seed in range(n_runs):
         rng = np.random.default_rng(seed)
         swing = swing_poses(40, rng)
-        pixels = seen_by(rig_of(CAMERA), PEN, swing, 0.03, rng)
+        pixels = simulate_rig_centers(rig_of(CAMERA), PEN, swing, 0.03, rng)
         assert CAMERA.covariance is not None
         drawn = rng.multivariate_normal(CAMERA.intrinsics, CAMERA.covariance)
         measured = replace(perturbed_pen(PEN, 0.01, rng), led_sigma=0.01)
@@ -290,7 +272,7 @@ def test_two_cameras_find_the_focal_length_of_one_that_is_off() -> None:
     for seed in range(n_runs):
         rng = np.random.default_rng(100 + seed)
         swing = swing_poses(60, rng)
-        pixels = seen_by(pair(), PEN, swing, 0.03, rng)
+        pixels = simulate_rig_centers(pair(), PEN, swing, 0.03, rng)
         off = with_intrinsics(CAMERA, CAMERA.intrinsics * ([1.001] * 2 + [1.0] * 7))
         rig = pair(replace(off, covariance=None))
         bundle = adjusted(rig, PEN, swing, pixels)

@@ -55,7 +55,7 @@ def test_exact_centres_give_the_exact_tip() -> None:
 
 def test_the_derivative_of_the_contact_model_agrees_with_differences() -> None:
     truth = swing(4)
-    model = ContactModel(CAMERA, PEN, np.zeros((4, PEN.n_leds, 2)))
+    model = ContactModel.of(CAMERA, PEN, np.zeros((4, PEN.n_leds, 2)))
     R, x0, u0 = truth.rotations, truth.tip_pen, truth.cone_cam
     J = model.at(R, x0, u0).jacobian
 

@@ -21,6 +21,7 @@ from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -88,7 +89,8 @@ def of_images(joint: JointFit, some: slice) -> JointFit:
 def budget_of(calibration: Calibration, joint: JointFit) -> Budget:
     """Return the budget with the blocks of another fit."""
     pixels = calibration.observations.pixels[calibration.used]
-    return combine(adjust(CAMERA, PEN, pixels, calibration.joint, USUAL), joint)
+    rig = rig_of(CAMERA)
+    return combine(adjust(rig, PEN, pixels[:, None], calibration.joint, USUAL), joint)
 
 
 def variance_of(budget: Budget, name: ShareName) -> FloatArray:

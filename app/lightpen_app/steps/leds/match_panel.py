@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.estimation.calibrate import USUAL_SIGMA
+from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.pen_check.match import Finding, PenMatch, What
 from lightpen.pen_check.shifts import MIN_SHIFT
 from lightpen_app.look.phrases import reason_text

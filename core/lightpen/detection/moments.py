@@ -1,0 +1,137 @@
+"""What several cameras show of the pen at the same moments."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.observations import (
+    Observations,
+    Report,
+    observe_centers,
+    observe_images,
+)
+from lightpen.detection.reasons import Reason
+from lightpen.errors import CalibrationError, FileError
+from lightpen.formats.images import ImageSource
+from lightpen.formats.observation_files import Centers
+from lightpen.formats.pairing import NONE, Pairing
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, of_camera
+from lightpen.sentences import Sentence, sentence
+
+
+def observe_rig_images(
+    sources: Sequence[ImageSource],
+    pairing: Pairing,
+    rig: Rig,
+    pen: Pen,
+    report: Report = lambda fraction: None,
+) -> tuple[Observations, ...]:
+    """Find and label the LEDs in the images of a rig; see `observe_images`.
+
+    Parameters
+    ----------
+    pairing : Pairing
+        Which images of the sources are of the same moment.
+
+    Returns
+    -------
+    tuple of Observations
+        Of each camera, all of the same moments.
+
+    Raises
+    ------
+    FileError, CalibrationError
+        As for one camera, which is named.
+    """
+    seen = []
+    for c, source in enumerate(sources):
+
+        def part(fraction: float, c: int = c) -> None:
+            report((c + fraction) / len(sources))
+
+        try:
+            seen.append(observe_images(source, rig.cameras[c], pen, part))
+        except FileError as error:
+            raise FileError(_with_exchange(rig, c, error.sentence)) from error
+        except CalibrationError as error:
+            trouble = of_camera(rig.names[c], error.sentence)
+            raise CalibrationError(trouble) from error
+    return at_moments(seen, pairing)
+
+
+def observe_rig_centers(
+    centers: Sequence[Centers], pairing: Pairing, rig: Rig, pen: Pen
+) -> tuple[Observations, ...]:
+    """Take LED centres that were found elsewhere; see `observe_centers`.
+
+    Raises
+    ------
+    FileError
+        As for one camera, which is named.
+    """
+    seen = []
+    for c, each in enumerate(centers):
+        try:
+            seen.append(observe_centers(each, rig.cameras[c], pen))
+        except FileError as error:
+            raise FileError(of_camera(rig.names[c], error.sentence)) from error
+    return at_moments(seen, pairing)
+
+
+def at_moments(
+    observations: Sequence[Observations], pairing: Pairing
+) -> tuple[Observations, ...]:
+    """Return observations of each camera with the images of a moment side by side.
+
+    Of a moment that a camera has no image of, the reason is `Reason.ABSENT`.
+    """
+    return tuple(
+        _rearranged(seen, pairing.images[:, c]) for c, seen in enumerate(observations)
+    )
+
+
+def _rearranged(seen: Observations, images: IntArray) -> Observations:
+    absent = images == NONE
+
+    def moved(values: FloatArray) -> FloatArray:
+        taken = values[images]
+        taken[absent] = np.nan
+        return taken
+
+    return replace(
+        seen,
+        names=tuple("" if i == NONE else seen.names[i] for i in images),
+        pixels=moved(seen.pixels),
+        seen_pixels=moved(seen.seen_pixels),
+        rotations=moved(seen.rotations),
+        translations=moved(seen.translations),
+        edge_widths=moved(seen.edge_widths),
+        reasons=tuple(Reason.ABSENT if i == NONE else seen.reasons[i] for i in images),
+        details=tuple(None if i == NONE else seen.details[i] for i in images),
+    )
+
+
+def _with_exchange(rig: Rig, c: int, trouble: Sentence) -> Sentence:
+    """Return what is wrong with a camera's images, and whose size they have."""
+    told = of_camera(rig.names[c], trouble)
+    size = trouble.values.get("size")
+    if not isinstance(size, Sentence):
+        return told
+    theirs = size.values["width"], size.values["height"]
+    others = [
+        name
+        for name, camera in zip(rig.names, rig.cameras, strict=True)
+        if camera.image_size == theirs
+    ]
+    if not others:
+        return told
+    return sentence(
+        "rig.size-of-another",
+        "{told} They have the size of {other}: the images may be given in another "
+        "order than the cameras of the rig file.",
+        told=told,
+        other=others[0],
+    )

@@ -1,0 +1,101 @@
+"""Which images of several cameras are of the same moment, by their names or order."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TypeAlias
+
+import numpy as np
+
+from lightpen.arrays import IntArray
+from lightpen.errors import FileError
+from lightpen.formats.images import natural_order
+from lightpen.sentences import sentence
+
+NONE = -1
+SHARED = 0.5  # of the images of the camera that has fewest, that tell a way of naming
+
+Key: TypeAlias = str | int
+
+
+@dataclass(frozen=True, eq=False)
+class Pairing:
+    """The images of C cameras at N moments.
+
+    Attributes
+    ----------
+    images : (N, C) array of int
+        Which one of a camera it is, from 0; -1 where the camera has none.
+    by_order : bool
+        Whether the names told nothing.
+    """
+
+    images: IntArray
+    by_order: bool = False
+
+
+def pair_images(names: Sequence[Sequence[str]], cameras: Sequence[str]) -> Pairing:
+    """Pair images by name, by the last number in their names, or by their order.
+
+    Parameters
+    ----------
+    names : sequence of sequence of str
+        Of the images of each camera, in their order.
+    cameras : sequence of str
+        Names of the cameras.
+
+    Raises
+    ------
+    FileError
+        The names do not tell, and there is another number of images.
+    """
+    for key_of in (_stem, _last_number):
+        paired = _paired(names, key_of)
+        if paired is not None:
+            return Pairing(paired)
+    counts = [len(each) for each in names]
+    if min(counts) < max(counts):
+        few, many = counts.index(min(counts)), counts.index(max(counts))
+        raise FileError(
+            sentence(
+                "rig.names-tell-nothing",
+                "There are {n_few} images of {few} and {n_many} of {many}, and their "
+                "names, such as {example} and {other}, do not tell which are of the "
+                "same moment. Give the images of one moment the same name or number.",
+                n_few=counts[few],
+                few=cameras[few],
+                n_many=counts[many],
+                many=cameras[many],
+                example=names[few][0],
+                other=names[many][0],
+            )
+        )
+    return Pairing(np.tile(np.arange(counts[0])[:, None], (1, len(names))), True)
+
+
+def _paired(
+    names: Sequence[Sequence[str]], key_of: Callable[[str], Key | None]
+) -> IntArray | None:
+    """Return the images of each key, in its order; None if the keys tell nothing."""
+    places: list[dict[Key, int]] = []
+    for each in names:
+        keys = [key_of(name) for name in each]
+        if None in keys or len(set(keys)) < len(keys):
+            return None
+        places.append({key: i for i, key in enumerate(keys) if key is not None})
+    every = set[Key]().union(*places)
+    n_shared = sum(sum(key in each for each in places) > 1 for key in every)
+    if n_shared < SHARED * min(map(len, places)):
+        return None
+    ordered = sorted(every, key=lambda key: natural_order(str(key)))
+    return np.array([[each.get(key, NONE) for each in places] for key in ordered])
+
+
+def _stem(name: str) -> str:
+    return PurePath(name).stem
+
+
+def _last_number(name: str) -> int | None:
+    digits = re.findall(r"(?a:\d+)", _stem(name))
+    return int(digits[-1]) if digits else None
