@@ -21,9 +21,10 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.moments import observe_rig_centers, observe_rig_images
 from lightpen.detection.observations import observe_centers, observe_images
 from lightpen.errors import CalibrationError, LightpenError, UsageError
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.pivot_calibration import calibrate_pivot
 from lightpen.estimation.report import (
     METHODS,
@@ -35,13 +36,15 @@ from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import printable, write_whole
-from lightpen.formats.hashes import Inputs, all_hashed, hashed
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
+from lightpen.formats.pairing import pair_images
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.formats.rig_files import read_rig
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
-from lightpen.model.pen import DISC_DIAMETER
+from lightpen.model.pen import DISC_DIAMETER, Pen
 from lightpen.record.reading import (
     is_record,
     missing_parts,
@@ -57,10 +60,15 @@ DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
+MAX_RIG = 4  # simulated cameras
+MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
 MIN_BLUR, MAX_BLUR = 0.3, 8.0  # px, of simulated optics
 MAX_NAMED = 3  # images; of more the first is named
 MAX_RENDERED = 30_000  # images
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
+RIG_NEEDED = sentence(
+    "cli.rig-needed", "Those of several cameras need --rig FILE in place of --camera."
+)
 # What to type about what the core says, by its codes.
 ADVICE = {
     "pen-file.no-units": "Name them so: --units mm.",
@@ -166,10 +174,19 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--centers",
         type=Path,
+        nargs="+",
+        action="extend",
         metavar="FILE.csv",
         help="LED centres (frame,led,x_px,y_px) in place of IMAGES",
     )
     parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help="several cameras and where they stand, in place of --camera; IMAGES (or "
+        "FILE.csv) is then one of each camera, in the order of this file",
+    )
     parser.add_argument("--pen", type=Path, metavar="FILE")
     _add_pen_options(parser)
     parser.add_argument(
@@ -225,6 +242,21 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
     parser.add_argument(
+        "--cameras",
+        type=int,
+        choices=range(1, MAX_RIG + 1),
+        default=1,
+        help="in a row, each turned to the pen; of several OUT gets a folder each, and "
+        "rig.json",
+    )
+    parser.add_argument(
+        "--baseline",
+        type=_baseline,
+        default=1000.0,
+        metavar="MM",
+        help="from the first of several cameras to the last",
+    )
+    parser.add_argument(
         "--pen",
         choices=("paper", "six", "eight", "near-symmetric", "fanned"),
         default="paper",
@@ -255,6 +287,15 @@ def _blur(text: str) -> float:
             f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
         )
     return sigma
+
+
+def _baseline(text: str) -> float:
+    baseline = _finite(text)
+    if not MIN_BASELINE <= baseline <= MAX_BASELINE:
+        raise argparse.ArgumentTypeError(
+            f"{text} mm is no baseline from {MIN_BASELINE:g} to {MAX_BASELINE:g} mm."
+        )
+    return baseline
 
 
 def _n_images(text: str) -> int:
@@ -372,9 +413,12 @@ def _calibrate(options: argparse.Namespace) -> None:
                 "Give either IMAGES or --centers FILE.csv.",
             )
         )
-    _require_other_file(options.json, options.camera, options.pen, options.centers)
+    inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
+    _require_other_file(options.json, *inputs)
     if len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
+    elif options.rig is not None:
+        calibrated = _from_rig(options)
     else:
         calibrated = _from_observations(options)
     calibration = calibrated.calibration
@@ -394,6 +438,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
     folder = Path(options.images[0])
     own = {
         "--camera": options.camera,
+        "--rig": options.rig,
         "--pen": options.pen,
         "--units": options.units,
         "--led-diameter": options.led_diameter,
@@ -451,6 +496,10 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
             n_images=len(names),
             first=names[0],
         )
+    _note(note)
+
+
+def _note(note: Sentence) -> None:
     print(_shown(f"lightpen: {note}"), file=sys.stderr)
 
 
@@ -483,13 +532,15 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         if file is None:
             raise _lacking(name, options.images)
     camera = read_camera(options.camera)
-    nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
-    pen = read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
+    pen = _read_pen(options)
     if options.centers is not None:
-        centers = read_centers(options.centers, pen.n_leds)
-        files: tuple[Path, ...] = (options.centers,)
+        _require_one_each(options.centers, 1, RIG_NEEDED)
+        centers = read_centers(options.centers[0], pen.n_leds)
+        files: tuple[Path, ...] = tuple(options.centers)
         observations = observe_centers(centers, camera, pen)
     else:
+        if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
+            _require_one_each(options.images, 1, RIG_NEEDED)
         source = find_images(*options.images)
         files = source.files
         _require_other_file(options.json, *files)
@@ -508,11 +559,110 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
     )
 
 
+def _read_pen(options: argparse.Namespace) -> Pen:
+    nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
+    return read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
+
+
+def _from_rig(options: argparse.Namespace) -> _Calibrated:
+    if options.camera is not None:
+        raise UsageError(
+            sentence(
+                "cli.rig-and-camera",
+                "The rig file names the files of its cameras. Leave out --camera.",
+            )
+        )
+    if options.pen is None:
+        raise _lacking("--pen", ())
+    rig_file = read_rig(options.rig)
+    rig = rig_file.rig
+    pen = _read_pen(options)
+    in_order = sentence(
+        "cli.one-of-each-camera",
+        "The rig has {n_cameras} cameras: give one for each, in the order of its file "
+        "({names}), and a pattern in quotation marks.",
+        n_cameras=rig.n_cameras,
+        names=", ".join(rig.names),
+    )
+    if options.centers is not None:
+        _require_one_each(options.centers, rig.n_cameras, in_order)
+        centers = [read_centers(file, pen.n_leds) for file in options.centers]
+        files: tuple[Path, ...] = tuple(options.centers)
+        pairing = pair_images([list(map(str, c.frames)) for c in centers], rig.names)
+        observations = observe_rig_centers(centers, pairing, rig, pen)
+    else:
+        _require_one_each(options.images, rig.n_cameras, in_order)
+        _require_other_names(options.images, rig.names)
+        sources = [find_images(place) for place in options.images]
+        files = tuple(file for source in sources for file in source.files)
+        _require_other_file(options.json, *files, *rig_file.camera_files)
+        pairing = pair_images([source.names for source in sources], rig.names)
+        with _progress("Finding LEDs") as report:
+            observations = observe_rig_images(sources, pairing, rig, pen, report)
+    if pairing.by_order:
+        _note(
+            sentence(
+                "rig.paired-by-order",
+                "The names of the images do not tell which are of the same moment: the "
+                "first of each camera are taken as one moment, and so on.",
+            )
+        )
+    return _Calibrated(
+        calibrate_rig(rig, pen, observations, _assumptions(options)),
+        pen.nominal_tip,
+        SwingLimits(),
+        lambda: Inputs(
+            camera=hashed(rig_file.camera_files[0]),
+            pen=hashed(options.pen),
+            observations=all_hashed(files),
+            nominal_tip=pen.nominal_tip,
+            rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
+        ),
+    )
+
+
+def _require_one_each(
+    given: Sequence[str | Path], n_cameras: int, why: Sentence
+) -> None:
+    """Refuse another number of places than of cameras, and one that is given twice."""
+    if len(given) != n_cameras:
+        raise UsageError(
+            sentence(
+                "cli.other-number",
+                "Folders or files given: {n_given}. {why}",
+                n_given=len(given),
+                why=why,
+            )
+        )
+    places = [os.path.realpath(place) for place in given]
+    if len(set(places)) < len(places):
+        raise UsageError(
+            sentence("cli.place-twice", "A place is given twice. {why}", why=why)
+        )
+
+
+def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse folders that are called as the cameras, but in another order."""
+    folders = [Path(place).name.casefold() for place in places]
+    cameras = [name.casefold() for name in names]
+    if folders != cameras and sorted(folders) == sorted(cameras):
+        raise UsageError(
+            sentence(
+                "cli.other-order",
+                "The folders {folders} are in another order than the cameras of the "
+                "rig file, {names}. Give them in the order of the file.",
+                folders=", ".join(map(str, places)),
+                names=", ".join(names),
+            )
+        )
+
+
 @_printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen.simulator.sample_pens import SAMPLE_PENS
-    from lightpen.simulator.scene_files import write_scene
+    from lightpen.simulator.sample_rigs import row_of_cameras
+    from lightpen.simulator.scene_files import write_rig_scene, write_scene
     from lightpen.simulator.scenes import LEDS, SCENES, Scene
     from lightpen.simulator.sensor import Sensor
 
@@ -529,12 +679,22 @@ def _simulate(options: argparse.Namespace) -> None:
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
     with _progress("Rendering") as report:
-        x, y, z = write_scene(scene, options.out, report)
+        if options.cameras == 1:
+            x, y, z = write_scene(scene, options.out, report)
+            written = f"{scene.n_images} images, camera.yaml"
+        else:
+            rig = row_of_cameras(options.cameras, options.baseline)
+            x, y, z = write_rig_scene(scene, rig, options.out, report)
+            folders = ", ".join(rig.names)
+            written = (
+                f"{scene.n_images} images of each camera (folders {folders}), their "
+                "camera files, rig.json"
+            )
     print(
         _shown(
-            f"{scene.n_images} images, camera.yaml, leds.csv and the true answer "
-            f"(truth.json) are in {options.out}.\nThe true tip is {x:.4f} {y:.4f} "
-            f"{z:.4f} mm in the frame of leds.csv."
+            f"{written}, leds.csv and the true answer (truth.json) are in "
+            f"{options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} mm in the "
+            "frame of leds.csv."
         )
     )
     if options.led_diameter != DISC_DIAMETER:

@@ -35,7 +35,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError, FileError, UsageError
 from lightpen.formats.documents import parse_document
-from lightpen.formats.entries import Entries, counted_numbers
+from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
 from lightpen.model.camera import Camera
 from lightpen.sentences import Sentence, sentence
@@ -48,7 +48,6 @@ LARGEST_ASPECT = 1.5  # of a pixel
 FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
-SYMMETRY_TOLERANCE = 1e-6  # of the covariance, relative: files with few digits
 
 _WIDTH = ("image_width", "width")
 _HEIGHT = ("image_height", "height")
@@ -477,14 +476,7 @@ def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
 
 
 def _check_covariance(covariance: FloatArray, name: str | Sentence) -> None:
-    variances = np.diagonal(covariance)
-    limits = np.multiply.outer(variances, variances) * (1 + SYMMETRY_TOLERANCE)
-    asymmetry = (covariance - covariance.T) ** 2
-    if (
-        np.any(variances < 0)
-        or np.any(covariance**2 > limits)
-        or np.any(asymmetry > SYMMETRY_TOLERANCE**2 * limits)
-    ):
+    if not is_covariance(covariance):
         raise FileError(
             sentence(
                 "camera-file.covariance",

@@ -13,6 +13,7 @@ from lightpen.sentences import Sentence, sentence
 
 MAX_NUMBERS = 10_000  # of one entry; a covariance has 324
 LARGEST_NUMBER = 1e12  # no length, pixel or coefficient comes near it
+SYMMETRY_TOLERANCE = 1e-6  # of a covariance, relative: files with few digits
 
 
 @dataclass(frozen=True)
@@ -160,6 +161,28 @@ class Entries:
         value = self.value(*names) if self.has(*names) else ""
         return value.strip() if isinstance(value, str) else ""
 
+    def refuse_others(self, *names: str) -> None:
+        """Refuse entries of other names: one that is misspelt would not be read.
+
+        Raises
+        ------
+        FileError
+            There is one.
+        """
+        known = {_plain(name) for name in names}
+        for plain, (key, _) in self.values.items():
+            if plain not in known:
+                raise FileError(
+                    sentence(
+                        "entry.unknown",
+                        "{name} has {key}, which means nothing here. Remove it, or "
+                        "correct it to one of {known}.",
+                        name=self.name,
+                        key=quoted(key),
+                        known=", ".join(sorted(names)),
+                    )
+                )
+
     def _check_shape(self, key: str, matrix: dict[str, Tree], count: int) -> None:
         shape = Entries.of(matrix, self.name)
         if not shape.has("rows") or not shape.has("cols"):
@@ -187,6 +210,18 @@ def counted_numbers(count: int) -> Sentence:
     if count == 1:
         return sentence("count.one-number", "1 number")
     return sentence("count.numbers", "{count} numbers", count=count)
+
+
+def is_covariance(matrix: FloatArray) -> bool:
+    """Return whether a square matrix is symmetric with correlations from -1 to 1."""
+    variances = np.diagonal(matrix)
+    limits = np.multiply.outer(variances, variances) * (1 + SYMMETRY_TOLERANCE)
+    asymmetry = (matrix - matrix.T) ** 2
+    return bool(
+        np.all(variances >= 0)
+        and np.all(matrix**2 <= limits)
+        and np.all(asymmetry <= SYMMETRY_TOLERANCE**2 * limits)
+    )
 
 
 def _plain(name: str) -> str:

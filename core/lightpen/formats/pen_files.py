@@ -71,8 +71,8 @@ _COLUMN = (
 )
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
-    *("units", "leds", "diameter", "nominaltip", "name", "comment"),
-    *("ledsigma", "scalesigma", "diametersigma"),
+    *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
+    *("led_sigma", "scale_sigma", "diameter_sigma"),
 }
 _SIGMAS = ("led_sigma", "scale_sigma", "diameter_sigma")
 LARGEST_SIGMA = 10.0  # mm; and LARGEST_SCALE_SIGMA relative
@@ -476,7 +476,7 @@ def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
             )
         )
     entries = Entries.of(tree, name)
-    _refuse_other_keys(entries, _FILE_KEYS, name)
+    entries.refuse_others(*_FILE_KEYS)
     stated = entries.word("units").casefold()
     if stated and stated not in _UNIT_NAMES:
         raise FileError(
@@ -542,7 +542,7 @@ def _listed_leds(entries: Entries, name: str) -> list[Entries]:
                 )
             )
         led = Entries.of(tree, place)
-        _refuse_other_keys(led, _LED_KEYS, place)
+        led.refuse_others(*_LED_KEYS)
         if led.counted(1, "led")[0] != number:
             raise FileError(
                 sentence(
@@ -573,21 +573,6 @@ def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
             )
         )
     return np.array([_unit(led.counted(3, "normal"), led.name) for led in leds])
-
-
-def _refuse_other_keys(entries: Entries, known: set[str], name: str | Sentence) -> None:
-    for plain, (key, _) in entries.values.items():
-        if plain not in known:
-            raise FileError(
-                sentence(
-                    "pen-file.unknown-key",
-                    "{name} has {key}, which means nothing here. Remove it, or "
-                    "correct it to one of {known}.",
-                    name=name,
-                    key=quoted(key),
-                    known=", ".join(sorted(known)),
-                )
-            )
 
 
 def _stated_sigmas(pen: Pen) -> dict[str, float]:

@@ -12,6 +12,7 @@ from lightpen.arrays import BoolArray, FloatArray, Image
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import vector_from_rotation
 from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
 from lightpen.simulator.faces import Dome, Face, HotSpot, Ring
@@ -23,6 +24,8 @@ from lightpen.simulator.swings import (
     Swing,
     leds_in_camera,
     perturbed_pen,
+    seen_from,
+    shows_all,
     slip_tip,
     swing_from_postures,
     swing_poses,
@@ -103,15 +106,43 @@ def plan_scene(scene: Scene) -> ScenePlan:
     ScenePlan
         The same for the same scene.
     """
+    rig = rig_of(scene.camera)
+    return plan_rig(scene, rig)[0]
+
+
+def plan_rig(scene: Scene, rig: Rig) -> tuple[ScenePlan, ...]:
+    """Draw everything random that several cameras see at once, but the noise.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its ``camera`` stands for the middle of the rig.
+    rig : Rig
+        cam_from_rig from that middle.
+
+    Returns
+    -------
+    tuple of ScenePlan
+        Of each camera, in its own frame.
+    """
     rng = _stream(scene, _SWING)
+    stands = list(zip(rig.cameras, rig.rotations, rig.translations, strict=True))
+
+    def shows(swing: Swing) -> BoolArray:
+        each = [
+            shows_all(camera, scene.pen, seen_from(swing, R, t))
+            for camera, R, t in stands
+        ]
+        return np.asarray(np.all(each, axis=0))
+
     swing = swing_poses(
         scene.n_images,
         rng,
         scene.swing,
         pen=scene.pen,
-        camera=scene.camera,
         tip_pen=scene.tip_pen,
         cone_cam=scene.cone_cam,
+        shows=shows,
     )
     hit = _draw_hits(scene, rng)
     swing = slip_tip(swing, hit["slipped"], rng.uniform(*SLIP, scene.n_images), rng)
@@ -123,17 +154,26 @@ def plan_scene(scene: Scene) -> ScenePlan:
         led_sigma=scene.led_noise or None,
     )
     gains = led_gains(scene)
-    image_plans = []
-    for index in range(scene.n_images):
-        flags = tuple(name for name, frames in hit.items() if frames[index])
-        image_plans.append(_plan_image(scene, swing, gains, index, flags))
-    return ScenePlan(scene, swing, measured_pen, gains, tuple(image_plans))
+    flags = [
+        tuple(name for name, frames in hit.items() if frames[index])
+        for index in range(scene.n_images)
+    ]
+    plans = []
+    for c, (camera, R, t) in enumerate(stands):
+        there = seen_from(swing, R, t)
+        seen = replace(scene, camera=camera, cone_cam=there.cone_cam, viewpoint=c)
+        image_plans = tuple(
+            _plan_image(seen, there, gains, index, flags[index])
+            for index in range(scene.n_images)
+        )
+        plans.append(ScenePlan(seen, there, measured_pen, gains, image_plans))
+    return tuple(plans)
 
 
 def render_plan(scene: Scene, image_plan: ImagePlan) -> Image:
     """Return the image that is planned, the same every time."""
     light = render_view(scene.camera, scene.pen, image_plan.view, image_plan.optics)
-    return expose(light, scene.sensor, _stream(scene, _NOISE, image_plan.index))
+    return expose(light, scene.sensor, _image_stream(scene, _NOISE, image_plan.index))
 
 
 def live_plan(
@@ -189,6 +229,11 @@ def _stream(scene: Scene, *path: int) -> np.random.Generator:
     return np.random.Generator(np.random.SFC64([scene.seed, *path]))
 
 
+def _image_stream(scene: Scene, what: int, index: int) -> np.random.Generator:
+    viewpoint = (scene.viewpoint,) if scene.viewpoint else ()
+    return _stream(scene, what, index, *viewpoint)
+
+
 def _draw_hits(scene: Scene, rng: np.random.Generator) -> dict[str, BoolArray]:
     """Return which images each disturbance hits.
 
@@ -217,7 +262,7 @@ def _draw_hits(scene: Scene, rng: np.random.Generator) -> dict[str, BoolArray]:
 def _plan_image(
     scene: Scene, swing: Swing, gains: FloatArray, index: int, flags: tuple[str, ...]
 ) -> ImagePlan:
-    rng = _stream(scene, _FRAME, index)
+    rng = _image_stream(scene, _FRAME, index)
     rotation, translation = swing.rotations[index], swing.translations[index]
     moved = 0.0
     optics = scene.optics

@@ -15,11 +15,19 @@ from lightpen.formats.camera_files import write_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import strerror, write_whole
 from lightpen.formats.pen_files import write_pen
+from lightpen.formats.rig_files import write_rig
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
+from lightpen.model.rig import Rig, from_first
 from lightpen.model.rigid import fit_rigid, vector_from_rotation
 from lightpen.sentences import sentence
-from lightpen.simulator.image_plans import ImagePlan, ScenePlan, plan_scene, render_plan
+from lightpen.simulator.image_plans import (
+    ImagePlan,
+    ScenePlan,
+    plan_rig,
+    plan_scene,
+    render_plan,
+)
 from lightpen.simulator.render import hidden_fraction, led_levels
 from lightpen.simulator.rims import disc_rims, measure_insides
 from lightpen.simulator.scenes import Scene
@@ -75,22 +83,97 @@ def write_scene(
     _make_folder(images, names)
     plan = plan_scene(scene)
     write_camera(scene.camera, folder / "camera.yaml", "opencv")
-    # A table of coordinates has no place for these.
-    anonymous = replace(plan.measured_pen, name="", nominal_tip=None)
-    write_pen(anonymous, folder / "leds.csv")
-    with ThreadPoolExecutor(N_THREADS) as pool:
-        encoded = _in_order(
-            pool,
-            lambda image_plan: encode_png(render_plan(scene, image_plan)),
-            plan.image_plans,
-        )
-        for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
-            write_whole(images / name, data)
-            if report is not None:
-                report(done / len(names))
+    _write_measured_pen(plan, folder)
+    _write_images(plan, images, names, report or _silent)
     truth = {"set": folder.name, **scene_truth(plan)}
     write_whole(folder / "truth.json", json.dumps(truth, indent=1).encode())
     return _tip_in_file_frame(plan)
+
+
+def write_rig_scene(
+    scene: Scene,
+    rig: Rig,
+    folder: Path,
+    report: Callable[[float], None] | None = None,
+) -> FloatArray:
+    """Write what several cameras see of a swing: a folder of images for each.
+
+    Beside these a camera file for each, ``rig.json``, ``leds.csv``, ``truth.json``.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its camera stands for the middle of the rig.
+    rig : Rig
+        cam_from_rig from that middle, with the covariance that its file states.
+    folder, report
+        As for `write_scene`.
+
+    Returns
+    -------
+    (3,) array
+        As `write_scene`.
+
+    Raises
+    ------
+    FileError
+        As `write_scene`.
+    """
+    names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
+    for name in rig.names:
+        _make_folder(folder / name, names)
+    plans = plan_rig(scene, rig)
+    there = from_first(rig)
+    camera_files = [f"{name}.yaml" for name in rig.names]
+    for camera, file in zip(rig.cameras, camera_files, strict=True):
+        write_camera(camera, folder / file, "opencv")
+    write_rig(there, folder / "rig.json", camera_files)
+    _write_measured_pen(plans[0], folder)
+    views = []
+    for c, (name, plan) in enumerate(zip(rig.names, plans, strict=True)):
+
+        def part(fraction: float, c: int = c) -> None:
+            (report or _silent)((c + fraction) / rig.n_cameras)
+
+        _write_images(plan, folder / name, names, part)
+        cam_from_rig = {
+            "rotation": there.rotations[c].tolist(),
+            "translation": there.translations[c].tolist(),
+        }
+        truth = scene_truth(plan, f"{name}/")
+        views.append({"name": name, "cam_from_rig": cam_from_rig, **truth})
+    whole = {
+        "set": folder.name,
+        "pen": _pen_truth(plans[0]),
+        "cone_point": plans[0].scene.cone_cam.tolist(),
+        "cameras": views,
+    }
+    write_whole(folder / "truth.json", json.dumps(whole, indent=1).encode())
+    return _tip_in_file_frame(plans[0])
+
+
+def _write_measured_pen(plan: ScenePlan, folder: Path) -> None:
+    # A table of coordinates has no place for these.
+    anonymous = replace(plan.measured_pen, name="", nominal_tip=None)
+    write_pen(anonymous, folder / "leds.csv")
+
+
+def _write_images(
+    plan: ScenePlan, folder: Path, names: list[str], report: Callable[[float], None]
+) -> None:
+    with ThreadPoolExecutor(N_THREADS) as pool:
+        encoded = _in_order(
+            pool,
+            lambda image_plan: encode_png(render_plan(plan.scene, image_plan)),
+            plan.image_plans,
+        )
+        for done, (name, data) in enumerate(zip(names, encoded, strict=True), start=1):
+            write_whole(folder / name, data)
+            report(done / len(names))
+
+
+def _silent(fraction: float) -> None:
+    """Report to nobody."""
 
 
 def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
@@ -116,10 +199,15 @@ def _tip_in_file_frame(plan: ScenePlan) -> FloatArray:
     return np.asarray(R @ plan.scene.tip_pen + t)
 
 
-def scene_truth(plan: ScenePlan) -> Json:
+def scene_truth(plan: ScenePlan, folder: str = "images/") -> Json:
     """Return what a test needs to know about a set, as JSON.
 
     Lengths in mm, pixels in px, angles in degrees; see `NOTES`.
+
+    Parameters
+    ----------
+    folder : str
+        Of the images, beside the truth.
     """
     scene = plan.scene
     camera = scene.camera
@@ -156,7 +244,9 @@ def scene_truth(plan: ScenePlan) -> Json:
         },
         "notes": NOTES,
         "seed": scene.seed,
-        "frames": [_image_truth(plan, image_plan) for image_plan in plan.image_plans],
+        "frames": [
+            _image_truth(plan, image_plan, folder) for image_plan in plan.image_plans
+        ],
     }
 
 
@@ -243,7 +333,7 @@ def _frame_truth(leds: FloatArray, measured: FloatArray, tip: FloatArray) -> Jso
     }
 
 
-def _image_truth(plan: ScenePlan, image_plan: ImagePlan) -> Json:
+def _image_truth(plan: ScenePlan, image_plan: ImagePlan, folder: str) -> Json:
     scene, swing, index = plan.scene, plan.swing, image_plan.index
     tilt, direction, roll = np.degrees(
         [
@@ -256,7 +346,7 @@ def _image_truth(plan: ScenePlan, image_plan: ImagePlan) -> Json:
         scene.camera, scene.pen, image_plan.rotation[None], image_plan.translation[None]
     )
     return {
-        "file": f"images/frame_{index + 1:04d}.png",
+        "file": f"{folder}frame_{index + 1:04d}.png",
         "R": image_plan.rotation.tolist(),
         "T": image_plan.translation.tolist(),
         "rvec": vector_from_rotation(image_plan.rotation).tolist(),

@@ -111,6 +111,8 @@ class Scene:
         The truth.
     tip_pen, cone_cam : (3,) array
         The truth, mm.
+    viewpoint : int
+        Which camera of several it is, from 0; it chooses the noise.
     """
 
     n_images: int = 60
@@ -125,3 +127,4 @@ class Scene:
     camera: Camera = field(default_factory=paper_camera)
     tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)
     cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)
+    viewpoint: int = 0

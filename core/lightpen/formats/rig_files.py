@@ -1,0 +1,379 @@
+"""The cameras of a rig, and where each stands, as JSON (or YAML).
+
+A rig file has ``cameras``, a list of which the first is the reference, and optionally a
+``comment``, which is not read. Of each camera it has
+
+============================ =========================================================
+``name``                     by which the program speaks of it
+``intrinsics``               its camera file, from the folder of the rig file
+``cam_from_rig_rotation``    9 numbers, the rotation matrix row by row, or 4, a unit
+                             quaternion w x y z
+``cam_from_rig_translation`` 3 numbers, mm
+============================ =========================================================
+
+A point of the reference camera's frame is in the camera's own at ``R p + t``. The
+reference itself has the identity, or neither of the two entries. All other cameras or
+none of them state how well that is known, by
+
+============================ =========================================================
+``extrinsics_covariance``    6 x 6, of a small rotation vector w (rad), the true
+                             rotation being ``exp([w]x) R``, and of the translation
+                             (mm)
+``std_deviations_extrinsics``  or the 6 standard deviations of these
+============================ =========================================================
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.documents import parse_document
+from lightpen.formats.entries import Entries, is_covariance
+from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.model.camera import Camera
+from lightpen.model.rig import Rig
+from lightpen.model.rigid import nearest_rotation, rotation_from_quaternion
+from lightpen.sentences import Sentence, sentence
+
+RIG_FILE = sentence("file.rig", "rig file")
+RIG_FILE_LIMIT = MEGABYTE
+MAX_CAMERAS = 16
+LONGEST_NAME = 40  # characters
+LARGEST_TRANSLATION = 1e6  # mm
+LARGEST_SIGMAS = np.repeat([1.0, 1e4], 3)  # rad and mm
+ROTATION_TOLERANCE = 1e-3  # of R R^T - 1: more is no rotation in a few digits
+ROUNDING_TOLERANCE = 1e-6  # of R R^T - 1: less is kept as it is
+NEGATIVE = -1e-6  # least eigenvalue of a correlation matrix in a few digits
+
+_NAME = "name"
+_INTRINSICS = "intrinsics"
+_ROTATION = "cam_from_rig_rotation"
+_TRANSLATION = "cam_from_rig_translation"
+_COVARIANCE = "extrinsics_covariance"
+_DEVIATIONS = "std_deviations_extrinsics"
+_UNCERTAINTIES = (_COVARIANCE, _DEVIATIONS)
+_CAMERA_KEYS = (_NAME, _INTRINSICS, _ROTATION, _TRANSLATION, *_UNCERTAINTIES)
+
+
+@dataclass(frozen=True, eq=False)
+class RigFile:
+    """A rig file that was read, and the camera files that it names.
+
+    Attributes
+    ----------
+    camera_files : tuple of Path
+        One a camera.
+    """
+
+    path: Path
+    camera_files: tuple[Path, ...]
+    rig: Rig
+
+
+def read_rig(path: Path) -> RigFile:
+    """Read a rig file and the camera files it names; see the module for the layout.
+
+    Raises
+    ------
+    FileError
+        One of them cannot be read, or is not what it must be.
+    """
+    name = printable(path.name)
+    entries = Entries.of(
+        parse_document(read_text(path, RIG_FILE, RIG_FILE_LIMIT), name), name
+    )
+    entries.refuse_others("cameras", "comment")
+    listed = _listed_cameras(entries, name)
+    names = _names(listed, name)
+    files = _camera_files(listed, names, path)
+    cameras = tuple(_read_of(name, names[c], file) for c, file in enumerate(files))
+    _require_reference(listed[0], names[0], name)
+    places = [_place(each) for each in listed[1:]]
+    return RigFile(
+        path,
+        files,
+        Rig(
+            cameras=cameras,
+            rotations=np.stack([np.eye(3), *(R for R, _ in places)]),
+            translations=np.stack([np.zeros(3), *(t for _, t in places)]),
+            covariance=_covariance(listed[1:], names[1:], name),
+            names=names,
+        ),
+    )
+
+
+def write_rig(rig: Rig, path: Path, camera_files: Sequence[str]) -> None:
+    """Write a rig, to be read back to the last digit.
+
+    Parameters
+    ----------
+    camera_files : sequence of str
+        Names of the camera files, from the folder of the rig file.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written.
+    """
+    cameras: list[dict[str, Any]] = []
+    for c, (name, file) in enumerate(zip(rig.names, camera_files, strict=True)):
+        camera: dict[str, Any] = {_NAME: name, _INTRINSICS: file}
+        if c > 0:
+            camera[_ROTATION] = rig.rotations[c].tolist()
+            camera[_TRANSLATION] = rig.translations[c].tolist()
+            if rig.covariance is not None:
+                own = slice(6 * (c - 1), 6 * c)
+                camera[_COVARIANCE] = rig.covariance[own, own].tolist()
+        cameras.append(camera)
+    write_whole(path, json.dumps({"cameras": cameras}, indent=1).encode())
+
+
+def _listed_cameras(entries: Entries, name: str) -> list[Entries]:
+    listed = entries.value("cameras")
+    if not isinstance(listed, list) or not 2 <= len(listed) <= MAX_CAMERAS:
+        raise FileError(
+            sentence(
+                "rig-file.no-cameras",
+                "cameras in {name} is no list of 2 to {most} cameras. One camera alone "
+                "needs no rig file.",
+                name=name,
+                most=MAX_CAMERAS,
+            )
+        )
+    cameras = []
+    for number, tree in enumerate(listed, 1):
+        place = sentence(
+            "rig-file.camera", "camera {number} of {name}", number=number, name=name
+        )
+        if not isinstance(tree, dict):
+            raise FileError(
+                sentence(
+                    "rig-file.no-mapping",
+                    "{place} is no mapping with name, intrinsics and cam_from_rig.",
+                    place=place,
+                )
+            )
+        camera = Entries.of(tree, place)
+        camera.refuse_others(*_CAMERA_KEYS)
+        cameras.append(camera)
+    return cameras
+
+
+def _names(listed: list[Entries], name: str) -> tuple[str, ...]:
+    names = tuple(printable(_text(each, _NAME))[:LONGEST_NAME] for each in listed)
+    for c, each in enumerate(names):
+        if each in names[:c]:
+            raise FileError(
+                sentence(
+                    "rig-file.name-twice",
+                    "{name} has two cameras called {camera}. Give each a name of its "
+                    "own.",
+                    name=name,
+                    camera=quoted(each),
+                )
+            )
+    return names
+
+
+def _text(entries: Entries, key: str) -> str:
+    text = entries.word(key)
+    if not text:
+        raise FileError(
+            sentence(
+                "rig-file.no-text",
+                "{place} has no {key}, or one that is no text. Add it.",
+                place=entries.name,
+                key=key,
+            )
+        )
+    return text
+
+
+def _camera_files(
+    listed: list[Entries], names: tuple[str, ...], path: Path
+) -> tuple[Path, ...]:
+    files = tuple(path.parent / _text(each, _INTRINSICS) for each in listed)
+    for c, file in enumerate(files):
+        if file in files[:c]:
+            raise FileError(
+                sentence(
+                    "rig-file.file-twice",
+                    "{name} gives {one} and {other} the same camera file {file}. Each "
+                    "camera needs the file of its own calibration.",
+                    name=printable(path.name),
+                    one=names[files.index(file)],
+                    other=names[c],
+                    file=printable(file.name),
+                )
+            )
+    return files
+
+
+def _read_of(rig_name: str, name: str, file: Path) -> Camera:
+    try:
+        return read_camera(file)
+    except FileError as error:
+        raise FileError(
+            sentence(
+                "rig-file.camera-file",
+                "{name} names the camera file of {camera}: {trouble}",
+                name=rig_name,
+                camera=name,
+                trouble=error.sentence,
+            )
+        ) from error
+
+
+def _require_reference(entries: Entries, camera: str, name: str) -> None:
+    """Refuse a first camera that stands elsewhere than in the frame of the rig."""
+    turned = entries.has(_ROTATION) and not np.allclose(
+        _rotation(entries), np.eye(3), rtol=0, atol=ROUNDING_TOLERANCE
+    )
+    if turned or (entries.has(_TRANSLATION) and np.any(_translation(entries))):
+        raise FileError(
+            sentence(
+                "rig-file.no-reference",
+                "The first camera of {name}, {camera}, is the reference of the rig: "
+                "its cam_from_rig must be the identity. List the reference camera "
+                "first, and give the others from its frame.",
+                name=name,
+                camera=camera,
+            )
+        )
+    if entries.has(*_UNCERTAINTIES):
+        raise FileError(
+            sentence(
+                "rig-file.uncertain-reference",
+                "{place} is the reference of the rig, where it stands is exact. Remove "
+                "its {key}.",
+                place=entries.name,
+                key=entries.entry(*_UNCERTAINTIES)[0],
+            )
+        )
+
+
+def _place(entries: Entries) -> tuple[FloatArray, FloatArray]:
+    return _rotation(entries), _translation(entries)
+
+
+def _rotation(entries: Entries) -> FloatArray:
+    numbers = entries.numbers(_ROTATION)
+    if len(numbers) == 4:
+        return _from_quaternion(numbers, entries.name)
+    matrix = entries.counted(9, _ROTATION).reshape(3, 3)
+    deviation = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if not deviation <= ROTATION_TOLERANCE:
+        raise FileError(
+            sentence(
+                "rig-file.no-rotation",
+                "{key} of {place} is no rotation: its rows must have the length 1 and "
+                "be at right angles to each other. Give the matrix row by row, or a "
+                "unit quaternion w x y z.",
+                key=_ROTATION,
+                place=entries.name,
+            )
+        )
+    if np.linalg.det(matrix) < 0:
+        raise FileError(
+            sentence(
+                "rig-file.mirrored",
+                "{key} of {place} is a mirrored rotation (determinant -1). Both "
+                "cameras need right-handed frames: u right, v down, w forward.",
+                key=_ROTATION,
+                place=entries.name,
+            )
+        )
+    return matrix if deviation <= ROUNDING_TOLERANCE else nearest_rotation(matrix)
+
+
+def _from_quaternion(numbers: FloatArray, place: str | Sentence) -> FloatArray:
+    length = float(np.linalg.norm(numbers))
+    if not abs(length - 1) <= ROTATION_TOLERANCE:
+        raise FileError(
+            sentence(
+                "rig-file.quaternion",
+                "{key} of {place} is a quaternion of length {length:.4g}; 1 is needed. "
+                "Give it as w x y z.",
+                key=_ROTATION,
+                place=place,
+                length=length,
+            )
+        )
+    return rotation_from_quaternion(numbers / length)
+
+
+def _translation(entries: Entries) -> FloatArray:
+    translation = entries.counted(3, _TRANSLATION)
+    if np.abs(translation).max() > LARGEST_TRANSLATION:
+        raise FileError(
+            sentence(
+                "rig-file.far",
+                "{key} of {place} is more than {most:g} m. Check its units: "
+                "millimetres are needed.",
+                key=_TRANSLATION,
+                place=entries.name,
+                most=LARGEST_TRANSLATION / 1000,
+            )
+        )
+    return translation
+
+
+def _covariance(
+    listed: list[Entries], names: tuple[str, ...], name: str
+) -> FloatArray | None:
+    stated = [each.has(*_UNCERTAINTIES) for each in listed]
+    if not any(stated):
+        return None
+    if not all(stated):
+        raise FileError(
+            sentence(
+                "rig-file.some-uncertain",
+                "{name} states how well it is known where {one} stands, but not of "
+                "{other}. State it of all cameras but the first, or of none.",
+                name=name,
+                one=names[stated.index(True)],
+                other=names[stated.index(False)],
+            )
+        )
+    covariance = np.zeros((6 * len(listed), 6 * len(listed)))
+    for c, each in enumerate(listed):
+        own = slice(6 * c, 6 * c + 6)
+        covariance[own, own] = _covariance_of(each)
+    return covariance
+
+
+def _covariance_of(entries: Entries) -> FloatArray:
+    key, _ = entries.entry(*_UNCERTAINTIES)
+    if entries.has(_DEVIATIONS):
+        deviations = entries.counted(6, _DEVIATIONS)
+        covariance = np.diag(deviations**2)
+        is_right = bool(np.all(deviations >= 0))
+    else:
+        covariance = entries.counted(36, _COVARIANCE).reshape(6, 6)
+        is_right = is_covariance(covariance) and _is_positive(covariance)
+    if not is_right or np.any(np.diag(covariance) > LARGEST_SIGMAS**2):
+        raise FileError(
+            sentence(
+                "rig-file.covariance",
+                "{key} of {place} must hold what the turn about x y z (rad) and the "
+                "translation (mm) are uncertain by: 6 standard deviations, none of "
+                "them negative, or a covariance, symmetric and positive; up to 1 rad "
+                "and 10 m. Correct or remove it.",
+                key=key,
+                place=entries.name,
+            )
+        )
+    return covariance
+
+
+def _is_positive(covariance: FloatArray) -> bool:
+    scale = np.sqrt(np.diag(covariance))
+    scale = np.where(scale > 0, scale, 1.0)
+    return bool(np.linalg.eigvalsh(covariance / np.outer(scale, scale))[0] > NEGATIVE)
