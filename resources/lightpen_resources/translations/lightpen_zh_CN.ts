@@ -2239,6 +2239,18 @@
         <translation>请将两组分别存为文件，各自校准。</translation>
     </message>
     <message>
+        <source>Camera {camera} does not see the pen as the others do: at {n_apart} of {n_pairs} moments it is turned otherwise. Check that the images belong to the same swing and are paired rightly, that one signal triggers all cameras, and that none of them moved.</source>
+        <translation>相机 {camera} 看到的光笔姿态与其他相机不一致：{n_pairs} 个时刻中有 {n_apart} 个的转角不同。请检查各图像是否属于同一次摆动且配对正确、所有相机是否由同一信号触发，以及是否有相机移动过。</translation>
+    </message>
+    <message>
+        <source>Camera {camera} has no image at {n_absent} of {n_moments} moments, such as that of {example}. What the other cameras saw there is used.</source>
+        <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_absent} 个没有图像，例如 {example} 所在的时刻。这些时刻采用其他相机的图像。</translation>
+    </message>
+    <message>
+        <source>Camera {camera}: {trouble}</source>
+        <translation>相机 {camera}：{trouble}</translation>
+    </message>
+    <message>
         <source>Capture more images.</source>
         <translation>请采集更多图像。</translation>
     </message>
@@ -2285,6 +2297,26 @@
     <message>
         <source>Images of the upright pen still needed: {n_images}.</source>
         <translation>还需 {n_images} 幅光笔竖直的图像。</translation>
+    </message>
+    <message>
+        <source>It agrees with them if it holds rig_from_cam; cam_from_rig is needed. Of each camera transpose the rotation R, and put -R^T t in place of the translation t.</source>
+        <translation>若该文件给出的是 rig_from_cam，则与图像一致；而此处需要 cam_from_rig。请将每台相机的旋转 R 转置，并用 -R^T t 代替平移 t。</translation>
+    </message>
+    <message>
+        <source>It agrees with them if it holds the places of the cameras in the rig instead of the translations of cam_from_rig. Put -R c in place of c.</source>
+        <translation>若该文件给出的是相机在相机组中的位置，而不是 cam_from_rig 的平移，则与图像一致。请用 -R c 代替 c。</translation>
+    </message>
+    <message>
+        <source>It agrees with them if its lengths are in {unit}. Millimetres are needed.</source>
+        <translation>若该文件的长度单位为{unit}，则与图像一致。此处需要毫米。</translation>
+    </message>
+    <message>
+        <source>It agrees with them if its rotations are transposed. Write each row by row, as it is multiplied to a column vector.</source>
+        <translation>若将该文件中的旋转转置，则与图像一致。请按左乘列向量的形式逐行写出旋转矩阵。</translation>
+    </message>
+    <message>
+        <source>It agrees with them if the images of {one} and {other} are exchanged: give the images in the order of the rig file, {names}.</source>
+        <translation>若将 {one} 与 {other} 的图像对调，则与图像一致：请按相机组文件中的顺序（{names}）给出图像。</translation>
     </message>
     <message>
         <source>It rests {distance:.2f} mm from where it was. Put it back into the cone; check that the cone is clamped.</source>
@@ -2595,6 +2627,10 @@
         <translation>文件 {path} 无法读取：{reason}。请检查名称和读取权限。</translation>
     </message>
     <message>
+        <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
+        <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
+    </message>
+    <message>
         <source>The folder {folder} cannot be made or read: {reason}. Choose another folder.</source>
         <translation>文件夹 {folder} 无法创建或读取：{reason}。请选择其他文件夹。</translation>
     </message>
@@ -2627,6 +2663,14 @@
         <translation>图像与内参文件不符：按图像，{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
     </message>
     <message>
+        <source>The images contradict the file of camera {camera}: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this camera, lens and focus, or calibrate the camera again.</source>
+        <translation>图像与相机 {camera} 的文件相矛盾：按图像，{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否对应此相机、镜头和对焦，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The images contradict the rig file: of camera {camera} they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that no camera was moved since, or calibrate the rig again.</source>
+        <translation>图像与相机组文件相矛盾：按图像，相机 {camera} 的{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件中为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查此后是否有相机移动过，或重新标定相机组。</translation>
+    </message>
+    <message>
         <source>The images do not tell yet where the tip is. Lean the pen to all sides.</source>
         <translation>目前的图像还不能确定测头位置。请向各个方向倾斜光笔。</translation>
     </message>
@@ -2641,6 +2685,10 @@
     <message>
         <source>The images fit the pen with about {factor:g} times the focal length of the camera file. Choose the file of this camera and lens, or calibrate the camera again.</source>
         <translation>图像与内参文件焦距的约 {factor:g} 倍相符。请选择这台相机和镜头的文件，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The images of camera {camera} are paired with those of other moments: its image {own} fits image {others} of the other cameras, and so on. Give the images of one moment the same name; some may be missing at the start.</source>
+        <translation>相机 {camera} 的图像与其他时刻的图像配成了对：它的第 {own} 幅图像对应其他相机的第 {others} 幅，依此类推。请让同一时刻的图像同名；开头可能缺少若干图像。</translation>
     </message>
     <message>
         <source>The intrinsics_covariance of {name} is not a covariance: it must be symmetric, with correlations from -1 to 1. Correct or remove it.</source>
@@ -2715,12 +2763,72 @@
         <translation>残差过大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于此相机、镜头和对焦，LED 文件是否属于此光笔。</translation>
     </message>
     <message>
+        <source>The rig file has camera {camera} {angle:.1f} degrees and {distance:.0f} mm away from where the images put it.</source>
+        <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
+    </message>
+    <message>
+        <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
+        <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
+    </message>
+    <message>
+        <source>camera {number} of {name}</source>
+        <translation>{name} 中的第 {number} 台相机</translation>
+    </message>
+    <message>
+        <source>cameras in {name} is no list of 2 to {most} cameras. One camera alone needs no rig file.</source>
+        <translation>{name} 中的 cameras 不是 2 至 {most} 台相机的列表。单台相机不需要相机组文件。</translation>
+    </message>
+    <message>
+        <source>centimetres</source>
+        <translation>厘米</translation>
+    </message>
+    <message>
+        <source>further turn of cam_from_rig about {axis}</source>
+        <translation>cam_from_rig 绕 {axis} 轴的附加转角</translation>
+    </message>
+    <message>
+        <source>inches</source>
+        <translation>英寸</translation>
+    </message>
+    <message>
+        <source>metres</source>
+        <translation>米</translation>
+    </message>
+    <message>
+        <source>micrometres</source>
+        <translation>微米</translation>
+    </message>
+    <message>
+        <source>no image</source>
+        <translation>无图像</translation>
+    </message>
+    <message>
+        <source>not of the same moment</source>
+        <translation>不是同一时刻</translation>
+    </message>
+    <message>
+        <source>rig file</source>
+        <translation>相机组文件</translation>
+    </message>
+    <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
         <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
+    </message>
+    <message>
+        <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
+        <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
+    </message>
+    <message>
+        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images earlier than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
+        <translation>相机 {camera} 的拍摄时刻比第一台相机早 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
+    </message>
+    <message>
+        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images later than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
+        <translation>相机 {camera} 的拍摄时刻比第一台相机晚 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -3203,6 +3311,10 @@
         <translation>朝向相机偏右</translation>
     </message>
     <message>
+        <source>translation of cam_from_rig along {axis}</source>
+        <translation>cam_from_rig 沿 {axis} 轴的平移</translation>
+    </message>
+    <message>
         <source>underscore</source>
         <translation>下划线</translation>
     </message>
@@ -3263,6 +3375,10 @@
         <translation>{count} 个数</translation>
     </message>
     <message>
+        <source>{direction} Its lengths seem to be in {unit}; millimetres are needed.</source>
+        <translation>{direction}其长度单位似乎是{unit}；此处需要毫米。</translation>
+    </message>
+    <message>
         <source>{entry} in {name} cannot be read: {flaw} Correct it, or export the file again.</source>
         <translation>{name} 中的 {entry} 无法读取：{flaw}请改正，或重新导出文件。</translation>
     </message>
@@ -3303,6 +3419,26 @@
         <translation>{name} 第 {line} 行重复给出 {key}。请保留正确的一个。</translation>
     </message>
     <message>
+        <source>{key} of {place} is a mirrored rotation (determinant -1). Both cameras need right-handed frames: u right, v down, w forward.</source>
+        <translation>{place}的 {key} 是镜像旋转（行列式为 -1）。两台相机都需要右手坐标系：u 向右，v 向下，w 向前。</translation>
+    </message>
+    <message>
+        <source>{key} of {place} is a quaternion of length {length:.4g}; 1 is needed. Give it as w x y z.</source>
+        <translation>{place}的 {key} 是长度为 {length:.4g} 的四元数；长度应为 1。请按 w x y z 的顺序给出。</translation>
+    </message>
+    <message>
+        <source>{key} of {place} is more than {most:g} m. Check its units: millimetres are needed.</source>
+        <translation>{place}的 {key} 超过 {most:g} m。请检查其单位：此处需要毫米。</translation>
+    </message>
+    <message>
+        <source>{key} of {place} is no rotation: its rows must have the length 1 and be at right angles to each other. Give the matrix row by row, or a unit quaternion w x y z.</source>
+        <translation>{place}的 {key} 不是旋转：各行的长度必须为 1 且两两垂直。请逐行给出矩阵，或给出单位四元数 w x y z。</translation>
+    </message>
+    <message>
+        <source>{key} of {place} must hold what the turn about x y z (rad) and the translation (mm) are uncertain by: 6 standard deviations, none of them negative, or a covariance, symmetric and positive; up to 1 rad and 10 m. Correct or remove it.</source>
+        <translation>{place}的 {key} 必须给出绕 x y z 的转角（rad）和平移（mm）的不确定度：6 个非负的标准差，或一个对称的正定协方差矩阵；最大为 1 rad 和 10 m。请更正或删除它。</translation>
+    </message>
+    <message>
         <source>{led} where {other} belongs</source>
         <translation>{other} 的位置上是 {led}</translation>
     </message>
@@ -3317,6 +3453,10 @@
     <message>
         <source>{n_left_out} of {n_poses} poses agree with no common tip and were left out: {poses}. Look for what disturbed the tracking.</source>
         <translation>{n_poses} 个位姿中有 {n_left_out} 个与共同的测头不符，已剔除：{poses}。请查找干扰跟踪的原因。</translation>
+    </message>
+    <message>
+        <source>{n_pairs} of {n_moments} moments show the pen to camera {camera} and to another one; {needed} are needed to tell how both stand. Give the images of one moment the same name, and turn the cameras so that each sees the pen.</source>
+        <translation>{n_moments} 个时刻中有 {n_pairs} 个同时被相机 {camera} 和另一台相机看到光笔；至少需要 {needed} 个才能确定两者的相对位置。请让同一时刻的图像同名，并转动相机使每台都能看到光笔。</translation>
     </message>
     <message>
         <source>{n_poses} poses are usable; the tip needs at least {needed}. Capture more images.</source>
@@ -3369,6 +3509,10 @@
     <message>
         <source>{name} gives an image size of {width:g} x {height:g} px. Two whole numbers from 1 to {most} are needed.</source>
         <translation>{name} 给出的图像尺寸为 {width:g} × {height:g} px。需要两个 1 到 {most} 的整数。</translation>
+    </message>
+    <message>
+        <source>{name} gives {one} and {other} the same camera file {file}. Each camera needs the file of its own calibration.</source>
+        <translation>{name} 为 {one} 和 {other} 指定了同一个相机文件 {file}。每台相机都需要自己的标定文件。</translation>
     </message>
     <message>
         <source>{name} has LED discs {diameter:g} mm wide. A diameter of up to {most:g} mm is needed; check its units.</source>
@@ -3445,6 +3589,10 @@
     <message>
         <source>{name} has the {what} {sigma:g}. A standard uncertainty above 0 and up to {most:g} is needed; leave it away if it is not known.</source>
         <translation>{name} 的 {what} 为 {sigma:g}。标准不确定度必须大于 0 且不超过 {most:g}；未知时请省略。</translation>
+    </message>
+    <message>
+        <source>{name} has two cameras called {camera}. Give each a name of its own.</source>
+        <translation>{name} 中有两台相机都名为 {camera}。请为每台相机取不同的名称。</translation>
     </message>
     <message>
         <source>{name} has {bits} bits, the first image is {first}. Replay only images of one camera together.</source>
@@ -3539,6 +3687,14 @@
         <translation>{name} 为 {width} × {height} px，第一幅图像为 {first_width} × {first_height} px。请只回放同一台相机的图像。</translation>
     </message>
     <message>
+        <source>{name} names the camera file of {camera}: {trouble}</source>
+        <translation>{name} 所指定的相机 {camera} 的文件：{trouble}</translation>
+    </message>
+    <message>
+        <source>{name} states how well it is known where {one} stands, but not of {other}. State it of all cameras but the first, or of none.</source>
+        <translation>{name} 给出了 {one} 位置的不确定度，却没有给出 {other} 的。请为除第一台外的所有相机给出，或全部不给。</translation>
+    </message>
+    <message>
         <source>{name} states its lengths in {stated}, but the unit {given} is given. Leave the unit away, or correct the file.</source>
         <translation>{name} 注明的长度单位是 {stated}，但给出的单位是 {given}。请不要另给单位，或改正文件。</translation>
     </message>
@@ -3579,12 +3735,24 @@
         <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
     </message>
     <message>
+        <source>{place} has no {key}, or one that is no text. Add it.</source>
+        <translation>{place}没有 {key}，或者它不是文本。请补上。</translation>
+    </message>
+    <message>
         <source>{place} holds no images. Choose a recording that holds some.</source>
         <translation>{place} 中没有图像。请选择有图像的录制。</translation>
     </message>
     <message>
+        <source>{place} is no mapping with name, intrinsics and cam_from_rig.</source>
+        <translation>{place}不是包含 name、intrinsics 和 cam_from_rig 的映射。</translation>
+    </message>
+    <message>
         <source>{place} is no mapping. Write it as {{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}.</source>
         <translation>{place} 不是映射。请写成 {{&quot;led&quot;: 1, &quot;x&quot;: 0, &quot;y&quot;: 0, &quot;z&quot;: -30}}。</translation>
+    </message>
+    <message>
+        <source>{place} is the reference of the rig, where it stands is exact. Remove its {key}.</source>
+        <translation>{place}是相机组的基准，其位置没有不确定度。请删除它的 {key}。</translation>
     </message>
     <message>
         <source>{place}: the normal {normal} does not have the length 1. Correct it, or leave the normals away if all discs face +z.</source>
@@ -3593,6 +3761,10 @@
     <message>
         <source>{reason}. Choose another folder or name.</source>
         <translation>{reason}。请选择其他文件夹或名称。</translation>
+    </message>
+    <message>
+        <source>{told} They have the size of {other}: the images may be given in another order than the cameras of the rig file.</source>
+        <translation>{told}它们的尺寸与 {other} 相符：给出图像的顺序可能与相机组文件中相机的顺序不同。</translation>
     </message>
     <message>
         <source>{unit} is not a unit of length known here. Choose one of {known}.</source>
@@ -3605,6 +3777,18 @@
     <message>
         <source>{usable}; the tip needs at least {needed}. {advice}</source>
         <translation>{usable}；求测头至少需要 {needed} 幅。{advice}</translation>
+    </message>
+    <message>
+        <source>{where} Check that it is the file of these cameras as they stand now, or calibrate the rig again.</source>
+        <translation>{where}请检查该文件是否对应这些相机当前的位置，或重新标定相机组。</translation>
+    </message>
+    <message>
+        <source>{where} {cause}</source>
+        <translation>{where}{cause}</translation>
+    </message>
+    <message>
+        <source>{where} {one} Or: {other}</source>
+        <translation>{where}{one}或者：{other}</translation>
     </message>
     <message>
         <source>{why}</source>
@@ -3732,6 +3916,10 @@
     <message>
         <source>File does not fit</source>
         <translation>文件不符</translation>
+    </message>
+    <message>
+        <source>Not at the same time</source>
+        <translation>拍摄不同时</translation>
     </message>
     <message>
         <source>No tip found</source>
