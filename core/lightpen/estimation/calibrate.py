@@ -314,7 +314,7 @@ def _telling(parts: Sequence[PosedImages], kept: BoolArray) -> list[IntArray]:
     Those of images that were left out do only where no other image of the moment takes
     part.
     """
-    none_kept = ~kept.any(axis=1)
+    none_kept = np.logical_not(kept.any(axis=1))
     return [
         np.flatnonzero(kept[part.posed, c] | none_kept[part.posed])
         for c, part in enumerate(parts)
