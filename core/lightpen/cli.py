@@ -39,8 +39,10 @@ from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import DISC_DIAMETER
 from lightpen.record.reading import (
     is_record,
@@ -360,6 +362,7 @@ class _Calibrated:
     calibration: Calibration
     nominal_tip: FloatArray | None
     limits: SwingLimits
+    origin: Origin | None
     inputs: Callable[[], Inputs]
 
 
@@ -380,7 +383,8 @@ def _calibrate(options: argparse.Namespace) -> None:
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        calibration, options.method, calibrated.nominal_tip, verdict
+        *(calibration, options.method, calibrated.nominal_tip, verdict),
+        calibrated.origin,
     )
     print(_shown(text))
     if options.json is not None:
@@ -421,6 +425,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         solution.calibration,
         solution.source.pen.nominal_tip,
         recorded_limits(record),
+        solution.source.origin,
         lambda: record_inputs(solution.source),
     )
 
@@ -495,15 +500,19 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         _require_other_file(options.json, *files)
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
+    simulated = any(map(is_simulated, (options.camera, options.pen, *files[:1])))
+    origin = Origin.SIMULATED if simulated else Origin.RECORDED
     return _Calibrated(
         calibrate(camera, pen, observations, _assumptions(options)),
         pen.nominal_tip,
         SwingLimits(),
+        origin,
         lambda: Inputs(
             camera=hashed(options.camera),
             pen=hashed(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
+            origin=origin,
         ),
     )
 

@@ -15,6 +15,7 @@ from lightpen.formats.camera_files import write_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import strerror, write_whole
 from lightpen.formats.pen_files import write_pen
+from lightpen.formats.simulated_files import mark_simulated
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
 from lightpen.model.rigid import fit_rigid, vector_from_rotation
@@ -73,6 +74,7 @@ def write_scene(
     images = folder / "images"
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
     _make_folder(images, names)
+    mark_simulated(folder)
     plan = plan_scene(scene)
     write_camera(scene.camera, folder / "camera.yaml", "opencv")
     # A table of coordinates has no place for these.
@@ -105,6 +107,7 @@ def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _no_folder(folder, error) from error
+    mark_simulated(folder)
     files = SampleFiles(folder / "camera.yaml", folder / "pen.json")
     write_camera(scene.camera, files.camera, "opencv")
     write_pen(scene.pen, files.pen)
