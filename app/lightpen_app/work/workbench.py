@@ -96,6 +96,7 @@ class Workbench(QObject):
         self._unread = Station()
         self._presence = Presence(folder)
         self._n_others = 0
+        self._counter: Job | None = None
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
@@ -328,14 +329,17 @@ class Workbench(QObject):
 
     def _count_others(self) -> None:
         """See whether other windows use the same data folder."""
+        if self._counter is not None:  # a disk that does not answer is asked once
+            return
         presence = self._presence
-        job = Job(lambda _: presence.count_others(), self)
+        self._counter = job = Job(lambda _: presence.count_others(), self)
 
         # Connections
         job.succeeded.connect(self._on_others_counted)
         job.start()
 
     def _on_others_counted(self, n_others: int) -> None:
+        self._counter = None
         if n_others != self._n_others:
             self._n_others = n_others
             self.others_counted.emit(n_others)

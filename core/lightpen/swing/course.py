@@ -37,7 +37,7 @@ from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.capture import Rule, capture_image
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.recorded import read_image
+from lightpen.swing.recorded import pass_over, read_image
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rules import (
     Transition,
@@ -101,6 +101,7 @@ class SwingCourse:
         self._attendance = Attendance()
         self._writer: RecordWriter | None = None
         self._record: Record | None = None  # as it was when it was entered
+        self._n_others = 0  # images of a recording since the last that was read
         self._known = frozenset[str]()  # checksums of images that were recorded by then
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
@@ -234,6 +235,7 @@ class SwingCourse:
         self._drop_task()
         self._close_record()
         self._writer, self._record = writer, record
+        self._n_others = 0
         self._known = frozenset(image.sha256 for image in record.images)
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
@@ -283,7 +285,9 @@ class SwingCourse:
         assert writer is not None
         rule: Rule | None = None
         if setup.is_recording:
-            if n_images is None or not _is_next(before, frame, n_images):
+            if n_images is None or before.phase is Phase.PAUSED:
+                return
+            if not self._is_next(before, frame, n_images):
                 return
             is_known = self._is_known(frame)
             rule = partial(read_image, n_images=n_images, is_known=is_known)
@@ -300,6 +304,21 @@ class SwingCourse:
         if any(event.what is Happening.KEPT for event in transition.events):
             self._relieve()
         self._become(transition)
+
+    def _is_next(self, before: SwingState, frame: Frame, n_images: int) -> bool:
+        """Return whether it is the turn of an image of a recording.
+
+        The recording is shown over and over; each image is read once, in its order.
+        One that does not come in a whole pass cannot be read, and is passed over.
+        """
+        if frame.seq % n_images == before.progress.n_read:
+            self._n_others = 0
+            return True
+        self._n_others += 1
+        if self._n_others > n_images:
+            self._n_others = 0
+            self._become(pass_over(before, n_images))
+        return False
 
     def _is_known(self, frame: Frame) -> bool:
         """Return whether a recorded image was taken before an interruption."""
@@ -577,13 +596,3 @@ class _Solved:
 
     solution: Solution
     assessment: Assessment
-
-
-def _is_next(state: SwingState, frame: Frame, n_images: int) -> bool:
-    """Return whether it is the turn of an image of a recording.
-
-    The recording is shown over and over; each image is read once, in its order.
-    """
-    if state.phase is Phase.PAUSED:
-        return False
-    return frame.seq % n_images == state.progress.n_read

@@ -51,29 +51,48 @@ def read_image(
     Transition
         As `lightpen.swing.rules.advance` returns it.
     """
-    progress = Progress(state.progress.n_read + 1, n_images)
-    state = replace(
-        state,
-        phase=Phase.CAPTURING,
-        time=time,
-        progress=progress,
-        message=images_read(progress.n_read, n_images),
-    )
+    state = replace(_further(state, n_images), time=time)
     events: tuple[SwingEvent, ...] = ()
     flaw = _flaw(setup, sighting)
     if flaw is not Reason.NONE:
-        counts = Counter(state.n_dropped)
-        counts[flaw] += 1
-        state = replace(state, n_dropped=counts)
+        state = _with_dropped(state, flaw)
     elif not is_known:
         number = state.next_number
         kept = keep(setup.camera, setup.pen, state.kept, sighting, number, time)
         state = replace(state, kept=kept, next_number=number + 1)
         events = (SwingEvent(Happening.KEPT, (number,)),)
-    if progress.n_read < n_images:
-        return Transition(state, events)
-    ended = finish(state)
-    return Transition(ended.state, (*events, *ended.events))
+    return _ended_by_last(Transition(state, events))
+
+
+def pass_over(state: SwingState, n_images: int) -> Transition:
+    """Leave out the next recorded image, which cannot be read."""
+    passed = _with_dropped(_further(state, n_images), Reason.UNREADABLE)
+    return _ended_by_last(Transition(passed))
+
+
+def _further(state: SwingState, n_images: int) -> SwingState:
+    n_read = state.progress.n_read + 1
+    return replace(
+        state,
+        phase=Phase.CAPTURING,
+        progress=Progress(n_read, n_images),
+        message=images_read(n_read, n_images),
+    )
+
+
+def _with_dropped(state: SwingState, reason: Reason) -> SwingState:
+    counts = Counter(state.n_dropped)
+    counts[reason] += 1
+    return replace(state, n_dropped=counts)
+
+
+def _ended_by_last(transition: Transition) -> Transition:
+    """End the capture where no image is left."""
+    progress = transition.state.progress
+    if progress.n_read < progress.n_images:
+        return transition
+    ended = finish(transition.state)
+    return Transition(ended.state, (*transition.events, *ended.events))
 
 
 def _flaw(setup: SwingSetup, sighting: Sighting) -> Reason:

@@ -1,14 +1,17 @@
 """A swing of recorded images: all are read once, in order, and nothing is asked."""
 
+import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, FrameIncomplete
 from lightpen.cameras.replay import ReplayCamera
+from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
 from lightpen.messages import Code
 from lightpen.model.origin import Origin
@@ -37,9 +40,10 @@ class Recording:
         )
 
     def show(self, n_images: int) -> None:
-        """Show so many of the next images."""
+        """Show so many of the next images; what cannot be read is not seen."""
         for _ in range(n_images):
-            self.take(self.camera.read(1.0))
+            with suppress(FrameIncomplete):
+                self.take(self.camera.read(1.0))
 
     def take(self, frame: Frame) -> None:
         station = self.station
@@ -91,6 +95,23 @@ def test_it_begins_with_the_first_image_whichever_is_shown(
     for frame in frames[20:]:
         recording.take(frame)
     assert station.state.progress.n_read == station.n_recorded == 3
+
+
+@pytest.mark.parametrize("spoiled", [7, N_IMAGES - 1])
+def test_an_image_that_cannot_be_read_is_passed_over(
+    station: "Station", swung: Callable[..., Path], tmp_path: Path, spoiled: int
+) -> None:
+    images = tmp_path / "images"
+    shutil.copytree(swung() / "images", images)
+    sorted(images.iterdir())[spoiled].write_bytes(b"no image")
+    recording = Recording(station, images)
+    station.begin()
+    while station.status.is_capturing:
+        recording.show(1)
+    station.wait_for_phase(Phase.VERDICT)
+
+    assert station.n_recorded == N_IMAGES - 1
+    assert station.state.n_dropped == {Reason.UNREADABLE: 1}
 
 
 def test_the_postures_that_lack_are_named_at_the_end(
