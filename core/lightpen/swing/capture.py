@@ -1,11 +1,16 @@
 """From a live image to a longer record: decide, and put on disk what is kept."""
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 from lightpen.arrays import Image
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.rules import Transition, advance
 from lightpen.swing.state import Happening, SwingSetup, SwingState
+
+Rule: TypeAlias = Callable[[SwingSetup, SwingState, Sighting, float], Transition]
 
 
 def capture_image(
@@ -16,8 +21,9 @@ def capture_image(
     sighting: Sighting,
     time: float,
     device_time_ns: int | None = None,
+    rule: Rule | None = None,
 ) -> Transition:
-    """Take one live image into a swing.
+    """Take one image into a swing.
 
     Parameters
     ----------
@@ -31,6 +37,8 @@ def capture_image(
         When it was taken, s.
     device_time_ns : int, optional
         By the clock of the camera.
+    rule : Rule, optional
+        What the image does to the swing; that of a live one by default.
 
     Returns
     -------
@@ -47,7 +55,7 @@ def capture_image(
             f"The swing is at image {state.next_number}, the record at "
             f"{writer.next_number}."
         )
-    transition = advance(setup, state, sighting, time)
+    transition = (rule or advance)(setup, state, sighting, time)
     # The image last: if the disk fails before, state and record both go without it.
     for event in transition.events:
         if event.what is Happening.SLIPPED and event.numbers:

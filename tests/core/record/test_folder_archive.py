@@ -371,10 +371,10 @@ def test_a_result_of_a_later_version_is_refused_and_hides_none(
     archive.store(result(6.0))
     archive.store(result(9.0))
     file = files_of(archive)[2]
-    later = json.dumps(entries_of(file) | {"format": 4, "calibration": "elsewhere"})
+    later = json.dumps(entries_of(file) | {"format": 5, "calibration": "elsewhere"})
     file.write_bytes(with_checksum(later.encode()))
 
-    with pytest.raises(FileError, match=r"later version of the program \(format 4"):
+    with pytest.raises(FileError, match=r"later version of the program \(format 5"):
         archive.in_force("LP-04", "T-10")
     assert x_in_force(archive, tip="T-11") == 1.0
 

@@ -14,11 +14,15 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
+from lightpen.record.recordings import FilesBeside
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.phrases import QT_TRANSLATE_NOOP
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 
 
@@ -59,11 +63,14 @@ class SourcePanel(Translated, QGroupBox):
         The files of the simulated pen are to be used.
     retry_requested()
         Open the same source once more.
+    files_requested(FilesBeside)
+        The files beside the recorded images are to be used.
     """
 
     value_changed = Signal(object)
     samples_requested = Signal()
     retry_requested = Signal()
+    files_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -83,6 +90,9 @@ class SourcePanel(Translated, QGroupBox):
         self._pick.setMenu(menu)
         self._samples = PushButton()
         self._retry = PushButton()
+        self._beside = FilesBeside()
+        self._found = SignLabel()
+        self._use_found = PushButton()
 
         # Layout
         layout = QVBoxLayout(self)
@@ -94,6 +104,8 @@ class SourcePanel(Translated, QGroupBox):
         first.addWidget(self._samples)
         layout.addLayout(first)
         layout.addWidget(self._place)
+        layout.addWidget(self._found)
+        layout.addWidget(self._use_found)
         layout.addWidget(self._retry)
 
         # Connections
@@ -101,6 +113,8 @@ class SourcePanel(Translated, QGroupBox):
         self._place.value_changed.connect(self._on_place_changed)
         self._folder.triggered.connect(self._on_folder_triggered)
         self._file.triggered.connect(self._on_file_triggered)
+        self._use_found.clicked.connect(self._on_use_found_clicked)
+        FileDrops(self).dropped.connect(self._on_dropped)
         self._samples.clicked.connect(self.samples_requested)
         self._retry.clicked.connect(self.retry_requested)
 
@@ -120,6 +134,11 @@ class SourcePanel(Translated, QGroupBox):
         if self._entry.has_place:
             self._place.set_value(value.place)
         self._refresh()
+
+    def set_beside(self, files: FilesBeside) -> None:
+        """Offer files that stand beside the recorded images, or none."""
+        self._beside = files
+        self._refresh_beside()
 
     def set_faulty(self, faulty: bool) -> None:
         """Mark the source as one that could not be opened, and offer to try again."""
@@ -144,6 +163,14 @@ class SourcePanel(Translated, QGroupBox):
         else:
             self._choose(chosen)
 
+    def _on_use_found_clicked(self) -> None:
+        self.files_requested.emit(self._beside)
+
+    def _on_dropped(self, path: str) -> None:
+        """Take images that are dropped here, whatever the source was."""
+        self._place.set_value(path)
+        self._choose(SourceChoice(SourceKind.RECORDED, path))
+
     def _on_folder_triggered(self) -> None:
         self._place.pick(
             QFileDialog.FileMode.Directory, self.tr("Folder of the recorded images")
@@ -166,8 +193,20 @@ class SourcePanel(Translated, QGroupBox):
         self._kind.setCurrentIndex(SOURCES.index(self._entry))
         self._place.setVisible(self._entry.has_place)
         self._samples.setVisible(self._value.kind is SourceKind.SIMULATED)
+        self._refresh_beside()
+
+    def _refresh_beside(self) -> None:
+        files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]
+        is_offered = bool(files) and self._entry.has_place
+        names = self.tr(" and ").join(file.name for file in files)
+        text = self.tr("Beside the images: {0}").format(names) if is_offered else ""
+        self._found.set_value(Remark(text, Sign.RING, Tone.ACTIVE))
+        use = self.tr("Use both") if len(files) > 1 else self.tr("Use it")
+        self._use_found.setText(use)
+        self._use_found.setVisible(is_offered)
 
     def _retranslate(self) -> None:
+        self._refresh_beside()
         self.setTitle(self.tr("Source of the images"))
         for index, entry in enumerate(SOURCES):
             self._kind.setItemText(index, self.tr(entry.name))
