@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial, wraps
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
@@ -22,16 +22,22 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.moments import observe_rig_centers, observe_rig_images
-from lightpen.detection.observations import observe_centers, observe_images
+from lightpen.detection.observations import (
+    Observations,
+    observe_centers,
+    observe_images,
+)
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.pivot_calibration import calibrate_pivot
+from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import (
     METHODS,
     calibration_record,
     json_bytes,
     pivot_record,
 )
+from lightpen.estimation.second_cone import SecondSwing
 from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
@@ -44,6 +50,7 @@ from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
 from lightpen.formats.rig_files import read_rig
 from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
+from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import DISC_DIAMETER, Pen
@@ -61,6 +68,7 @@ from lightpen.sentences import Sentence, sentence
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
 BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
+COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
@@ -205,6 +213,47 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty of the pen's scale, such as 20e-6, where the pen "
         "file states none",
     )
+    parser.add_argument(
+        "--temperature",
+        type=_temperature,
+        metavar="CELSIUS",
+        help="of the pen during the swing, which makes it larger than its file says",
+    )
+    parser.add_argument(
+        "--temperature-sigma",
+        type=_positive,
+        metavar="K",
+        help="its standard uncertainty (0.5), or without --temperature how much warmer "
+        "than at its measurement the pen may be (1.5)",
+    )
+    parser.add_argument(
+        "--form-error",
+        type=_positive,
+        metavar="MM",
+        help="standard uncertainty of where the ball sits, as ball and cone are not "
+        "quite round (0.0002)",
+    )
+    parser.add_argument(
+        "--center-bias",
+        type=_positive,
+        metavar="PX",
+        help="standard uncertainty of LED centres that does not average out (0.003)",
+    )
+    parser.add_argument(
+        "--second-cone",
+        metavar="IMAGES",
+        help="images of a swing in a second cone, in the form of those of the first; "
+        "the camera must not have moved",
+    )
+    parser.add_argument(
+        "--distance", type=_positive, metavar="MM", help="of the two cones"
+    )
+    parser.add_argument(
+        "--distance-sigma",
+        type=_positive,
+        metavar="MM",
+        help="its standard uncertainty",
+    )
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
         "--nominal-tip", type=_finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
@@ -319,6 +368,22 @@ def _finite(text: str) -> float:
     return number
 
 
+def _positive(text: str) -> float:
+    number = _finite(text)
+    if not number > 0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0.")
+    return number
+
+
+def _temperature(text: str) -> float:
+    number = _finite(text)
+    if not COLDEST <= number <= WARMEST:
+        raise argparse.ArgumentTypeError(
+            f"{text} is no temperature from {COLDEST:g} to {WARMEST:g} degrees Celsius."
+        )
+    return number
+
+
 def _share(text: str) -> float:
     """Return a part of one, which may be given in per cent."""
     number = _finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
@@ -335,7 +400,32 @@ def _assumptions(options: argparse.Namespace) -> Assumptions:
         assumed = with_focal_length(assumed, options.camera_sigma)
     if options.scale_sigma is not None:
         assumed = replace(assumed, scale=options.scale_sigma)
+    if options.temperature is not None:
+        assumed = replace(assumed, temperature_c=options.temperature)
+    if options.temperature_sigma is not None:
+        which = "warmth" if options.temperature is None else "temperature"
+        assumed = replace(assumed, **{which: options.temperature_sigma})
+    if options.form_error is not None:
+        assumed = replace(assumed, form_error=options.form_error)
+    if options.center_bias is not None:
+        assumed = replace(assumed, center_bias=options.center_bias)
     return assumed
+
+
+def _separation(options: argparse.Namespace) -> Separation | None:
+    """Return the distance of two cones, if there are two."""
+    given = (options.second_cone, options.distance, options.distance_sigma)
+    if all(each is None for each in given):
+        return None
+    if any(each is None for each in given):
+        raise UsageError(
+            sentence(
+                "cli.second-cone",
+                "A second cone needs three options: --second-cone IMAGES, --distance "
+                "MM and --distance-sigma MM. Give all or none.",
+            )
+        )
+    return Separation(options.distance, options.distance_sigma)
 
 
 def _add_pivot(parser: argparse.ArgumentParser) -> None:
@@ -449,6 +539,13 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         "--nominal-tip": options.nominal_tip,
         "--camera-sigma": options.camera_sigma,
         "--scale-sigma": options.scale_sigma,
+        "--temperature": options.temperature,
+        "--temperature-sigma": options.temperature_sigma,
+        "--form-error": options.form_error,
+        "--center-bias": options.center_bias,
+        "--second-cone": options.second_cone,
+        "--distance": options.distance,
+        "--distance-sigma": options.distance_sigma,
     }
     given = [name for name, value in own.items() if value is not None]
     if given:
@@ -538,22 +635,25 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
             raise _lacking(name, options.images)
     camera = read_camera(options.camera)
     pen = _read_pen(options)
+    separation = _separation(options)
     if options.centers is not None:
         _require_one_each(options.centers, 1, RIG_NEEDED)
-        centers = read_centers(options.centers[0], pen.n_leds)
-        files: tuple[Path, ...] = tuple(options.centers)
-        observations = observe_centers(centers, camera, pen)
+        given = [str(options.centers[0])]
     else:
         if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
             _require_one_each(options.images, 1, RIG_NEEDED)
-        source = find_images(*options.images)
-        files = source.files
-        _require_other_file(options.json, *files)
-        with _progress("Finding LEDs") as report:
-            observations = observe_images(source, camera, pen, report)
-    origin = _origin(options.camera, options.pen, *files[:1])
+        given = options.images
+    observe = partial(
+        _observe, options.json, camera, pen, is_centers=options.centers is not None
+    )
+    observations, files = observe(given)
+    second = None
+    if separation is not None:
+        others, more_files = observe([options.second_cone])
+        second, files = SecondSwing(others, separation), files + more_files
+    origin = _origin(options.camera, options.pen, *files)
     return _Calibrated(
-        calibrate(camera, pen, observations, _assumptions(options)),
+        calibrate(camera, pen, observations, _assumptions(options), second),
         pen.nominal_tip,
         SwingLimits(),
         origin,
@@ -673,6 +773,26 @@ def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
+def _observe(
+    record: Path | None,
+    camera: Camera,
+    pen: Pen,
+    given: Sequence[str],
+    *,
+    is_centers: bool,
+) -> tuple[Observations, tuple[Path, ...]]:
+    """Return what images or a file of centres show, and the files of it."""
+    if is_centers:
+        path = Path(given[0])
+        _require_other_file(record, path)
+        centers = read_centers(path, pen.n_leds)
+        return observe_centers(centers, camera, pen), (path,)
+    source = find_images(*given)
+    _require_other_file(record, *source.files)
+    with _progress("Finding LEDs") as report:
+        return observe_images(source, camera, pen, report), source.files
+
+
 @_printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
@@ -713,11 +833,6 @@ def _simulate(options: argparse.Namespace) -> None:
             "frame of leds.csv."
         )
     )
-    if options.led_diameter != DISC_DIAMETER:
-        print(
-            "leds.csv does not say the size of the LEDs: calibrate with "
-            f"--led-diameter {options.led_diameter:g}."
-        )
 
 
 @_printing

@@ -227,24 +227,13 @@ def file_contradicted(why: Sentence) -> Sentence:
 
 def not_simultaneous(camera: str, lag: float) -> Sentence:
     """Tell by which part of the time between two images a camera is late."""
-    if lag > 0:
-        return sentence(
-            Code.NOT_SIMULTANEOUS,
-            "Camera {camera} takes its images some {lag:.2f} of the time between two "
-            "images later than the first camera. That moves the tip, and other "
-            "warnings may come of it. Trigger all cameras by one signal, or hold the "
-            "pen still for each image.",
-            camera=camera,
-            lag=lag,
-        )
     return sentence(
         Code.NOT_SIMULTANEOUS,
-        "Camera {camera} takes its images some {lag:.2f} of the time between two "
-        "images earlier than the first camera. That moves the tip, and other warnings "
-        "may come of it. Trigger all cameras by one signal, or hold the pen still for "
-        "each image.",
+        "Camera {camera} is out of step with the first camera by some {lag:.2f} of the "
+        "time between two images. That moves the tip, and other warnings may come of "
+        "it. Trigger all cameras by one signal, or hold the pen still for each image.",
         camera=camera,
-        lag=-lag,
+        lag=abs(lag),
     )
 
 

@@ -92,6 +92,10 @@ _AT_THE_SCREEN: dict[Code, str] = {
 }
 _SHARES: dict[ShareName, str] = {
     ShareName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
+    ShareName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centers"),
+    ShareName.FORM: QT_TRANSLATE_NOOP("phrases", "ball, cone"),
+    ShareName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "warmth"),
+    ShareName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),
     ShareName.SEAT: QT_TRANSLATE_NOOP("phrases", "seat"),
     ShareName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
     ShareName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),

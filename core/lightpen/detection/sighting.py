@@ -20,7 +20,7 @@ from lightpen.detection.labelling.labels import (
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.detection.reasons import MISHAPS, Reason
-from lightpen.detection.spots import Spots, detect_spots
+from lightpen.detection.spots import Flaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
@@ -84,6 +84,21 @@ class Sighting:
     def is_blurred(self) -> bool:
         """Whether most of the spots are smeared, as a fast hand smears them."""
         return self.spots is not None and self.spots.are_blurred
+
+    @property
+    def areas(self) -> FloatArray:
+        """Areas of the LEDs fit for use, (L,), px^2; NaN elsewhere.
+
+        So it is of saturated ones, which look larger than they are.
+        """
+        areas = np.full(len(self.pixels), np.nan)
+        if self.spots is None or self.labels is None:
+            return areas
+        spot = self.labels.spot
+        known = np.isfinite(self.pixels[:, 0])
+        known[known] = (self.spots.flaws[spot[known]] & Flaw.SATURATED) == 0
+        areas[known] = self.spots.areas[spot[known]]
+        return areas
 
     @property
     def edge_width(self) -> float:

@@ -18,6 +18,7 @@ from lightpen.estimation.rig_report import (
     rig_record,
     rig_warnings,
 )
+from lightpen.estimation.second_cone import SecondCone
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
@@ -118,6 +119,7 @@ def calibration_record(
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "adjusted": _adjusted(calibration),
+        "second_cone": _second_cone(calibration.second),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
             "expanded_uncertainty_mm": calibration.budget.weakest_uncertainty,
@@ -245,7 +247,7 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     """Return what is told of a tip that did not rest where the model has it."""
     bundle, found = calibration.bundle, calibration.bundle.components
     warnings = []
-    if found.jitter is not None:
+    if found.jitter.covariance is not None:
         warnings.append(
             sentence(
                 "warning.seat-jitter",
@@ -253,7 +255,7 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
                 "{distance:.4f} mm (standard deviation) from image to image. Clean tip "
                 "and cone, look for wear, and press the tip in. It is in the "
                 "uncertainty.",
-                distance=float(np.sqrt(np.trace(found.jitter))),
+                distance=float(np.sqrt(np.trace(found.jitter.covariance))),
             )
         )
     if any(form.is_significant for form in found.seat):
@@ -389,12 +391,20 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
 def _adjusted(calibration: Calibration) -> dict[str, Any]:
     """Return what the images made of the files."""
     prior = calibration.priors.cameras[0]
+    reading = calibration.priors.reading
     return {
         "intrinsics": intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
         "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
+        "temperature_uncertainty_assumed": calibration.priors.temperature.assumed,
+        "pen_growth": calibration.growth,
         "disc_diameter_mm": calibration.bundle.state.pen.diameter,
+        "disc_diameter_by_areas_mm": (
+            None
+            if reading is None
+            else {"value": reading.value, "standard_uncertainty": reading.sigma}
+        ),
         "contradictions": [
             {
                 "what": str(each.what),
@@ -408,6 +418,20 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
             }
             for each in calibration.contradictions
         ],
+    }
+
+
+def _second_cone(second: SecondCone | None) -> dict[str, Any] | None:
+    if second is None:
+        return None
+    return {
+        "cone_cam_mm": second.cone_cam,
+        "images_used": second.n_used,
+        "stated_distance_mm": second.separation.distance,
+        "stated_standard_uncertainty_mm": second.separation.sigma,
+        "distance_mm": second.distance,
+        "expanded_uncertainty_without_mm": second.uncertainty_without,
+        "expanded_uncertainty_with_mm": second.uncertainty_with,
     }
 
 

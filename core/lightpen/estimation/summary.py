@@ -143,11 +143,37 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     )
     if calibration.coverage.missing:
         lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
+    lines += _pen_lines(calibration)
     if calibration.led_sigma > 0:
         lines.append(
             f"LED file     off by {calibration.led_sigma:.4f} mm (standard "
             "deviation of a coordinate), corrected as far as the images tell"
         )
+    return lines
+
+
+def _pen_lines(calibration: Calibration) -> list[str]:
+    lines = []
+    if calibration.growth != 0:
+        lines.append(
+            f"Temperature  the pen is {1e6 * calibration.growth:+.1f} ppm larger than "
+            "its file says, which is corrected"
+        )
+    reading = calibration.priors.reading
+    if reading is not None:
+        lines.append(
+            f"Discs        {reading.value:.2f} mm wide by their areas, U = "
+            f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
+        )
+    second = calibration.second
+    if second is not None:
+        lines += [
+            f"Second cone  {second.n_used} images used, {second.distance:.4f} mm from "
+            f"the first; certified {second.separation.distance:.4f} mm, U = "
+            f"{COVERAGE_FACTOR * second.separation.sigma:.4f} mm",
+            _numbers("  U without the distance", second.uncertainty_without),
+            _numbers("  U with it", second.uncertainty_with),
+        ]
     return lines
 
 

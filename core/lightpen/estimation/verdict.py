@@ -41,6 +41,7 @@ TINY = 1e-12  # mm
 
 IMAGES_SHRINK = (
     ShareName.NOISE,
+    ShareName.CENTERS,
     ShareName.SEAT,
     ShareName.DRIFT,
     ShareName.HELD_BACK,
@@ -53,6 +54,19 @@ _ADVICE = {
         "share.scale",
         "the scale of the LED file. State its uncertainty in the file, and measure "
         "where the pen is used",
+    ),
+    ShareName.FORM: sentence(
+        "share.form",
+        "ball and cone, which are not quite round. Use better ones, and state their "
+        "form error",
+    ),
+    ShareName.TEMPERATURE: sentence(
+        "share.temperature",
+        "the temperature of the pen. State its expansion in the LED file, and measure "
+        "its temperature at the swing",
+    ),
+    ShareName.DISTANCE: sentence(
+        "share.distance", "the distance of the two cones. Have it measured better"
     ),
     ShareName.DIAMETER: sentence(
         "share.diameter",

@@ -2480,6 +2480,10 @@
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_absent} 个没有图像，例如 {example} 所在的时刻。这些时刻采用其他相机的图像。</translation>
     </message>
     <message>
+        <source>Camera {camera} is out of step with the first camera by some {lag:.2f} of the time between two images. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
+        <translation>相机 {camera} 与第一台相机不同步，约差两幅图像间隔的 {lag:.2f}。这会使测头位置偏移，也可能引起其他警告。请用同一信号触发所有相机，或在每次拍摄时握稳光笔。</translation>
+    </message>
+    <message>
         <source>Camera {camera}: {trouble}</source>
         <translation>相机 {camera}：{trouble}</translation>
     </message>
@@ -2896,6 +2900,10 @@
         <translation>图像与 LED 文件不符：其坐标偏差为 {found:.4f} mm（标准差），文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
     </message>
     <message>
+        <source>The images contradict the LED file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this pen, or measure the pen again.</source>
+        <translation>图像与 LED 文件矛盾：图像要求{what}为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件给出 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于这支笔，或重新测量这支笔。</translation>
+    </message>
+    <message>
         <source>The images contradict the camera file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this camera, lens and focus, or calibrate the camera again.</source>
         <translation>图像与内参文件不符：按图像，{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
     </message>
@@ -3032,6 +3040,10 @@
         <translation>测头 {tip}、光笔 {pen} 的这一结果已不再生效。撤回之前，请先查看现在生效的是哪一个。</translation>
     </message>
     <message>
+        <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
+        <translation>测球与锥孔不够圆。请换用更好的，并给出其形状误差</translation>
+    </message>
+    <message>
         <source>camera {number} of {name}</source>
         <translation>{name} 中的第 {number} 台相机</translation>
     </message>
@@ -3042,6 +3054,10 @@
     <message>
         <source>centimetres</source>
         <translation>厘米</translation>
+    </message>
+    <message>
+        <source>diameter of the discs</source>
+        <translation>发光圆面的直径</translation>
     </message>
     <message>
         <source>further turn of cam_from_rig about {axis}</source>
@@ -3072,6 +3088,10 @@
         <translation>相机组文件</translation>
     </message>
     <message>
+        <source>scale of the LEDs</source>
+        <translation>LED 坐标的比例</translation>
+    </message>
+    <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
@@ -3082,14 +3102,6 @@
     <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
-    </message>
-    <message>
-        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images earlier than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
-        <translation>相机 {camera} 的拍摄时刻比第一台相机早 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
-    </message>
-    <message>
-        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images later than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
-        <translation>相机 {camera} 的拍摄时刻比第一台相机晚 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -3488,6 +3500,10 @@
         <translation>磁盘是只读的。请选择其他文件夹。</translation>
     </message>
     <message>
+        <source>the distance of the two cones. Have it measured better</source>
+        <translation>两个锥孔的间距。请更精确地测量它</translation>
+    </message>
+    <message>
         <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
         <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
     </message>
@@ -3522,6 +3538,10 @@
     <message>
         <source>the scatter of the poses, and that it hangs together from pose to pose</source>
         <translation>位姿的散布，以及相邻位姿之间的相关性</translation>
+    </message>
+    <message>
+        <source>the temperature of the pen. State its expansion in the LED file, and measure its temperature at the swing</source>
+        <translation>笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
     </message>
     <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
@@ -3848,10 +3868,6 @@
         <translation>{name} 的单位 {unit} 不受支持。请使用 {known} 之一。</translation>
     </message>
     <message>
-        <source>{name} has the {what} {sigma:g}. A standard uncertainty above 0 and up to {most:g} is needed; leave it away if it is not known.</source>
-        <translation>{name} 的 {what} 为 {sigma:g}。标准不确定度必须大于 0 且不超过 {most:g}；未知时请省略。</translation>
-    </message>
-    <message>
         <source>{name} has two cameras called {camera}. Give each a name of its own.</source>
         <translation>{name} 中有两台相机都名为 {camera}。请为每台相机取不同的名称。</translation>
     </message>
@@ -3930,6 +3946,10 @@
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that the right file is named.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} has the {what} {number:g}. A number above {least:g} and up to {most:g} is needed; leave it away if it is not known.</source>
+        <translation>{name} 中的 {what} 为 {number:g}。需要大于 {least:g} 且不超过 {most:g} 的数；若未知请略去。</translation>
     </message>
     <message>
         <source>{name} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
@@ -4205,6 +4225,22 @@
     <message>
         <source>noise</source>
         <translation>噪声</translation>
+    </message>
+    <message>
+        <source>centers</source>
+        <translation>中心</translation>
+    </message>
+    <message>
+        <source>ball, cone</source>
+        <translation>球与锥孔</translation>
+    </message>
+    <message>
+        <source>warmth</source>
+        <translation>温度</translation>
+    </message>
+    <message>
+        <source>cone distance</source>
+        <translation>锥孔间距</translation>
     </message>
     <message>
         <source>seat</source>

@@ -315,6 +315,26 @@ def test_only_uncertainties_that_are_known_are_written(
     assert "diameter_sigma" not in text
 
 
+def test_how_a_pen_grows_with_warmth_is_read_from_tables_and_json(
+    tmp_path: Path,
+) -> None:
+    numbers = {"expansion": 2.3e-5, "expansion_sigma": 1e-6, "temperature_c": 20.5}
+    columns = with_columns(",".join(numbers), ",".join(map(str, numbers.values())))
+    for text in (columns, document(**numbers)):
+        pen = read_pen(saved(tmp_path, text))
+        assert (pen.expansion, pen.expansion_sigma) == (2.3e-5, 1e-6)
+        assert pen.temperature_c == 20.5
+
+
+@pytest.mark.parametrize(
+    ("what", "value"), [("expansion", "0.002"), ("temperature_c", "293.15")]
+)
+def test_other_units_of_warmth_are_refused(
+    tmp_path: Path, what: str, value: str
+) -> None:
+    assert f"has the {what} {value}." in refusal(tmp_path, with_columns(what, value))
+
+
 @pytest.mark.parametrize("what", ["led_sigma", "scale_sigma", "diameter_sigma"])
 @pytest.mark.parametrize("value", ["0", "-0.001", "11"])
 def test_what_is_no_standard_uncertainty_is_refused(
@@ -435,6 +455,9 @@ def pens(draw: st.DrawFn) -> Pen:
         led_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
         scale_sigma=draw(st.none() | st.floats(1e-9, 0.01)),
         diameter_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
+        expansion=draw(st.none() | st.floats(-9e-6, 1e-4)),
+        expansion_sigma=draw(st.none() | st.floats(1e-9, 1e-4)),
+        temperature_c=draw(st.none() | st.floats(-49.0, 100.0)),
     )
 
 
