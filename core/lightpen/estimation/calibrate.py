@@ -15,6 +15,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.contradictions import Contradiction
+from lightpen.estimation.instrument import Instrument, adjusted_instrument
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
 from lightpen.estimation.placing import place_cameras
@@ -101,6 +102,8 @@ class Calibration:
         The paper's method on the same images, of the first camera.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
+    instrument : Instrument
+        What is left to measure with, of the first camera.
     lags : tuple of Lag or None
         Of each camera of a rig but the first.
     """
@@ -117,6 +120,7 @@ class Calibration:
     two_stage: TwoStageFit
     two_stage_covariance: FloatArray
     budget: Budget
+    instrument: Instrument
     halves: Halves
     leds: LedQuality
     coverage: Coverage
@@ -257,6 +261,7 @@ def calibrate_rig(
         for c, part in enumerate(parts)
     )
     moments = _moments(cameras)
+    budget = combine(adjusted, joint)
     return Calibration(
         cameras=cameras,
         reasons=moments,
@@ -271,7 +276,8 @@ def calibrate_rig(
         two_stage_covariance=propagated_covariance(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
-        budget=combine(adjusted, joint),
+        budget=budget,
+        instrument=adjusted_instrument(adjusted, budget),
         halves=compare_halves(joint),
         leds=measure_leds(fitted.rig, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),

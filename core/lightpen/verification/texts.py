@@ -1,0 +1,156 @@
+"""Verifications as text for the screen, in the tables of the paper.
+
+[1] S. Liu et al., "Portable light pen 3D vision coordinate measuring system - probe tip
+center calibration", Measurement Science Review 13 (2013) 194-199, tables 1 to 3.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.verification.articulation import Articulation
+from lightpen.verification.assessment import Assessment
+from lightpen.verification.circle import Circle
+from lightpen.verification.fixed_point import FixedPoint
+from lightpen.verification.length import Length
+from lightpen.verification.touch import RejectedFrame
+
+MOST_COLUMNS = 10  # runs beside each other
+MOST_NAMED = 5  # images
+TITLE, COLUMN = 24, 10  # characters
+
+
+def fixed_point_text(found: FixedPoint, rejected: Sequence[RejectedFrame]) -> str:
+    """Return a fixed point as text: the paper's Table 2."""
+    both = [found.calibrated, *([] if found.nominal is None else [found.nominal])]
+    titles = ("Calibrated tip", "Nominal tip")
+    width = 3 * COLUMN + 2
+    lines = [
+        "Fixed point in the camera frame, mm",
+        f"{'':<{TITLE}}"
+        + "".join(f"{title:>{width}}" for title in titles[: len(both)]),
+        f"{'No.':<{TITLE}}"
+        + ("  " + "".join(f"{axis:>{COLUMN}}" for axis in "uvw")) * len(both),
+    ]
+
+    def row(title: str, values: Sequence[FloatArray]) -> str:
+        cells = ("  " + "".join(f"{x:{COLUMN}.4f}" for x in each) for each in values)
+        return f"{title:<{TITLE}}" + "".join(cells)
+
+    for i, touch in enumerate(found.touches):
+        name = f"{i + 1:>3} {touch.label}"
+        lines.append(row(name[:TITLE], [scatter.points[i] for scatter in both]))
+    lines += [
+        row("Ave", [scatter.mean for scatter in both]),
+        row("Std", [scatter.deviation for scatter in both]),
+        row("Range", [scatter.range for scatter in both]),
+        row("U (k = 2) of Ave", [found.uncertainty]),
+        row("Std expected", [found.expected_deviation]),
+    ]
+    if found.moved is not None:
+        lines.append(row("Ave less the cone", [found.moved]))
+    if found.nominal is None:
+        lines.append("No nominal tip is given to compare with.")
+    lines += [
+        row("Tip wanted less given", [found.tip_change]) + "  (x y z of the pen)",
+        row("  U (k = 2)", [found.tip_change_uncertainty]),
+        *_left_out(rejected),
+    ]
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def circle_text(found: Circle, rejected: Sequence[RejectedFrame]) -> str:
+    """Return a circle as text: the paper's Table 3."""
+    errors = found.errors
+    rows = (
+        ("Computed value", found.radii, 4),
+        ("Absolute error", errors, 4),
+        ("Relative error (x 1e-4)", errors / found.certified * 1e4, 2),
+        ("U (k = 2)", np.array([run.uncertainty for run in found.runs]), 4),
+        ("Roundness", np.array([run.fit.roundness for run in found.runs]), 4),
+        ("Off the plane", np.array([run.fit.flatness for run in found.runs]), 4),
+        ("Covered, degrees", np.array([run.fit.covered for run in found.runs]), 0),
+        ("Touches", np.array([len(run.touches) for run in found.runs]), 0),
+    )
+    lines = [f"Radius, mm; certified {found.certified:.4f}"]
+    n_runs = len(found.runs)
+    for first in range(0, n_runs, MOST_COLUMNS):
+        own = slice(first, min(first + MOST_COLUMNS, n_runs))
+        ends = own.stop == n_runs and n_runs > 1
+        head = [str(i + 1) for i in range(own.start, own.stop)]
+        head += ["Average"] * ends
+        lines.append(
+            f"{'No. of test':<{TITLE}}" + "".join(f"{each:>{COLUMN}}" for each in head)
+        )
+        for title, values, digits in rows:
+            shown = [*values[own], *([values.mean()] if ends else [])]
+            lines.append(
+                f"{title:<{TITLE}}"
+                + "".join(f"{value:{COLUMN}.{digits}f}" for value in shown)
+            )
+    if found.deviation is not None:
+        lines.append(f"{'Std of the radii':<{TITLE}}{found.deviation:{COLUMN}.4f}")
+    lines.append(f"{'U (k = 2) of Average':<{TITLE}}{found.uncertainty:{COLUMN}.4f}")
+    lines += [f"{i + 1:>3} {run.name}" for i, run in enumerate(found.runs)]
+    lines += _left_out(rejected)
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def length_text(found: Length, rejected: Sequence[RejectedFrame]) -> str:
+    """Return a known length as text."""
+    head = ("measured", "error", "U (k = 2)", "touches")
+    lines = [
+        f"Length, mm; certified {found.certified:.4f}, U (k = 2) "
+        f"{found.certified_uncertainty:.4f}",
+        f"{'Place':<{TITLE}}" + "".join(f"{each:>{COLUMN}}" for each in head),
+    ]
+    for run, error, uncertainty in zip(
+        found.runs, found.errors, found.uncertainties, strict=True
+    ):
+        n_touches = len(run.ends[0]) + len(run.ends[1])
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in (run.measured, error, uncertainty))
+        lines.append(f"{run.name[:TITLE]:<{TITLE}}{cells}{n_touches:{COLUMN}d}")
+    scale = found.scale
+    lines += [
+        f"{'Scale of the pen':<{TITLE}}{scale.factor:{COLUMN}.6f}, U (k = 2) "
+        f"{1e6 * scale.uncertainty:.1f} ppm, without the length "
+        f"{1e6 * scale.uncertainty_before:.1f} ppm",
+        *_left_out(rejected),
+    ]
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def articulation_text(found: Articulation, rejected: Sequence[RejectedFrame]) -> str:
+    """Return an articulated location error as text."""
+    head = ("u", "v", "w", "spread")
+    lines = [
+        "Location error in the form of ISO 10360-12, mm",
+        f"{'Posture':<{TITLE}}" + "".join(f"{each:>{COLUMN}}" for each in head),
+    ]
+    for name, location, spread in zip(
+        found.names, found.locations, found.spreads, strict=True
+    ):
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in (*location, spread))
+        lines.append(f"{name[:TITLE]:<{TITLE}}{cells}")
+    lines += [
+        f"{'Location error':<{TITLE}}{found.location_error:{COLUMN}.4f}",
+        f"{'  expected':<{TITLE}}{found.expected:{COLUMN}.4f}",
+        *_left_out(rejected),
+    ]
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
+    if not rejected:
+        return []
+    named = ", ".join(f"{each.name} ({each.reason})" for each in rejected[:MOST_NAMED])
+    more = ", ..." if len(rejected) > MOST_NAMED else ""
+    return [f"{len(rejected)} images left out: {named}{more}"]
+
+
+def _verdict(assessment: Assessment) -> list[str]:
+    return [
+        f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
+        f"             {assessment.next_step}",
+    ]
