@@ -24,12 +24,15 @@ from lightpen.commands.console import (
     NO_TIP,
     Command,
     are_same,
+    lacking,
     printing,
     progress,
     require_other_file,
     shown,
     write_record,
 )
+from lightpen.commands.pen_health import add_improve_pen
+from lightpen.commands.repeatability import add_repeatability
 from lightpen.commands.verify import add_verify
 from lightpen.detection.moments import observe_rig_centers, observe_rig_images
 from lightpen.detection.observations import observe_centers, observe_images
@@ -161,6 +164,12 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     _add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
     _add_pen(commands.add_parser("pen", help="put measured LEDs into the pen frame"))
     add_verify(commands.add_parser("verify", help="prove a tip by touching"))
+    add_repeatability(
+        commands.add_parser("repeatability", help="compare calibrations of one tip")
+    )
+    add_improve_pen(
+        commands.add_parser("improve-pen", help="a better LED file by several swings")
+    )
     return parser
 
 
@@ -450,13 +459,7 @@ def _lacking(option: str, images: Sequence[str]) -> UsageError:
     """Return that an option is missing, and why the images are not a record."""
     missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
     if not missing:
-        return UsageError(
-            sentence(
-                "cli.option-missing",
-                "{option} FILE is missing. Only a record needs none.",
-                option=option,
-            )
-        )
+        return lacking(option)
     return UsageError(
         sentence(
             "cli.part-of-record-missing",

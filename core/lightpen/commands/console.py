@@ -71,6 +71,17 @@ def write_record(path: Path, record: Mapping[str, Any]) -> None:
     write_whole(path, with_checksum(json_bytes(record)) + b"\n")
 
 
+def lacking(option: str) -> UsageError:
+    """Return that an option is missing which only a record can do without."""
+    return UsageError(
+        sentence(
+            "cli.option-missing",
+            "{option} FILE is missing. Only a record needs none.",
+            option=option,
+        )
+    )
+
+
 def are_same(one: Path, other: Path) -> bool:
     """Return whether two paths lead to one file."""
     if one.exists() and other.exists():

@@ -17,13 +17,14 @@ from lightpen.commands.arguments import (
     not_negative,
 )
 from lightpen.commands.console import (
+    lacking,
     printing,
     progress,
     require_other_file,
     shown,
     write_record,
 )
-from lightpen.errors import UsageError
+from lightpen.commands.pen_health import add_verify_pen
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import all_hashed, hashed
@@ -33,7 +34,6 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.record.reading import is_record, open_record, source
-from lightpen.sentences import sentence
 from lightpen.verification.articulation import (
     N_POSTURES,
     N_TOUCHES,
@@ -74,6 +74,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     _add_articulation(
         kinds.add_parser("articulation", help="one point, in the form of ISO 10360-12")
     )
+    add_verify_pen(kinds.add_parser("pen", help="the LEDs over several swings"))
 
 
 def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
@@ -335,7 +336,7 @@ def _camera(options: argparse.Namespace, place: _Place) -> tuple[Camera, Path]:
     if options.camera is not None:
         return read_camera(options.camera), options.camera
     if place.camera is None or place.camera_file is None:
-        raise _lacking("--camera")
+        raise lacking("--camera")
     return place.camera, place.camera_file
 
 
@@ -344,18 +345,8 @@ def _pen(options: argparse.Namespace, place: _Place) -> tuple[Pen, Path]:
         pen = read_pen(options.pen, options.units, options.led_diameter, None)
         return pen, options.pen
     if place.pen is None or place.pen_file is None:
-        raise _lacking("--pen")
+        raise lacking("--pen")
     return place.pen, place.pen_file
-
-
-def _lacking(option: str) -> UsageError:
-    return UsageError(
-        sentence(
-            "cli.option-missing",
-            "{option} FILE is missing. Only a record needs none.",
-            option=option,
-        )
-    )
 
 
 def _limits(options: argparse.Namespace) -> VerificationLimits:

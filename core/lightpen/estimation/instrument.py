@@ -114,7 +114,11 @@ def instrument_of_files(
     covariance[at.diameter, at.diameter] = priors.diameter.covariance
     scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
     basis = led_basis(pen.leds)
-    covariance[at.leds, at.leds] = (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
+    covariance[at.leds, at.leds] = (
+        (pen.led_sigma or 0.0) ** 2 * basis @ basis.T
+        if pen.led_covariance is None
+        else pen.led_covariance
+    )
     covariance[at.leds, at.leds] += priors.scale.covariance * np.outer(scaling, scaling)
     return Instrument(camera, pen, tip_pen, covariance, sigma)
 

@@ -47,6 +47,8 @@ class Priors:
         Of the discs, mm.
     led_sigma : float or None
         Of one LED coordinate, mm; None: to be found from the images.
+    led_covariance : (3 L, 3 L) array or None
+        Of all of them, mm^2, where more is known than ``led_sigma``.
     """
 
     cameras: tuple[Prior, ...]
@@ -54,6 +56,7 @@ class Priors:
     scale: Prior
     diameter: Prior
     led_sigma: float | None
+    led_covariance: FloatArray | None = None
 
 
 def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
@@ -75,6 +78,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
             else _one(pen.diameter_sigma, assumed=False)
         ),
         led_sigma=pen.led_sigma,
+        led_covariance=pen.led_covariance,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.instrument import instrument_record
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.rig_report import (
     count_dropped,

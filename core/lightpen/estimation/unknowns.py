@@ -207,6 +207,10 @@ class Unknowns:
         for place, sigma in self._sigmas(components):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        of_leds = priors.led_covariance
+        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+            known = self.basis.T @ of_leds @ self.basis
+            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
 
     def _sigmas(self, components: Components) -> list[tuple[slice, float]]:

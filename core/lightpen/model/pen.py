@@ -78,6 +78,9 @@ class Pen:
         Standard uncertainty common to all coordinates, relative; None if not stated.
     diameter_sigma : float or None
         Standard uncertainty of the diameter, mm; None if not stated.
+    led_covariance : (3 L, 3 L) array or None
+        Of all LED coordinates but for the scale that they share, mm^2; None if no more
+        than ``led_sigma`` is known.
     """
 
     leds: FloatArray
@@ -88,6 +91,7 @@ class Pen:
     led_sigma: float | None = None
     scale_sigma: float | None = None
     diameter_sigma: float | None = None
+    led_covariance: FloatArray | None = None
 
     @property
     def n_leds(self) -> int:

@@ -279,23 +279,8 @@ def _measure_run(
                 off=off,
             )
         )
-    if fit.covered < MIN_ANGLE:
-        raise CalibrationError(
-            sentence(
-                "circle.open",
-                "The touches of {run} cover {covered:.0f} degrees of the ring, at "
-                "least {needed:.0f} are needed: a radius from less is hardly worth "
-                "anything. Touch the ring also in the gap between {first} and "
-                "{second}.",
-                run=name,
-                covered=fit.covered,
-                needed=MIN_ANGLE,
-                **_gap_ends(
-                    [t for t, on in zip(touches, on_ring, strict=True) if on], fit
-                ),
-            )
-        )
     kept = tuple(t for t, on in zip(touches, on_ring, strict=True) if on)
+    _require_closed(name, kept, fit)
     row = np.einsum(
         "ni,niq->q", fit.weights, np.array([touch.sensitivity for touch in kept])
     )
@@ -348,11 +333,24 @@ def _gaps(angles: FloatArray) -> FloatArray:
     return np.diff(ordered, append=ordered[0] + 2 * np.pi)
 
 
-def _gap_ends(touches: Sequence[Touch], fit: CircleFit) -> dict[str, str]:
+def _require_closed(name: str, touches: Sequence[Touch], fit: CircleFit) -> None:
+    if fit.covered >= MIN_ANGLE:
+        return
     order = np.argsort(fit.angles)
     widest = int(np.argmax(_gaps(fit.angles)))
-    first, second = order[widest], order[(widest + 1) % len(order)]
-    return {"first": touches[first].label, "second": touches[second].label}
+    raise CalibrationError(
+        sentence(
+            "circle.open",
+            "The touches of {run} cover {covered:.0f} degrees of the ring, at least "
+            "{needed:.0f} are needed: a radius from less is hardly worth anything. "
+            "Touch the ring also in the gap between {first} and {second}.",
+            run=name,
+            covered=fit.covered,
+            needed=MIN_ANGLE,
+            first=touches[order[widest]].label,
+            second=touches[order[(widest + 1) % len(order)]].label,
+        )
+    )
 
 
 def _assessment(

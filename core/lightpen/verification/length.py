@@ -169,7 +169,7 @@ def _two_ends(
             sentence(
                 "length.too-few",
                 "{run} has {n_touches} touches that can be used; a length needs both "
-                "its ends. Touch each end at least once.",
+                "its ends. Touch each end once at least.",
                 run=name,
                 n_touches=len(touches),
             )

@@ -13,6 +13,8 @@ from lightpen.verification.assessment import Assessment
 from lightpen.verification.circle import Circle, CircleRun
 from lightpen.verification.fixed_point import FixedPoint, Scatter
 from lightpen.verification.length import Length
+from lightpen.verification.pen_health import PenHealth
+from lightpen.verification.repeatability import Repeatability
 from lightpen.verification.touch import RejectedFrame, Touch
 
 
@@ -179,4 +181,48 @@ def _circle_run(run: CircleRun, instrument: Instrument) -> dict[str, Any]:
         "covered_deg": run.fit.covered,
         "touches": [touch_entries(touch, instrument) for touch in run.touches],
         "left_out": [touch_entries(touch, instrument) for touch in run.left_out],
+    }
+
+
+def repeatability_entries(found: Repeatability) -> dict[str, Any]:
+    """Return what was found of calibrations of one tip."""
+    study = found.capability
+    return {
+        "mean_mm": found.mean,
+        "std_mm": found.deviation,
+        "range_mm": found.values.max(axis=0) - found.values.min(axis=0),
+        "control": {
+            "lower_mm": found.control.lower,
+            "center_mm": found.control.center,
+            "upper_mm": found.control.upper,
+            "out_of_control": [tip.name for tip in found.out_of_control],
+        },
+        "capability": (
+            None
+            if study is None
+            else {"tolerance_mm": study.tolerance, "cg": study.cg, "cgk": study.cgk}
+        ),
+        "fixed_point_std_mm": found.fixed_point_deviation,
+        "points_to": found.points_to,
+        "tips": [
+            {
+                "name": tip.name,
+                "tip_pen_mm": tip.tip_pen,
+                "expanded_uncertainty_mm": tip.uncertainty,
+                "when": None if tip.when is None else tip.when.isoformat(),
+            }
+            for tip in found.tips
+        ],
+    }
+
+
+def pen_health_entries(found: PenHealth) -> dict[str, Any]:
+    """Return what was found of a pen over its swings."""
+    return {
+        "moved_leds": found.moved,
+        "growth": found.growth,
+        "swings": [
+            {"name": swing.name, "shifts_mm": swing.shifts, "growth": swing.growth}
+            for swing in found.swings
+        ],
     }

@@ -8,6 +8,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_images
+from lightpen.detection.reasons import counted
 from lightpen.detection.sighting import Sighting, sight_centers, unseen
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.calibrate import USUAL_SIGMA
@@ -211,15 +212,8 @@ def _sightings(seen: Observations, instrument: Instrument) -> list[Sighting]:
 
 
 def _no_pen(name: str, seen: Observations) -> CalibrationError:
-    counts = Counter(seen.reasons)
     why: tuple[Sentence, ...] = tuple(
-        sentence(
-            "calibrate.images-of-a-reason",
-            "{n_images} {reason}",
-            n_images=n_images,
-            reason=reason.words,
-        )
-        for reason, n_images in counts.items()
+        counted(n_images, reason) for reason, n_images in Counter(seen.reasons).items()
     )
     advice = seen.advice or sentence(
         "verification.show-pen", "Show the camera the pen that the tip belongs to."

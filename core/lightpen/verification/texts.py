@@ -4,7 +4,7 @@
 center calibration", Measurement Science Review 13 (2013) 194-199, tables 1 to 3.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -13,7 +13,15 @@ from lightpen.verification.articulation import Articulation
 from lightpen.verification.assessment import Assessment
 from lightpen.verification.circle import Circle
 from lightpen.verification.fixed_point import FixedPoint
+from lightpen.verification.led_file import ImprovedPen
 from lightpen.verification.length import Length
+from lightpen.verification.pen_health import PenHealth
+from lightpen.verification.repeatability import (
+    CAPABLE,
+    STUDY,
+    Capability,
+    Repeatability,
+)
 from lightpen.verification.touch import RejectedFrame
 
 MOST_COLUMNS = 10  # runs beside each other
@@ -154,3 +162,89 @@ def _verdict(assessment: Assessment) -> list[str]:
         f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
         f"             {assessment.next_step}",
     ]
+
+
+def repeatability_text(found: Repeatability) -> str:
+    """Return calibrations of one tip as text: the paper's Table 1."""
+
+    def row(title: str, values: FloatArray, digits: int = 4) -> str:
+        return f"{title:<{TITLE}}" + "".join(f"{x:{COLUMN}.{digits}f}" for x in values)
+
+    lines = [
+        "Center coordinates of the probe tip, mm",
+        f"{'No. of test':<{TITLE}}"
+        + "".join(f"{axis + '-axis':>{COLUMN}}" for axis in "xyz"),
+        *(
+            row(f"{i + 1:>3} {tip.name}"[:TITLE], tip.tip_pen)
+            for i, tip in enumerate(found.tips)
+        ),
+        row("Ave", found.mean),
+        row("Std", found.deviation),
+        row("Range", np.ptp(found.values, axis=0)),
+        row("Control limit, lower", found.control.lower),
+        row("Control limit, upper", found.control.upper),
+    ]
+    out = found.out_of_control
+    if out:
+        lines.append("Out of control: " + ", ".join(tip.name for tip in out))
+    if found.fixed_point_deviation is not None:
+        lines.append(row("Std of a fixed point", found.fixed_point_deviation))
+    if found.capability is not None:
+        lines += _capability_lines(found.capability, len(found.tips), row)
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def _capability_lines(
+    found: Capability, n_tips: int, row: Callable[[str, FloatArray, int], str]
+) -> list[str]:
+    lines = [
+        f"Type-1 gauge study, tolerance {found.tolerance:g} mm wide, {n_tips} repeats"
+        + (f" (a study takes {STUDY} to 50)" if n_tips < STUDY else ""),
+        row("Cg", found.cg, 2),
+    ]
+    if found.cgk is not None:
+        lines.append(row("Cgk", found.cgk, 2))
+    capable = "capable" if found.is_capable else "not capable"
+    lines.append(f"{capable.capitalize()} (all {CAPABLE} or more are asked for)")
+    return lines
+
+
+def pen_health_text(found: PenHealth) -> str:
+    """Return a pen over its swings as text."""
+    n_leds = len(found.swings[0].shifts)
+    lines = [
+        "LEDs since the first swing, mm, and size of the pen, ppm",
+        f"{'Swing':<{TITLE}}"
+        + "".join(f"{f'LED {j + 1}':>{COLUMN}}" for j in range(n_leds))
+        + f"{'size':>{COLUMN}}",
+    ]
+    for swing in found.swings:
+        lengths = np.linalg.norm(swing.shifts, axis=1)
+        cells = "".join(
+            f"{x:{COLUMN}.3f}" if np.isfinite(x) else f"{'-':>{COLUMN}}"
+            for x in lengths
+        )
+        size = "-" if swing.growth is None else f"{1e6 * swing.growth:+.0f}"
+        lines.append(f"{swing.name[:TITLE]:<{TITLE}}{cells}{size:>{COLUMN}}")
+    return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def improved_pen_text(found: ImprovedPen) -> str:
+    """Return the new places of the LEDs of a pen as text."""
+    pen = found.pen
+    lines = [
+        "LEDs of the pen, mm: new, and new less old",
+        f"{'LED':<5}" + "".join(f"{axis:>{COLUMN}}" for axis in ("x", "y", "z") * 2),
+    ]
+    for j, (place, move) in enumerate(zip(pen.leds, found.moves, strict=True)):
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in (*place, *move))
+        lines.append(f"{j + 1:<5}{cells}")
+    lines += [
+        f"A coordinate is known to {pen.led_sigma:.5f} mm, the scale to "
+        f"{1e6 * (pen.scale_sigma or 0.0):.1f} ppm (k = 1), by "
+        + ", ".join(found.pooled)
+        + ".",
+        f"{found.held_out} confirms it: residuals of {found.sigma_after:.4f} px, "
+        f"{found.sigma_before:.4f} px with the old file.",
+    ]
+    return "\n".join(lines)
