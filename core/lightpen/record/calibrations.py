@@ -185,9 +185,12 @@ def read_calibration(path: Path) -> CalibrationFile:
         )
     try:
         is_checked = has_checksum(data)
-        tree = parse_json(data, dict[str, Any])
     except DamagedError as error:
         raise _changed(path) from error
+    try:
+        tree = parse_json(data, dict[str, Any])
+    except DamagedError as error:
+        raise _changed(path) if is_checked else _other(path) from error
     return _calibration(path, tree, "", "", None, is_checked=is_checked)
 
 
@@ -205,14 +208,7 @@ def _calibration(
         instrument = _instrument(record)
         pixels = _pixels(record)
     except DamagedError as error:
-        raise UsageError(
-            sentence(
-                "calibration-file.other",
-                "{path} is no record of a calibration. Give what the command calibrate "
-                "wrote, or an accepted result.",
-                path=printable(str(path)),
-            )
-        ) from error
+        raise _other(path) from error
     return CalibrationFile(
         path=path,
         pen=pen,
@@ -267,6 +263,17 @@ def _pixels(record: _Record) -> FloatArray:
                 raise DamagedError("An LED is seen that the pen does not have.")
             pixels[i, led.led - 1] = led.x_px, led.y_px
     return pixels
+
+
+def _other(path: Path) -> UsageError:
+    return UsageError(
+        sentence(
+            "calibration-file.other",
+            "{path} is no record of a calibration. Give what the command calibrate "
+            "wrote, or an accepted result.",
+            path=printable(str(path)),
+        )
+    )
 
 
 def _changed(path: Path) -> FileError:
