@@ -262,3 +262,26 @@ def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
     assert len(read(tmp_path / "new.json")["led_covariance"]) == 30
     assert over_old.returncode == 2
     assert "would replace the input file" in over_old.stderr
+
+
+def test_calibrations_are_solved_again_and_their_uncertainty_checked(
+    shared_data: Path, lightpen: Run, tip: Path, tmp_path: Path
+) -> None:
+    folder = shared_data / "fixed-point"
+    inputs = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
+    few = tmp_path / "few.json"
+    calibrated = lightpen(
+        *("calibrate", folder / "images", *inputs, "--json", few),
+    )
+    assert calibrated.returncode == 0
+
+    outcome = lightpen(
+        *("recalculate", few, *inputs, "--monte-carlo", "20"),
+        *("--workers", "2", "--json", tmp_path / "again.json"),
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    assert "U (k = 2), Monte Carlo" in outcome.stdout
+    (again,) = read(tmp_path / "again.json")["calibrations"]
+    assert max(map(abs, again["change_mm"])) < 1e-6
+    assert again["monte_carlo"]["trials"] + again["monte_carlo"]["failed"] == 20

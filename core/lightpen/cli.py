@@ -1,4 +1,4 @@
-"""The command line: ``lightpen calibrate | simulate | pivot | pen``.
+"""The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
 
 Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable input.
 """
@@ -32,6 +32,7 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_improve_pen
+from lightpen.commands.recalculate import add_recalculate
 from lightpen.commands.repeatability import add_repeatability
 from lightpen.commands.verify import add_verify
 from lightpen.detection.moments import observe_rig_centers, observe_rig_images
@@ -166,6 +167,11 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     add_verify(commands.add_parser("verify", help="prove a tip by touching"))
     add_repeatability(
         commands.add_parser("repeatability", help="compare calibrations of one tip")
+    )
+    add_recalculate(
+        commands.add_parser(
+            "recalculate", help="solve calibrations again, and check U by Monte Carlo"
+        )
     )
     add_improve_pen(
         commands.add_parser("improve-pen", help="a better LED file by several swings")

@@ -34,7 +34,7 @@ from lightpen.verification.pen_health import require_one_pen
 
 MIN_POOLED = 3  # swings, beside the one held out
 CONFIRMED = 2.33  # standard deviations: 99 %
-NO_LED_SIGMA = 0.1  # mm, of an LED coordinate before anything is known
+FINEST = 1e-4  # mm, to which no LED file is known beforehand
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,8 @@ def _pooled(
     information = first.prior_information[np.ix_(common, common)].copy()
     leds = np.flatnonzero(np.isin(common, np.r_[at.leds]))
     information[np.ix_(leds, leds)] = 0.0
-    known = pen.led_sigma or NO_LED_SIGMA
+    told = float(np.median([each.led_sigma for each in calibrations]))
+    known = pen.led_sigma or max(told, FINEST)
     information[leds, leds] = 1 / known**2
     right = np.zeros(len(common))
     for calibration in calibrations:

@@ -124,9 +124,9 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
 
     def errors(leds: np.ndarray) -> np.ndarray:
         """Errors but for those of the frame, by the differences between LEDs."""
-        return np.linalg.norm(leds[:, None] - leds, axis=2) - np.linalg.norm(
-            pen.leds[:, None] - pen.leds, axis=2
-        )
+        found = np.linalg.norm(leds[:, None] - leds, axis=2)
+        true = np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2)
+        return np.asarray(found - true)
 
     before, after = errors(PEN_FILE.leds), errors(found.pen.leds)
     assert np.sqrt(np.mean(after**2)) < 0.3 * np.sqrt(np.mean(before**2))

@@ -50,7 +50,7 @@ def run(
     places: Sequence[Place | None],
     rules: TouchRules = RULES,
 ) -> tuple[TouchState, list[TouchEvent]]:
-    state, events = TouchState(), []
+    state, events = TouchState(), list[TouchEvent]()
     for name, sighting in sightings(instrument, places):
         transition = advance(instrument, rules, state, name, sighting)
         state = transition.state
