@@ -41,12 +41,14 @@ from lightpen.verification.articulation import (
 )
 from lightpen.verification.assessment import Assessment
 from lightpen.verification.circle import measure_circle
+from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
 from lightpen.verification.length import measure_length
 from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
+    drift_entries,
     fixed_point_entries,
     length_entries,
     rejected_entries,
@@ -56,6 +58,7 @@ from lightpen.verification.sources import TouchRun, instrument_of, touch_run
 from lightpen.verification.texts import (
     articulation_text,
     circle_text,
+    drift_text,
     fixed_point_text,
     length_text,
 )
@@ -74,6 +77,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     _add_articulation(
         kinds.add_parser("articulation", help="one point, in the form of ISO 10360-12")
     )
+    _add_drift(kinds.add_parser("drift", help="whether the camera moved meanwhile"))
     add_verify_pen(kinds.add_parser("pen", help="the LEDs over several swings"))
 
 
@@ -124,6 +128,12 @@ def _add_articulation(parser: argparse.ArgumentParser) -> None:
         parser, "one posture; a single run holds five postures, one after the other"
     )
     _add_common(parser, "location")
+
+
+def _add_drift(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_drift)
+    _add_runs(parser, "one visit of a cone that stands still, in order of time")
+    _add_common(parser, "drift")
 
 
 def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
@@ -279,6 +289,13 @@ def _articulation(options: argparse.Namespace) -> None:
         *(options, measured, articulation_text, found, "articulation"),
         articulation_entries(found),
     )
+
+
+@printing
+def _drift(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    found = measure_drift(measured.touches, measured.instrument, _limits(options))
+    _tell(*(options, measured, drift_text, found, "drift"), drift_entries(found))
 
 
 def _measure(

@@ -201,19 +201,23 @@ def _too_few(n_touches: int) -> CalibrationError:
 
 
 def _other_tip(touches: Sequence[Touch]) -> tuple[FloatArray, FloatArray]:
-    """Return by which change of the tip the points meet best, and its covariance."""
-    H, g = np.zeros((6, 6)), np.zeros(6)
-    H[:3, :3] = np.eye(3) / TIP_SIGMA**2
+    """Return by which change of the tip the points meet best, and its covariance.
+
+    What all touches share moves the point as a whole, and hardly their scatter; where
+    the points scatter by more than their noise, so does the change.
+    """
+    prior = np.diag([TIP_SIGMA**-2] * 3 + [0.0] * 3)
     middle = np.mean([touch.point_cam for touch in touches], axis=0)
-    for touch in touches:
-        # What all touches share moves the point as a whole, and hardly their scatter.
-        A = np.hstack([touch.rotation, -np.eye(3)])
-        W = np.linalg.inv(touch.noise + SEATING**2 * np.eye(3))
-        H += A.T @ W @ A
-        g += A.T @ W @ (middle - touch.point_cam)
-    covariance = np.linalg.inv(H)
-    step = covariance @ g
-    return np.asarray(step[:3]), np.asarray(covariance[:3, :3])
+    A = np.array([np.hstack([touch.rotation, -np.eye(3)]) for touch in touches])
+    b = middle - np.array([touch.point_cam for touch in touches])
+    W = np.linalg.inv([touch.noise + SEATING**2 * np.eye(3) for touch in touches])
+    AtW = np.swapaxes(A, 1, 2) @ W
+    covariance = np.linalg.inv(prior + (AtW @ A).sum(axis=0))
+    step = covariance @ np.einsum("nij,nj->i", AtW, b)
+    left = b - A @ step
+    n_free = max(3 * len(touches) - len(step), 1)
+    excess = max(float(np.einsum("ni,nij,nj->", left, W, left)) / n_free, 1.0)
+    return np.asarray(step[:3]), np.asarray(excess * covariance[:3, :3])
 
 
 def _assessment(found: FixedPoint, limits: VerificationLimits) -> Assessment:

@@ -11,6 +11,7 @@ from lightpen.local_time import local_now
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.assessment import Assessment
 from lightpen.verification.circle import Circle, CircleRun
+from lightpen.verification.drift import Drift
 from lightpen.verification.fixed_point import FixedPoint, Scatter
 from lightpen.verification.length import Length
 from lightpen.verification.pen_health import PenHealth
@@ -225,4 +226,20 @@ def pen_health_entries(found: PenHealth) -> dict[str, Any]:
             {"name": swing.name, "shifts_mm": swing.shifts, "growth": swing.growth}
             for swing in found.swings
         ],
+    }
+
+
+def drift_entries(found: Drift) -> dict[str, Any]:
+    """Return what was found of a witness."""
+    return {
+        "visits": [
+            {"name": name, "move_mm": move, "expanded_uncertainty_mm": uncertainty}
+            for name, move, uncertainty in zip(
+                found.names,
+                found.moves.tolist(),
+                found.uncertainties.tolist(),
+                strict=True,
+            )
+        ],
+        "standard_uncertainty_share_mm": found.share,
     }

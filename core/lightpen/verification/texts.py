@@ -12,6 +12,7 @@ from lightpen.arrays import FloatArray
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.assessment import Assessment
 from lightpen.verification.circle import Circle
+from lightpen.verification.drift import Drift
 from lightpen.verification.fixed_point import FixedPoint
 from lightpen.verification.led_file import ImprovedPen
 from lightpen.verification.length import Length
@@ -248,3 +249,20 @@ def improved_pen_text(found: ImprovedPen) -> str:
         f"{found.sigma_before:.4f} px with the old file.",
     ]
     return "\n".join(lines)
+
+
+def drift_text(found: Drift, rejected: Sequence[RejectedFrame]) -> str:
+    """Return a witness visited several times as text."""
+    lines = [
+        "Witness since the first visit, camera frame, mm",
+        f"{'Visit':<{TITLE}}" + "".join(f"{axis:>{COLUMN}}" for axis in "uvw"),
+    ]
+    for name, move, uncertainty in zip(
+        found.names, found.moves, found.uncertainties, strict=True
+    ):
+        for title, values in ((name[:TITLE], move), ("  U (k = 2)", uncertainty)):
+            cells = "".join(f"{x:{COLUMN}.4f}" for x in values)
+            lines.append(f"{title:<{TITLE}}{cells}")
+    share = "".join(f"{x:{COLUMN}.4f}" for x in found.share)
+    lines += [f"{'Share of u (k = 1)':<{TITLE}}{share}", *_left_out(rejected)]
+    return "\n".join([*lines, "", *_verdict(found.assessment)])

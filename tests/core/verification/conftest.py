@@ -85,6 +85,6 @@ def ring() -> Callable[..., FloatArray]:
             angles = np.radians(np.linspace(0, 360, n, endpoint=False))
         axes = np.array([[1, 0, 0], [0, np.cos(0.4), np.sin(0.4)]])
         spokes = np.column_stack([np.cos(angles), np.sin(angles)]) @ axes
-        return np.asarray(np.array([-8.0, 168.0, 1050.0]) + radius * spokes
+        return np.asarray(np.array([-8.0, 168.0, 1050.0]) + radius * spokes)
 
     return points

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from benchmarks.touches import covered_share
 
+from lightpen.arrays import FloatArray
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.instrument import Instrument
@@ -51,28 +52,29 @@ def test_a_point_follows_the_parameters_as_its_derivative_says(
     )
     at = instrument.parameters
 
-    def point(camera_fx: float, led_z: float, diameter: float) -> np.ndarray:
-        camera = replace(instrument.camera, fx=instrument.camera.fx + camera_fx)
-        leds = instrument.pen.leds.copy()
-        leds[3, 2] += led_z
+    def point(fx: float, scale: float, diameter: float) -> FloatArray:
+        camera = replace(instrument.camera, fx=instrument.camera.fx + fx)
         pen = replace(
-            instrument.pen, leds=leds, diameter=instrument.pen.diameter + diameter
+            instrument.pen,
+            leds=(1 + scale) * instrument.pen.leds,
+            diameter=instrument.pen.diameter + diameter,
         )
         poses = fit_poses(camera, pen, pixels, R[None], t[None])
         return np.asarray(poses.rotations[0] @ PAPER_TIP + poses.translations[0])
 
     poses = fit_poses(instrument.camera, instrument.pen, pixels, R[None], t[None])
     (derivative,) = point_sensitivities(instrument, poses)
-    for column, step in (
-        (at.intrinsics.start, (0.1, 0.0, 0.0)),
-        (at.leds.start + 3 * 3 + 2, (0.0, 0.01, 0.0)),
-        (at.diameter.start, (0.0, 0.0, 0.1)),
+    by_scale = derivative[:, at.leds] @ instrument.pen.leds.ravel()
+    for by_this, step in (
+        (derivative[:, at.intrinsics.start], (0.1, 0.0, 0.0)),
+        (by_scale, (0.0, 1e-4, 0.0)),
+        (derivative[:, at.diameter.start], (0.0, 0.0, 0.1)),
     ):
-        difference = (point(*step) - point(*(-x for x in step))) / (2 * max(step))
-        # The Jacobian is that of projected centres, which is true to a thousandth.
-        np.testing.assert_allclose(
-            derivative[:, column], difference, rtol=0.02, atol=2e-3
-        )
+        back = [-part for part in step]
+        difference = (point(*step) - point(*back)) / (2 * max(step))
+        size = float(np.abs(difference).max())
+        # The Jacobian is that of projected centres, and weights follow the residuals.
+        np.testing.assert_allclose(by_this, difference, atol=0.05 * size)
 
 
 def test_more_images_make_a_point_less_noisy(touching: Touching) -> None:
@@ -138,7 +140,8 @@ def test_another_tip_moves_the_point_with_the_pen(
 
 
 def test_ellipsoids_hold_the_true_point_as_often_as_they_say() -> None:
-    # 60 touches by 5 calibrations; the benchmark counts 1000 by 100.
-    share = covered_share(n_calibrations=5, n_touches=12, seed=2)
+    # What is wrong of a calibration is wrong of all its touches: eight count, and three
+    # standard deviations below 95 % of eight are 72 %. The benchmark has a hundred.
+    share = covered_share(n_calibrations=8, n_touches=4, seed=2)
 
-    assert share > 0.8  # 95 % less three standard deviations of so few
+    assert share > 0.72
