@@ -209,8 +209,11 @@ def _drawn_camera(trials: Trials, rng: np.random.Generator) -> Camera:
 
 def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
     pen, priors = trials.pen, trials.priors
-    basis = led_basis(pen.leds)
-    moves = basis @ (trials.led_sigma * rng.standard_normal(basis.shape[1]))
+    if pen.led_covariance is None:
+        basis = led_basis(pen.leds)
+        moves = basis @ (trials.led_sigma * rng.standard_normal(basis.shape[1]))
+    else:
+        moves = _drawn(pen.led_covariance, rng)
     middle = pen.leds.mean(axis=0)
     scale = 1 + float(_drawn(priors.scale.covariance, rng)[0])
     leds = middle + scale * (pen.leds - middle) + moves.reshape(-1, 3)
