@@ -2,9 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
-
-from msgspec import Struct
 
 from lightpen.commands.arguments import add_json, add_pen_options
 from lightpen.commands.console import (
@@ -14,31 +11,18 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.errors import FileError, UsageError
+from lightpen.commands.verifications import read_scale
+from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import MEGABYTE, read_bytes, sha256
+from lightpen.formats.files import sha256
 from lightpen.formats.hashes import all_hashed
-from lightpen.formats.own_json import DamagedError, has_checksum, parse_json
 from lightpen.formats.pen_files import read_pen, write_pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.sentences import sentence
-from lightpen.verification.led_file import KnownScale, improve_pen
+from lightpen.verification.led_file import improve_pen
 from lightpen.verification.pen_health import GROWN, MOVED, examine_pen
 from lightpen.verification.records import pen_health_entries, verification_record
 from lightpen.verification.texts import improved_pen_text, pen_health_text
-
-VERIFICATION = sentence("file.length", "verification of a length")
-LIMIT = 64 * MEGABYTE
-
-
-class _Scale(Struct):
-    factor: float
-    expanded_uncertainty: float
-    expanded_uncertainty_before: float
-
-
-class _Length(Struct):
-    scale: _Scale
 
 
 def add_verify_pen(parser: argparse.ArgumentParser) -> None:
@@ -115,7 +99,7 @@ def _improve_pen(options: argparse.Namespace) -> None:
     swings = _swings(options)
     pen = read_pen(options.pen, options.units, options.led_diameter, None)
     camera = read_camera(options.camera)
-    scale = None if options.length is None else _scale(options.length)
+    scale = None if options.length is None else read_scale(options.length)
     found = improve_pen(swings, camera, pen, scale)
     write_pen(found.pen, options.out, sha256(options.pen))
     print(shown(improved_pen_text(found)))
@@ -139,24 +123,3 @@ def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
                 )
             )
     return swings
-
-
-def _scale(path: Path) -> KnownScale:
-    """Read the scale that a verified length gives the pen."""
-    data = read_bytes(path, VERIFICATION, LIMIT)
-    try:
-        has_checksum(data)
-        found: Any = parse_json(data, _Length)
-    except DamagedError as error:
-        raise FileError(
-            sentence(
-                "cli.no-length",
-                "{path} is no verification of a length as it was written. Give what "
-                "--json of verify length wrote.",
-                path=str(path),
-            )
-        ) from error
-    scale = found.scale
-    return KnownScale(
-        scale.factor, scale.expanded_uncertainty, scale.expanded_uncertainty_before
-    )

@@ -2,12 +2,9 @@
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
-from lightpen.arrays import FloatArray
 from lightpen.commands.arguments import (
     above_zero,
     add_json,
@@ -21,15 +18,15 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
+from lightpen.commands.verifications import read_fixed_point
 from lightpen.detection.observations import observe_centers
-from lightpen.errors import FileError, UsageError
+from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
 from lightpen.estimation.report import result_of
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.observation_files import read_centers
-from lightpen.formats.own_json import DamagedError, Vector, has_checksum, parse_json
 from lightpen.formats.pen_files import read_pen
 from lightpen.record.calibrations import read_calibration
 from lightpen.sentences import sentence
@@ -39,17 +36,6 @@ from lightpen.verification.pen_health import require_one_pen
 from lightpen.verification.records import repeatability_entries, verification_record
 from lightpen.verification.repeatability import TipEstimate, measure_repeatability
 from lightpen.verification.texts import repeatability_text
-
-VERIFICATION = sentence("file.verification", "verification")
-LIMIT = 64 * MEGABYTE
-
-
-class _Scatter(Struct):
-    points_cam_mm: list[Vector]
-
-
-class _FixedPoint(Struct):
-    calibrated: _Scatter
 
 
 def add_repeatability(parser: argparse.ArgumentParser) -> None:
@@ -118,7 +104,9 @@ def _repeatability(options: argparse.Namespace) -> None:
         tolerance=options.tolerance,
         reference=None if options.reference is None else np.array(options.reference),
         fixed_point=(
-            None if options.fixed_point is None else _fixed_point(options.fixed_point)
+            None
+            if options.fixed_point is None
+            else read_fixed_point(options.fixed_point)
         ),
     )
     print(shown(repeatability_text(found)))
@@ -200,21 +188,3 @@ def _from_centers(options: argparse.Namespace, tables: list[Path]) -> list[TipEs
             )
             report(len(tips) / len(tables))
     return tips
-
-
-def _fixed_point(path: Path) -> FloatArray:
-    """Read the points of a fixed point that was verified."""
-    data = read_bytes(path, VERIFICATION, LIMIT)
-    try:
-        has_checksum(data)
-        found: Any = parse_json(data, _FixedPoint)
-    except DamagedError as error:
-        raise FileError(
-            sentence(
-                "cli.no-fixed-point",
-                "{path} is no verification of a fixed point as it was written. Give "
-                "what --json of verify fixed-point wrote.",
-                path=str(path),
-            )
-        ) from error
-    return np.array(found.calibrated.points_cam_mm, dtype=np.float64)

@@ -69,7 +69,7 @@ def _picture(found: Repeatability) -> str:
 
 
 def _coordinate(found: Repeatability, k: int, axis: str) -> list[str]:
-    control, values = found.control, found.values[:, k]
+    control, values = found.control, found.scatter.points[:, k]
     lower, center, upper = (
         float(each[k]) for each in (control.lower, control.center, control.upper)
     )

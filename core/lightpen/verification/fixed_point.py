@@ -40,7 +40,7 @@ WORTH_TELLING = 0.01  # mm, of another tip
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Coordinates of a point measured several times, camera frame, mm.
+    """Coordinates of a point measured several times, mm.
 
     Attributes
     ----------

@@ -30,28 +30,12 @@ from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile
 from lightpen.sentences import sentence
+from lightpen.verification.length import Scale
 from lightpen.verification.pen_health import require_one_pen
 
 MIN_POOLED = 3  # swings, beside the one held out
 CONFIRMED = 2.33  # standard deviations: 99 %
 FINEST = 1e-4  # mm, to which no LED file is known beforehand
-
-
-@dataclass(frozen=True)
-class KnownScale:
-    """The scale of the pen by certified lengths.
-
-    Attributes
-    ----------
-    factor : float
-        Of the coordinates of the file, and
-    uncertainty, uncertainty_before : float
-        U (k = 2) of it with the lengths and without.
-    """
-
-    factor: float
-    uncertainty: float
-    uncertainty_before: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +84,14 @@ def improve_pen(
     calibrations: Sequence[CalibrationFile],
     camera: Camera,
     pen: Pen,
-    scale: KnownScale | None = None,
+    scale: Scale | None = None,
 ) -> ImprovedPen:
     """Improve the LEDs of a pen by several swings; the last one has to confirm it.
+
+    Parameters
+    ----------
+    scale : Scale, optional
+        Of the pen by certified lengths.
 
     Raises
     ------
@@ -148,9 +137,7 @@ def improve_pen(
     )
 
 
-def _pooled(
-    calibrations: Sequence[Calibration], pen: Pen, scale: KnownScale | None
-) -> Pen:
+def _pooled(calibrations: Sequence[Calibration], pen: Pen, scale: Scale | None) -> Pen:
     first = calibrations[0].bundle
     at = first.columns
     shared = (*at.cameras, at.extrinsics, at.diameter, at.scale, at.leds)

@@ -189,9 +189,9 @@ def repeatability_entries(found: Repeatability) -> dict[str, Any]:
     """Return what was found of calibrations of one tip."""
     study = found.capability
     return {
-        "mean_mm": found.mean,
-        "std_mm": found.deviation,
-        "range_mm": found.values.max(axis=0) - found.values.min(axis=0),
+        "mean_mm": found.scatter.mean,
+        "std_mm": found.scatter.deviation,
+        "range_mm": found.scatter.range,
         "control": {
             "lower_mm": found.control.lower,
             "center_mm": found.control.center,

@@ -24,6 +24,7 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
+from lightpen.verification.fixed_point import Scatter
 from lightpen.verification.limits import VerificationLimits
 
 MIN_TIPS = 2
@@ -107,24 +108,14 @@ class Repeatability:
     assessment: Assessment
 
     @property
-    def values(self) -> FloatArray:
-        """The tips, (N, 3), mm."""
-        return np.array([tip.tip_pen for tip in self.tips])
-
-    @property
-    def mean(self) -> FloatArray:
-        """Of each coordinate, (3,), mm."""
-        return np.asarray(self.values.mean(axis=0))
-
-    @property
-    def deviation(self) -> FloatArray:
-        """Standard deviation of each coordinate, (3,), mm."""
-        return np.asarray(self.values.std(axis=0, ddof=1))
+    def scatter(self) -> Scatter:
+        """Of the tips, in the pen frame."""
+        return Scatter(np.array([tip.tip_pen for tip in self.tips]))
 
     @property
     def out_of_control(self) -> tuple[TipEstimate, ...]:
         """The tips beyond the limits of the control chart."""
-        values, control = self.values, self.control
+        values, control = self.scatter.points, self.control
         beyond = (values < control.lower) | (values > control.upper)
         return tuple(self.tips[i] for i in np.flatnonzero(beyond.any(axis=1)))
 
@@ -162,14 +153,12 @@ def measure_repeatability(
                 n_tips=len(tips),
             )
         )
-    values = np.array([tip.tip_pen for tip in tips])
-    deviation = values.std(axis=0, ddof=1)
-    fixed = None if fixed_point is None else fixed_point.std(axis=0, ddof=1)
+    scatter = Scatter(np.array([tip.tip_pen for tip in tips]))
+    values, deviation = scatter.points, scatter.deviation
+    fixed = None if fixed_point is None else Scatter(fixed_point).deviation
     n_touches = 0 if fixed_point is None else len(fixed_point)
     points_to = (
-        None
-        if fixed is None
-        else _points_to(deviation, len(tips), np.asarray(fixed), n_touches)
+        None if fixed is None else _points_to(deviation, len(tips), fixed, n_touches)
     )
     return Repeatability(
         tips=tuple(tips),

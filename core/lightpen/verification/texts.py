@@ -179,9 +179,9 @@ def repeatability_text(found: Repeatability) -> str:
             row(f"{i + 1:>3} {tip.name}"[:TITLE], tip.tip_pen)
             for i, tip in enumerate(found.tips)
         ),
-        row("Ave", found.mean),
-        row("Std", found.deviation),
-        row("Range", np.ptp(found.values, axis=0)),
+        row("Ave", found.scatter.mean),
+        row("Std", found.scatter.deviation),
+        row("Range", found.scatter.range),
         row("Control limit, lower", found.control.lower),
         row("Control limit, upper", found.control.upper),
     ]

@@ -28,7 +28,8 @@ from lightpen.simulator.swings import (
     simulate_centers,
     swing_poses,
 )
-from lightpen.verification.led_file import KnownScale, improve_pen
+from lightpen.verification.led_file import improve_pen
+from lightpen.verification.length import Scale
 from lightpen.verification.pen_health import examine_pen
 
 N_IMAGES, SIGMA = 40, 0.02
@@ -145,7 +146,7 @@ def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> N
 
 def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
     swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
-    scale = KnownScale(1.0003, 1e-5, 1e-2)
+    scale = Scale(1.0003, 1e-5, 1e-2)
 
     found = improve_pen(
         swings, paper_camera(), replace(PEN_FILE, scale_sigma=5e-3), scale

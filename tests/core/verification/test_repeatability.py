@@ -54,8 +54,12 @@ def fixed_point(deviation: np.ndarray, n: int = 10) -> np.ndarray:
 def test_the_table_of_the_paper_is_reproduced() -> None:
     found = measure_repeatability(estimates(TABLE_1), LIMITS)
 
-    np.testing.assert_allclose(found.mean, [-1.3182, -90.4095, -23.8548], atol=5e-5)
-    np.testing.assert_allclose(found.deviation, [0.033, 0.030, 0.043], atol=1e-3)
+    np.testing.assert_allclose(
+        found.scatter.mean, [-1.3182, -90.4095, -23.8548], atol=5e-5
+    )
+    np.testing.assert_allclose(
+        found.scatter.deviation, [0.033, 0.030, 0.043], atol=1e-3
+    )
     text = repeatability_text(found)
     assert "  1 test 1                 -1.2780  -90.4290  -23.9030" in text
     assert "Ave                        -1.3182  -90.4095  -23.8548" in text
