@@ -63,7 +63,7 @@ from lightpen.verification.texts import (
     length_text,
 )
 from lightpen.verification.touch import Touch
-from lightpen.verification.touching import SETTLING, TouchRules
+from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
@@ -172,8 +172,8 @@ def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
         choices=range(1, 101),
         default=1,
         metavar="N",
-        help="images of a touch, through which the pen is held still; 1 unless said: "
-        "each image is a touch",
+        help="images of a touch, through which the pen is held still, such as "
+        f"{FAST} or for a precise one {PRECISE}; 1 unless said: each image is a touch",
     )
     usual = VerificationLimits()
     for name in limits:

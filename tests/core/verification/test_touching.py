@@ -74,6 +74,12 @@ def test_a_still_pen_is_taken_after_so_many_images(instrument: Instrument) -> No
     assert len(state.taken[0].frames) == RULES.n_frames
 
 
+def test_progress_tells_how_much_of_a_touch_is_taken(instrument: Instrument) -> None:
+    state, _ = run(instrument, [*moving(), *[HELD] * 4])
+
+    assert state.progress(RULES) == pytest.approx(4 / STILL)
+
+
 def test_the_approach_is_where_the_tip_came_from(instrument: Instrument) -> None:
     state, _ = run(instrument, [*moving(), *[HELD] * STILL])
 
