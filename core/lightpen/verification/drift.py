@@ -113,12 +113,8 @@ def _assessment(
     lengths = np.linalg.norm(moves, axis=1)
     worst = int(np.argmax(lengths))
     axis = int(np.argmax(np.abs(moves[worst])))
-    values: dict[str, str | float] = {
-        "distance": float(lengths[worst]),
-        "uncertainty": float(uncertainties[worst, axis]),
-        "limit": limits.drift,
-    }
-    if lengths[worst] > limits.drift:
+    distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
+    if distance > limits.drift:
         return refused(
             sentence(
                 "drift.moved",
@@ -128,7 +124,9 @@ def _assessment(
                 "measured in between is off by as much.",
                 first=names[0],
                 visit=names[worst],
-                **values,
+                distance=distance,
+                uncertainty=uncertainty,
+                limit=limits.drift,
             ),
             VERIFY_AGAIN,
         )
@@ -137,6 +135,8 @@ def _assessment(
             "drift.good",
             "The witness stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit "
             "{limit:.4f} mm).",
-            **values,
+            distance=distance,
+            uncertainty=uncertainty,
+            limit=limits.drift,
         )
     )

@@ -230,12 +230,6 @@ def _assessment(
 ) -> Assessment:
     axis = int(np.argmax(deviation))
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
-    values: dict[str, str | float] = {
-        "deviation": float(deviation[axis]),
-        "axis": "xyz"[axis],
-        "limit": limits.repeatability,
-        "stated": float(stated[axis]),
-    }
     if deviation[axis] > limits.repeatability:
         return refused(
             points_to
@@ -245,7 +239,10 @@ def _assessment(
                 "deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} "
                 "mm. Touch a fixed point several times: whether that scatters alike "
                 "tells what moved.",
-                **values,
+                deviation=float(deviation[axis]),
+                axis="xyz"[axis],
+                limit=limits.repeatability,
+                stated=float(stated[axis]),
             ),
             CALIBRATE_AGAIN,
         )
@@ -256,6 +253,9 @@ def _assessment(
             "repeatability.good",
             "The tip repeats within {deviation:.4f} mm along {axis} (standard "
             "deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.",
-            **values,
+            deviation=float(deviation[axis]),
+            axis="xyz"[axis],
+            limit=limits.repeatability,
+            stated=float(stated[axis]),
         )
     )
