@@ -268,7 +268,9 @@ class Unknowns:
         )
 
     def _found_leds(self, find: Callable[[slice, float], Component]) -> Component:
-        stated = self.priors.led_sigma
+        stated, of_leds = self.priors.led_sigma, self.priors.led_covariance
+        if of_leds is not None:  # the least known may be off by that much
+            stated = float(np.sqrt(np.linalg.eigvalsh(of_leds)[-1]))
         component = find(self.columns.leds, stated or 0.0)
         if stated is None or (component.is_significant and component.sigma > stated):
             return component
