@@ -172,7 +172,9 @@ def run_monte_carlo(
 def run_trial(trials: Trials, number: int) -> FloatArray | None:
     """Return the error of the tip in one trial, (3,), mm; None where it has none."""
     rng = np.random.default_rng([trials.seed, number])
-    model = ContactModel(trials.camera, trials.pen, np.zeros((*trials.seen.shape, 2)))
+    model = ContactModel.of(
+        trials.camera, trials.pen, np.zeros((*trials.seen.shape, 2))
+    )
     # Residuals of images at 0 are the centres with the sign turned.
     exact = -model.at(trials.rotations, trials.tip_pen, trials.cone_cam).residuals
     noise = trials.sigma * rng.standard_normal(exact.shape)

@@ -80,6 +80,7 @@ class _Record(Struct):
     frames: list[_Frame]
     nominal_tip_mm: Vector | None = None
     instrument: _Instrument | None = None
+    rig: list[Any] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +138,8 @@ class CalibrationFile:
     used : (N,) array of bool
     pixels : (N, L, 2) array
         LED centres in the images, px; NaN where not seen.
+    is_of_rig : bool
+        Whether several cameras looked; the frames are then of all of them.
     has_checksum : bool
         Whether a change of the file would have been noticed.
     """
@@ -160,6 +163,7 @@ class CalibrationFile:
     frames: tuple[str, ...]
     used: BoolArray
     pixels: FloatArray
+    is_of_rig: bool
     has_checksum: bool
 
     @property
@@ -233,6 +237,7 @@ def _calibration(
         frames=tuple(frame.file for frame in record.frames),
         used=np.array([frame.used for frame in record.frames], dtype=bool),
         pixels=pixels,
+        is_of_rig=record.rig is not None,
         has_checksum=is_checked,
     )
 

@@ -19,12 +19,13 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.observations import observe_centers
-from lightpen.errors import CalibrationError
+from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.unknowns import inverse
+from lightpen.formats.files import printable
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -67,7 +68,24 @@ class ImprovedPen:
 def calibrate_again(
     calibration: CalibrationFile, camera: Camera, pen: Pen
 ) -> Calibration:
-    """Calibrate from the LED centres that a calibration keeps."""
+    """Calibrate from the LED centres that a calibration keeps.
+
+    Raises
+    ------
+    UsageError
+        They are of several cameras.
+    CalibrationError
+        They do not determine the tip.
+    """
+    if calibration.is_of_rig:
+        raise UsageError(
+            sentence(
+                "led-file.of-rig",
+                "{path} is of several cameras; only calibrations of a single camera are "
+                "solved again. Leave it out.",
+                path=printable(str(calibration.path)),
+            )
+        )
     seen = observe_centers(
         Centers(
             frames=np.arange(1, len(calibration.frames) + 1),

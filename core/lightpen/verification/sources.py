@@ -11,12 +11,12 @@ from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.reasons import counted
 from lightpen.detection.sighting import Sighting, sight_centers, unseen
 from lightpen.errors import CalibrationError, UsageError
-from lightpen.estimation.calibrate import USUAL_SIGMA
 from lightpen.estimation.instrument import (
     Instrument,
     instrument_of_files,
     with_camera,
 )
+from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.formats.files import printable, sha256
 from lightpen.formats.images import ImageSource
 from lightpen.model.camera import Camera

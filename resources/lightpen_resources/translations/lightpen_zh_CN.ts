@@ -3963,6 +3963,10 @@
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
+        <source>{path} is of several cameras; only calibrations of a single camera are solved again. Leave it out.</source>
+        <translation>{path} 来自多台相机；只能重新求解单台相机的标定。请将其去掉。</translation>
+    </message>
+    <message>
         <source>{path} was written by a later version of the program (format {number}; this version reads up to {known}). Open the record with that version.</source>
         <translation>{path} 由更新版本的程序写入（格式 {number}；本版本最高读取 {known}）。请用该版本打开此记录。</translation>
     </message>
