@@ -80,7 +80,7 @@ class _Record(Struct):
     frames: list[_Frame]
     nominal_tip_mm: Vector | None = None
     instrument: _Instrument | None = None
-    rig: list[Any] | None = None
+    rig: Any = None
 
 
 @dataclass(frozen=True, eq=False)

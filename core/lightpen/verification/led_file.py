@@ -81,8 +81,8 @@ def calibrate_again(
         raise UsageError(
             sentence(
                 "led-file.of-rig",
-                "{path} is of several cameras; only calibrations of a single camera are "
-                "solved again. Leave it out.",
+                "{path} is of several cameras; only calibrations of a single camera "
+                "are solved again. Leave it out.",
                 path=printable(str(calibration.path)),
             )
         )

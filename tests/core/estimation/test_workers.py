@@ -1,9 +1,10 @@
 """Tests of `lightpen.estimation.workers`: processes here, and a real Dask cluster."""
 
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-import distributed
 import pytest
 
 from lightpen.errors import Cancelled, UsageError
@@ -21,6 +22,7 @@ def touch_file(place: str) -> None:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """Return the address of a cluster of two processes on this machine."""
+    distributed: Any = import_module("distributed")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
