@@ -1,17 +1,15 @@
-"""The command line: ``lightpen calibrate | simulate | pivot | pen``.
+"""The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
 
 Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable input.
 """
 
 import argparse
-import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, wraps
+from functools import partial
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
@@ -21,6 +19,23 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.commands.arguments import add_pen_options, finite, whole_number
+from lightpen.commands.console import (
+    BAD_INPUT,
+    NO_TIP,
+    Command,
+    are_same,
+    lacking,
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.commands.pen_health import add_improve_pen
+from lightpen.commands.recalculate import add_recalculate
+from lightpen.commands.repeatability import add_repeatability
+from lightpen.commands.verify import add_verify
 from lightpen.detection.moments import observe_rig_centers, observe_rig_images
 from lightpen.detection.observations import (
     Observations,
@@ -34,19 +49,17 @@ from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import (
     METHODS,
     calibration_record,
-    json_bytes,
     pivot_record,
 )
 from lightpen.estimation.second_cone import SecondSwing
 from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import printable, write_whole
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pairing import pair_images
-from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
 from lightpen.formats.rig_files import read_rig
 from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
@@ -65,8 +78,6 @@ from lightpen.record.reading import (
 from lightpen.record.solving import record_inputs, solve_record
 from lightpen.sentences import Sentence, sentence
 
-DONE, NO_TIP, BAD_INPUT = 0, 1, 2
-BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
 COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
@@ -92,7 +103,6 @@ ADVICE = {
 
 
 ShowWindow: TypeAlias = Callable[[bool], int]
-Command: TypeAlias = Callable[[argparse.Namespace], int]
 
 
 def main(
@@ -135,17 +145,12 @@ def main(
 def _complain(trouble: Sentence) -> None:
     """Print what is wrong, and what to type about it."""
     advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
-    print(_shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
-
-
-def _shown(text: str) -> str:
-    """Return a text in which names of files say nothing to the terminal."""
-    return "\n".join(map(printable, text.split("\n")))
+    print(shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        super().error(_shown(message))
+        super().error(shown(message))
 
 
 def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
@@ -170,6 +175,18 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     _add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
     _add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
     _add_pen(commands.add_parser("pen", help="put measured LEDs into the pen frame"))
+    add_verify(commands.add_parser("verify", help="prove a tip by touching"))
+    add_repeatability(
+        commands.add_parser("repeatability", help="compare calibrations of one tip")
+    )
+    add_recalculate(
+        commands.add_parser(
+            "recalculate", help="solve calibrations again, and check U by Monte Carlo"
+        )
+    )
+    add_improve_pen(
+        commands.add_parser("improve-pen", help="a better LED file by several swings")
+    )
     return parser
 
 
@@ -198,7 +215,7 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         "FILE.csv) is then one of each camera, in the order of this file",
     )
     parser.add_argument("--pen", type=Path, metavar="FILE")
-    _add_pen_options(parser)
+    add_pen_options(parser)
     parser.add_argument(
         "--camera-sigma",
         type=_share,
@@ -256,7 +273,7 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
-        "--nominal-tip", type=_finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+        "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
 
@@ -265,7 +282,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_simulate)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
     parser.add_argument("--images", type=_n_images, default=60, metavar="N")
-    parser.add_argument("--seed", type=_whole_number, default=0, metavar="S")
+    parser.add_argument("--seed", type=whole_number, default=0, metavar="S")
     parser.add_argument(
         "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
     )
@@ -315,14 +332,8 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _whole_number(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more.")
-    return int(text)
-
-
 def _led_diameter(text: str) -> float:
-    diameter = _finite(text)
+    diameter = finite(text)
     if not MIN_LED_DIAMETER <= diameter <= MAX_LED_DIAMETER:
         raise argparse.ArgumentTypeError(
             f"{text} mm is no diameter from {MIN_LED_DIAMETER:g} to "
@@ -332,7 +343,7 @@ def _led_diameter(text: str) -> float:
 
 
 def _blur(text: str) -> float:
-    sigma = _finite(text)
+    sigma = finite(text)
     if not MIN_BLUR <= sigma <= MAX_BLUR:
         raise argparse.ArgumentTypeError(
             f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
@@ -341,7 +352,7 @@ def _blur(text: str) -> float:
 
 
 def _baseline(text: str) -> float:
-    baseline = _finite(text)
+    baseline = finite(text)
     if not MIN_BASELINE <= baseline <= MAX_BASELINE:
         raise argparse.ArgumentTypeError(
             f"{text} mm is no baseline from {MIN_BASELINE:g} to {MAX_BASELINE:g} mm."
@@ -350,7 +361,7 @@ def _baseline(text: str) -> float:
 
 
 def _n_images(text: str) -> int:
-    number = _whole_number(text)
+    number = whole_number(text)
     if number == 0:
         raise argparse.ArgumentTypeError("at least one image is needed.")
     if number > MAX_RENDERED:
@@ -358,25 +369,15 @@ def _n_images(text: str) -> int:
     return number
 
 
-def _finite(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"{text} is not a number.")
-    return number
-
-
 def _positive(text: str) -> float:
-    number = _finite(text)
+    number = finite(text)
     if not number > 0:
         raise argparse.ArgumentTypeError(f"{text} is not above 0.")
     return number
 
 
 def _temperature(text: str) -> float:
-    number = _finite(text)
+    number = finite(text)
     if not COLDEST <= number <= WARMEST:
         raise argparse.ArgumentTypeError(
             f"{text} is no temperature from {COLDEST:g} to {WARMEST:g} degrees Celsius."
@@ -386,7 +387,7 @@ def _temperature(text: str) -> float:
 
 def _share(text: str) -> float:
     """Return a part of one, which may be given in per cent."""
-    number = _finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    number = finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
     if not 0 < number <= LARGEST_SHARE:
         raise argparse.ArgumentTypeError(
             f"{text} is not a share above 0 and up to {LARGEST_SHARE:.0%}."
@@ -441,49 +442,7 @@ def _add_pen(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_pen)
     parser.add_argument("raw", type=Path, metavar="RAW.csv")
     parser.add_argument("out", type=Path, metavar="OUT.csv")
-    _add_pen_options(parser)
-
-
-def _add_pen_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--units", choices=sorted(UNITS), help="of a pen file that does not say"
-    )
-    parser.add_argument(
-        "--led-diameter",
-        type=_finite,
-        metavar="MM",
-        help="of the LED discs, where the pen file does not say (10)",
-    )
-
-
-def _printing(command: Callable[[argparse.Namespace], None]) -> Command:
-    """Give a command an exit status also where its output cannot be written."""
-
-    @wraps(command)
-    def run(options: argparse.Namespace) -> int:
-        try:
-            command(options)
-            if sys.stdout is not None:
-                sys.stdout.flush()
-        except BrokenPipeError:  # its reader has seen enough
-            _drop_output()
-        except OSError as error:  # files have errors of their own: this is our output
-            _drop_output()
-            print(
-                f"lightpen: The result cannot be printed: {error.strerror}. Free some "
-                "space, or print it elsewhere.",
-                file=sys.stderr,
-            )
-            return BAD_INPUT
-        return DONE
-
-    return run
-
-
-def _drop_output() -> None:
-    """Keep what is not printed yet from failing again as the program ends."""
-    if sys.stdout is not None:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    add_pen_options(parser)
 
 
 @dataclass(frozen=True, eq=False)
@@ -497,7 +456,7 @@ class _Calibrated:
     inputs: Callable[[], Inputs]
 
 
-@_printing
+@printing
 def _calibrate(options: argparse.Namespace) -> None:
     if bool(options.images) == (options.centers is not None):
         raise UsageError(
@@ -507,7 +466,7 @@ def _calibrate(options: argparse.Namespace) -> None:
             )
         )
     inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
-    _require_other_file(options.json, *inputs)
+    require_other_file(options.json, *inputs)
     if len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
     elif options.rig is not None:
@@ -520,12 +479,12 @@ def _calibrate(options: argparse.Namespace) -> None:
         *(calibration, options.method, calibrated.nominal_tip, verdict),
         calibrated.origin,
     )
-    print(_shown(text))
+    print(shown(text))
     if options.json is not None:
         record = calibration_record(
             calibration, calibrated.inputs(), options.method, calibrated.limits
         )
-        write_whole(options.json, json_bytes(record))
+        write_record(options.json, record)
 
 
 def _from_record(options: argparse.Namespace) -> _Calibrated:
@@ -559,9 +518,9 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
             )
         )
     record = open_record(folder)
-    _require_other_file(options.json, *record_files(record))
+    require_other_file(options.json, *record_files(record))
     _note_unacknowledged(unacknowledged_images(record))
-    with _progress("Finding LEDs") as report:
+    with progress("Finding LEDs") as report:
         solution = solve_record(record, report)
     return _Calibrated(
         solution.calibration,
@@ -602,20 +561,14 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
 
 
 def _note(note: Sentence) -> None:
-    print(_shown(f"lightpen: {note}"), file=sys.stderr)
+    print(shown(f"lightpen: {note}"), file=sys.stderr)
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
     """Return that an option is missing, and why the images are not a record."""
     missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
     if not missing:
-        return UsageError(
-            sentence(
-                "cli.option-missing",
-                "{option} FILE is missing. Only a record needs none.",
-                option=option,
-            )
-        )
+        return lacking(option)
     return UsageError(
         sentence(
             "cli.part-of-record-missing",
@@ -708,9 +661,9 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         _require_other_names(options.images, rig.names)
         sources = [find_images(place) for place in options.images]
         files = tuple(file for source in sources for file in source.files)
-        _require_other_file(options.json, *files, *rig_file.camera_files)
+        require_other_file(options.json, *files, *rig_file.camera_files)
         pairing = pair_images([source.names for source in sources], rig.names)
-        with _progress("Finding LEDs") as report:
+        with progress("Finding LEDs") as report:
             observations = observe_rig_images(sources, pairing, rig, pen, report)
     if pairing.by_order:
         _note(
@@ -784,16 +737,16 @@ def _observe(
     """Return what images or a file of centres show, and the files of it."""
     if is_centers:
         path = Path(given[0])
-        _require_other_file(record, path)
+        require_other_file(record, path)
         centers = read_centers(path, pen.n_leds)
         return observe_centers(centers, camera, pen), (path,)
     source = find_images(*given)
-    _require_other_file(record, *source.files)
-    with _progress("Finding LEDs") as report:
+    require_other_file(record, *source.files)
+    with progress("Finding LEDs") as report:
         return observe_images(source, camera, pen, report), source.files
 
 
-@_printing
+@printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen.simulator.sample_pens import SAMPLE_PENS
@@ -814,7 +767,7 @@ def _simulate(options: argparse.Namespace) -> None:
         optics=replace(looks.optics, psf_sigma=options.blur),
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
-    with _progress("Rendering") as report:
+    with progress("Rendering") as report:
         if options.cameras == 1:
             x, y, z = write_scene(scene, options.out, report)
             written = f"{scene.n_images} images, camera.yaml"
@@ -827,7 +780,7 @@ def _simulate(options: argparse.Namespace) -> None:
                 "camera files, rig.json"
             )
     print(
-        _shown(
+        shown(
             f"{written}, leds.csv and the true answer (truth.json) are in "
             f"{options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} mm in the "
             "frame of leds.csv."
@@ -835,9 +788,9 @@ def _simulate(options: argparse.Namespace) -> None:
     )
 
 
-@_printing
+@printing
 def _pivot(options: argparse.Namespace) -> None:
-    _require_other_file(options.json, options.poses)
+    require_other_file(options.json, options.poses)
     poses = read_poses(options.poses)
     calibration = calibrate_pivot(
         poses.rotations,
@@ -848,12 +801,12 @@ def _pivot(options: argparse.Namespace) -> None:
     print(pivot_text(calibration))
     if options.json is not None:
         record = pivot_record(calibration, hashed(options.poses), options.least_squares)
-        write_whole(options.json, json_bytes(record))
+        write_record(options.json, record)
 
 
-@_printing
+@printing
 def _pen(options: argparse.Namespace) -> None:
-    if _are_same(options.raw, options.out):
+    if are_same(options.raw, options.out):
         raise UsageError(
             sentence(
                 "cli.pen-over-raw",
@@ -864,43 +817,4 @@ def _pen(options: argparse.Namespace) -> None:
         )
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
-    print(_shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))
-
-
-def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
-    """Refuse to write the record over one of the files that it is made from."""
-    if record is None:
-        return
-    for path in inputs:
-        if path is not None and _are_same(path, record):
-            raise UsageError(
-                sentence(
-                    "cli.json-over-input",
-                    "--json {record} would replace the input file of that name. "
-                    "Give the record another name.",
-                    record=str(record),
-                )
-            )
-
-
-def _are_same(one: Path, other: Path) -> bool:
-    if one.exists() and other.exists():
-        return one.samefile(other)
-    return os.path.realpath(one) == os.path.realpath(other)
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on a terminal, and nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from tqdm import tqdm
-
-    layout = "{desc} {bar} {percentage:3.0f}%"
-    with tqdm(total=1.0, desc=title, bar_format=layout, ncols=BAR_WIDTH) as bar:
-
-        def report(fraction: float) -> None:
-            bar.update(fraction - bar.n)
-
-        yield report
+    print(shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))

@@ -16,6 +16,7 @@ from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.contradictions import Contradiction
 from lightpen.estimation.disc_diameter import read_diameter
+from lightpen.estimation.instrument import Instrument, adjusted_instrument
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
 from lightpen.estimation.linearised import BundleState
@@ -111,6 +112,8 @@ class Calibration:
         The paper's method on the same images, of the first camera.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
+    instrument : Instrument
+        What is left to measure with, of the first camera.
     lags : tuple of Lag or None
         Of each camera of a rig but the first.
     """
@@ -128,6 +131,7 @@ class Calibration:
     two_stage: TwoStageFit
     two_stage_covariance: FloatArray
     budget: Budget
+    instrument: Instrument
     halves: Halves
     leds: LedQuality
     coverage: Coverage
@@ -310,6 +314,7 @@ def calibrate_rig(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
         budget=budget,
+        instrument=adjusted_instrument(adjusted, budget),
         halves=compare_halves(joint),
         leds=measure_leds(fitted.rig, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),

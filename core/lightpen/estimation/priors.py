@@ -61,6 +61,8 @@ class Priors:
         Of the discs, mm.
     led_sigma : float or None
         Of one LED coordinate, mm; None: to be found from the images.
+    led_covariance : (3 L, 3 L) array or None
+        Of all of them, mm^2, where more is known than ``led_sigma``.
     form_error : float
         Of where the ball sits, along each axis in each form of the lean, mm.
     center_bias : float
@@ -79,6 +81,7 @@ class Priors:
     led_sigma: float | None
     form_error: float
     center_bias: float
+    led_covariance: FloatArray | None = None
     reading: DiameterReading | None = None
     separation: Separation | None = None
 
@@ -114,6 +117,7 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
         led_sigma=pen.led_sigma,
         form_error=assumptions.form_error,
         center_bias=assumptions.center_bias,
+        led_covariance=pen.led_covariance,
     )
 
 

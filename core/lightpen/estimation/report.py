@@ -11,6 +11,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.instrument import instrument_record
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.rig_report import (
     count_dropped,
@@ -120,6 +121,7 @@ def calibration_record(
         "uncertainty": _uncertainty(calibration),
         "adjusted": _adjusted(calibration),
         "second_cone": _second_cone(calibration.second),
+        "instrument": instrument_record(calibration.instrument),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
             "expanded_uncertainty_mm": calibration.budget.weakest_uncertainty,
@@ -135,7 +137,7 @@ def calibration_record(
         },
         "frames": _frames(calibration),
     }
-    return {name: _plain(entry) for name, entry in record.items()}
+    return {name: plain(entry) for name, entry in record.items()}
 
 
 def pivot_record(
@@ -182,7 +184,7 @@ def pivot_record(
             )
         ],
     }
-    return {name: _plain(entry) for name, entry in record.items()}
+    return {name: plain(entry) for name, entry in record.items()}
 
 
 def json_bytes(record: Mapping[str, Any]) -> bytes:
@@ -323,7 +325,7 @@ def _verdict(calibration: Calibration, limits: SwingLimits) -> dict[str, Any]:
     verdict = judge(calibration, limits)
     return {
         "grade": verdict.grade.value,
-        **_plain(verdict.reason),
+        **plain(verdict.reason),
         "next_step": verdict.next_step.value,
         "limits": {
             "max_uncertainty_mm": limits.max_uncertainty,
@@ -510,16 +512,16 @@ def _dumps(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return arrays as lists, what is not a number as null, sentences with codes."""
     if isinstance(value, Sentence):
         value = {"code": value.code, "text": str(value), "values": value.values}
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):
-        return {name: _plain(entry) for name, entry in value.items()}
+        return {name: plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

@@ -220,6 +220,10 @@ class Unknowns:
         for place, sigma in self._sigmas(components):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        of_leds = priors.led_covariance
+        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+            known = self.basis.T @ of_leds @ self.basis
+            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
 
     def measured(
@@ -306,7 +310,9 @@ class Unknowns:
         )
 
     def _found_leds(self, find: Callable[[slice, float], Component]) -> Component:
-        stated = self.priors.led_sigma
+        stated, of_leds = self.priors.led_sigma, self.priors.led_covariance
+        if of_leds is not None:  # the least known may be off by that much
+            stated = float(np.sqrt(np.linalg.eigvalsh(of_leds)[-1]))
         component = find(self.columns.leds, stated or 0.0)
         if stated is None or (component.is_significant and component.sigma > stated):
             return component

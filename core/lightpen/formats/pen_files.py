@@ -24,6 +24,8 @@ A JSON file has
 ``temperature_c`` at which the LEDs were measured, degrees C, optional
 ``nominal_tip`` list of three coordinates, optional
 ``name``        name or serial number, optional
+``led_covariance`` of all coordinates but for the scale, 3 L rows of 3 L, optional
+``parent_sha256`` of the file that this one was made better from, not read
 ``comment``     not read
 ================== ===================================================================
 
@@ -77,9 +79,11 @@ _COLUMN = (
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
     *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
-    *("led_sigma", "scale_sigma", "diameter_sigma"),
+    *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
     *("expansion", "expansion_sigma", "temperature_c"),
+    "parent_sha256",
 }
+ASYMMETRY = 1e-6  # of the largest variance
 _LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
 # From above the first to the second: mm, relative, 1/K, degrees C.
 _RANGES = {
@@ -185,32 +189,36 @@ def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
     return _pen(_read(path, units), None, None)
 
 
-def write_pen(pen: Pen, path: Path) -> None:
+def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     """Write a pen as a table or as JSON, to be read back to the last digit.
 
     Parameters
     ----------
     path : Path
         Name that ends in .csv or .json.
+    parent_sha256 : str, optional
+        Of the file that the pen was made better from.
 
     Raises
     ------
     UsageError
-        The name ends otherwise, or the pen has a name or a nominal tip, for which a
-        table has no place.
+        The name ends otherwise, or the pen has a name, a nominal tip or a covariance,
+        for which a table has no place.
     FileError
         The file cannot be written.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
-        text = _json_text(pen)
+        text = _json_text(pen, parent_sha256)
     elif suffix == ".csv":
-        if pen.name or pen.nominal_tip is not None:
+        extras = pen.nominal_tip, pen.led_covariance
+        if pen.name or any(each is not None for each in extras):
             raise UsageError(
                 sentence(
                     "pen-file.table-has-no-place",
-                    "{name} is a table, which has no place for the name and the "
-                    "nominal tip of the pen. Choose a name that ends in .json.",
+                    "{name} is a table, which has no place for the name, the nominal "
+                    "tip and the covariance of the pen. Choose a name that ends in "
+                    ".json.",
                     name=printable(path.name),
                 )
             )
@@ -237,6 +245,7 @@ class _Content:
     nominal_tip: FloatArray | None = None
     name: str = ""
     stated: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = None
 
 
 def _pen(
@@ -260,7 +269,13 @@ def _pen(
     if normals is None:
         normals = _facing_normals(len(content.leds))
     return Pen(
-        content.leds, normals, diameter, nominal_tip, content.name, **content.stated
+        content.leds,
+        normals,
+        diameter,
+        nominal_tip,
+        content.name,
+        **content.stated,
+        led_covariance=content.covariance,
     )
 
 
@@ -528,7 +543,29 @@ def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
             for what in _RANGES
             if entries.has(what)
         },
+        covariance=_covariance(entries, len(leds), unit, name),
     )
+
+
+def _covariance(
+    entries: Entries, n_leds: int, unit: float, name: str
+) -> FloatArray | None:
+    if not entries.has("led_covariance"):
+        return None
+    n = 3 * n_leds
+    matrix = entries.counted(n * n, "led_covariance").reshape(n, n) * unit**2
+    off = float(np.abs(matrix - matrix.T).max())
+    size = float(np.abs(np.diag(matrix)).max())
+    if off > ASYMMETRY * size or np.linalg.eigvalsh(matrix)[0] < -ASYMMETRY * size:
+        raise FileError(
+            sentence(
+                "pen-file.no-covariance",
+                "The led_covariance of {name} is none: it must be symmetric, and no "
+                "variance below 0. Leave it away, or give it as it was written.",
+                name=name,
+            )
+        )
+    return matrix
 
 
 def _listed_leds(entries: Entries, name: str) -> list[Entries]:
@@ -611,7 +648,7 @@ def _csv_text(pen: Pen) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _json_text(pen: Pen) -> str:
+def _json_text(pen: Pen, parent_sha256: str) -> str:
     import json
 
     leds = [
@@ -628,6 +665,10 @@ def _json_text(pen: Pen) -> str:
         f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
         *(f'"{what}": {number!r}' for what, number in _stated(pen).items()),
         f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
+        *([f'"parent_sha256": "{parent_sha256}"'] if parent_sha256 else []),
         f'"leds": [\n    {rows}\n  ]',
     ]
+    if pen.led_covariance is not None:
+        of_leds = ",\n    ".join(map(json.dumps, pen.led_covariance.tolist()))
+        entries.append(f'"led_covariance": [\n    {of_leds}\n  ]')
     return "{\n  " + ",\n  ".join(entries) + "\n}\n"

@@ -84,6 +84,9 @@ class Pen:
         Its standard uncertainty, 1/K; None if not stated.
     temperature_c : float or None
         At which the LEDs were measured; None if not stated.
+    led_covariance : (3 L, 3 L) array or None
+        Of all LED coordinates but for the scale that they share, mm^2; None if no more
+        than ``led_sigma`` is known.
     """
 
     leds: FloatArray
@@ -97,6 +100,7 @@ class Pen:
     expansion: float | None = None
     expansion_sigma: float | None = None
     temperature_c: float | None = None
+    led_covariance: FloatArray | None = None
 
     @property
     def n_leds(self) -> int:

@@ -2444,6 +2444,14 @@
         <translation>内参文件以 YAML 保存，但 {name} 不以 .yaml 结尾。请选择这样的名称。</translation>
     </message>
     <message>
+        <source>A control chart is written as .csv or .svg, but {name} ends in neither. Choose such a name.</source>
+        <translation>控制图写为 .csv 或 .svg，而 {name} 不以二者结尾。请选择这样的文件名。</translation>
+    </message>
+    <message>
+        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, the tip did not rest in the cone, or each touch was of too few images.</source>
+        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定的测头仅散布 {of_tip:.4f} mm。测头是稳定的：锥孔或相机在触测之间移动，测头没有停稳在锥孔中，或每次触测的图像太少。</translation>
+    </message>
+    <message>
         <source>A pen is written as .csv or .json, but {name} ends in neither. Choose such a name.</source>
         <translation>光笔以 .csv 或 .json 保存，但 {name} 的结尾两者都不是。请选择这样的名称。</translation>
     </message>
@@ -2452,12 +2460,20 @@
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
     </message>
     <message>
+        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
+        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个检定长度。</translation>
+    </message>
+    <message>
         <source>All of them were taken, so the tip lies between both.</source>
         <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
     </message>
     <message>
         <source>All recorded images are read, then the tip is computed.</source>
         <translation>先读取全部录制的图像，再计算测头。</translation>
+    </message>
+    <message>
+        <source>All touches of {run} lie within {extent:.3f} mm: one end was touched again and the other not at all. Touch both ends.</source>
+        <translation>{run} 的全部触测点都在 {extent:.3f} mm 之内：同一端被重复触测，另一端没有触测。请触测两端。</translation>
     </message>
     <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
@@ -2498,6 +2514,10 @@
     <message>
         <source>Complete the line; if it is the last one, the file is cut short.</source>
         <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
+    </message>
+    <message>
+        <source>Dask is not installed here, which a cluster needs. Install the extra named cluster, or compute on this machine.</source>
+        <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
     </message>
     <message>
         <source>Diameter of the discs: {flaw}</source>
@@ -2566,6 +2586,10 @@
     <message>
         <source>LED centres</source>
         <translation>LED 中心</translation>
+    </message>
+    <message>
+        <source>LED {led} has moved by {distance:.3f} mm against the others, as {swing} has it: it was bent or knocked, or came loose.</source>
+        <translation>据 {swing}，LED {led} 相对其他 LED 移动了 {distance:.3f} mm：它被碰弯、碰撞或松动。</translation>
     </message>
     <message>
         <source>LED {led} is listed already on line {line}.</source>
@@ -2732,16 +2756,44 @@
         <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
     </message>
     <message>
+        <source>Next: check that camera file and LED file are of this camera and this pen.</source>
+        <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
+    </message>
+    <message>
         <source>Next: check the intrinsics file and the LED file, then repeat.</source>
         <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: clean tip and artefact, clamp artefact and camera, and verify again.</source>
+        <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
+    </message>
+    <message>
+        <source>Next: look at the pen, fix the LED, and measure the LEDs again.</source>
+        <translation>下一步：检查光笔，固定该 LED，并重新测量各 LED。</translation>
     </message>
     <message>
         <source>Next: repeat the swing with the tip pressed in.</source>
         <translation>下一步：压紧测头，重做摆动。</translation>
     </message>
     <message>
+        <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
+        <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
+    </message>
+    <message>
         <source>Next: see that it is the tip that is named, clean and tight, then repeat.</source>
         <translation>下一步：确认测头与所填写的一致、清洁且已拧紧，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: use the tip.</source>
+        <translation>下一步：使用该测头。</translation>
+    </message>
+    <message>
+        <source>No Dask scheduler answers at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler runs.</source>
+        <translation>{address} 处没有 Dask 调度器应答。请检查地址（例如 tcp://10.0.0.5:8786）以及调度器是否在运行。</translation>
+    </message>
+    <message>
+        <source>No LED has moved against the others over {n_swings} swings.</source>
+        <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
     <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
@@ -2764,6 +2816,10 @@
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
+        <source>One swing tells nothing of how a pen changes; give two at least.</source>
+        <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
@@ -2772,8 +2828,16 @@
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
     </message>
     <message>
+        <source>Put the tip into the cone and hold it still, each time leant another way: {n_touches} of {needed}.</source>
+        <translation>把测头放入锥孔并保持不动，每次向不同方向倾斜：{n_touches} / {needed}。</translation>
+    </message>
+    <message>
         <source>RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.</source>
         <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>Show the camera the pen that the tip belongs to.</source>
+        <translation>请让相机看到该测头所属的光笔。</translation>
     </message>
     <message>
         <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
@@ -2838,6 +2902,10 @@
     <message>
         <source>The LEDs stand in a line within {off_line:.2f} mm over {extent:.0f} mm, so a turn about it could not be seen. At least one LED must stand {needed:.1f} mm off the line.</source>
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
+    </message>
+    <message>
+        <source>The calibration {path} is not as it was written: it was changed or damaged since. Restore it from a copy, or calibrate again.</source>
+        <translation>标定结果 {path} 与写出时不同：此后被改动或损坏。请从副本恢复，或重新标定。</translation>
     </message>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
@@ -2944,6 +3012,18 @@
         <translation>联合拟合在 {n_steps} 步内未收敛。图像可能不属于这支光笔和这台相机：请检查两个文件。</translation>
     </message>
     <message>
+        <source>The led_covariance of {name} is none: it must be symmetric, and no variance below 0. Leave it away, or give it as it was written.</source>
+        <translation>{name} 的 led_covariance 不是协方差矩阵：它必须对称，且方差不得小于 0。请去掉它，或按原样给出。</translation>
+    </message>
+    <message>
+        <source>The length at {run} is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Is it the certified length of this bar? Else the scale of the LED file or the camera file is wrong, or the pen is warmer than when it was measured.</source>
+        <translation>{run} 处的长度偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这是该标准杆的检定长度吗？否则是 LED 文件的尺度或内参文件有误，或光笔比测量 LED 时更热。</translation>
+    </message>
+    <message>
+        <source>The length is off by {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>长度最大偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
         <source>The lens distortion of the camera file cannot be undone for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
     </message>
@@ -2972,8 +3052,32 @@
         <translation>光笔已抬起。放回测头即可继续。</translation>
     </message>
     <message>
+        <source>The pen was held alike each time: its postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed to prove a tip. Lean it to all sides.</source>
+        <translation>光笔每次的握持姿态相同：各姿态仅相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜。</translation>
+    </message>
+    <message>
         <source>The pen was swung about one axis only, {axis}: that axis itself turned by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the tip&apos;s place along it is not fixed. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
+    </message>
+    <message>
+        <source>The point moves as the pen leans, by {deviation:.4f} mm along {axis} (limit {limit:.4f} mm): the tip sits {x:+.4f} {y:+.4f} {z:+.4f} mm from where it was calibrated. Was it exchanged, bent or screwed in anew, or is it the tip of another pen?</source>
+        <translation>该点随光笔倾斜而移动，沿 {axis} 为 {deviation:.4f} mm（限值 {limit:.4f} mm）：测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm。测头是否被更换、碰弯或重新拧过，或者是另一支光笔的测头？</translation>
+    </message>
+    <message>
+        <source>The point scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm), which no other tip would mend. The tip may not rest in the cone: look for dirt, wear and a loose cone.</source>
+        <translation>该点沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm），换用其他测头位置也不能消除。测头可能没有停稳在锥孔中：请检查污物、磨损和锥孔是否松动。</translation>
+    </message>
+    <message>
+        <source>The point stays within a sphere of {error:.4f} mm as the pen leans (limit {limit:.4f} mm).</source>
+        <translation>光笔倾斜时，该点保持在直径 {error:.4f} mm 的球内（限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The point stays within {u:.4f} {v:.4f} {w:.4f} mm (standard deviation along u v w) however the pen is held.</source>
+        <translation>无论光笔如何握持，该点保持在 {u:.4f} {v:.4f} {w:.4f} mm 以内（沿 u v w 的标准差）。</translation>
+    </message>
+    <message>
+        <source>The point wanders within a sphere of {error:.4f} mm as the pen leans (limit {limit:.4f} mm).</source>
+        <translation>光笔倾斜时，该点在直径 {error:.4f} mm 的球内游移（限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
         <source>The poses are of two tips, {distance:.2f} mm apart in the pen, as if the tip had been exchanged or had slipped in its holder. One: poses {first}. The other: poses {second}. {consequence}</source>
@@ -2982,6 +3086,10 @@
     <message>
         <source>The poses have no tip in common: the best one scatters by {scatter:.0f} mm, while the poses themselves are {movement:.0f} mm apart. Check that they are of one pen that was swung on its tip, as cam_from_pen, and that rotations and translations belong together.</source>
         <translation>这些位姿没有共同的测头：最佳结果的散布为 {scatter:.0f} mm，而位姿本身彼此相距 {movement:.0f} mm。请检查：位姿是否来自同一支绕测头摆动的光笔，是否以 cam_from_pen 给出，旋转与平移是否对应。</translation>
+    </message>
+    <message>
+        <source>The postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed. Hold the pen upright, and lean it to four sides.</source>
+        <translation>各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请将光笔竖直握持，并向四个方向倾斜。</translation>
     </message>
     <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
@@ -2994,6 +3102,14 @@
     <message>
         <source>The program made a mistake of its own. The images kept so far are safe; go on, or start the program again.</source>
         <translation>程序自身出错。已保留的图像是安全的；请继续，或重新启动程序。</translation>
+    </message>
+    <message>
+        <source>The radius is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>半径偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The radius is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Tip, LED file or camera file may be wrong, or the ball is not compensated.</source>
+        <translation>半径偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或内参文件可能有误，或未补偿测球半径。</translation>
     </message>
     <message>
         <source>The record {name} holds no images. Resume the swing, or begin a new one.</source>
@@ -3012,12 +3128,20 @@
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
     </message>
     <message>
+        <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
+        <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
+    </message>
+    <message>
         <source>The tip cannot be accepted. {why}</source>
         <translation>不能接受该测头。{why}</translation>
     </message>
     <message>
         <source>The tip cannot be compared with the one in force. {why}</source>
         <translation>无法与已生效的测头比较。{why}</translation>
+    </message>
+    <message>
+        <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
+        <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
     <message>
         <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
@@ -3032,16 +3156,92 @@
         <translation>测头与 {date} 的结果相差 {distance:.4f} mm：沿 {axis} 方向相差 {difference:.4f} mm，而两者的 U (k = 2) 只能解释 {uncertainty:.4f} mm。测头是否更换、弯曲或重新安装过？</translation>
     </message>
     <message>
+        <source>The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.</source>
+        <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>The tip scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm. Touch a fixed point several times: whether that scatters alike tells what moved.</source>
+        <translation>测头沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。请多次触测一个固定点：它是否同样散布可说明是什么在移动。</translation>
+    </message>
+    <message>
+        <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point touched with it by only {of_point:.4f} mm. An error of the calibration would move both alike: so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
+        <translation>各次标定的测头散布为 {of_tip:.4f} mm，而用它触测的固定点仅散布 {of_point:.4f} mm。标定误差会使二者同样变化：因此两次标定之间光笔上有东西移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 是否测量得太粗。</translation>
+    </message>
+    <message>
+        <source>The touches lie in one place or on a line, which is no circle. Touch the ring all round.</source>
+        <translation>各触测点位于同一处或一条直线上，不成圆。请沿环一周触测。</translation>
+    </message>
+    <message>
+        <source>The touches lie on a circle of radius {measured:.3f} mm, {certified} mm is certified. Is it this ring, and its radius rather than its diameter?</source>
+        <translation>触测点所在圆的半径为 {measured:.3f} mm，检定值为 {certified} mm。是这个环吗？给出的是半径而不是直径吗？</translation>
+    </message>
+    <message>
+        <source>The touches of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed: a radius from less is hardly worth anything. Touch the ring also in the gap between {first} and {second}.</source>
+        <translation>{run} 的触测覆盖环的 {covered:.0f}°，至少需要 {needed:.0f}°：更少时求得的半径几乎没有意义。请在 {first} 与 {second} 之间的空缺处也触测。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie at more than two places: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Touch nothing but the two ends.</source>
+        <translation>{run} 的触测点不止两处：{touch} 与同一端的其他点相距 {distance:.2f} mm。光笔是否在该处抬起？请只触测两端。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie on no circle: {n_off} of {n_touches} are off it, and the others by up to {off:.2f} mm. Touch one ring, in one plane.</source>
+        <translation>{run} 的触测点不在一个圆上：{n_touches} 个点中有 {n_off} 个偏离，其余最多偏离 {off:.2f} mm。请在一个平面内触测同一个环。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie up to {form:.4f} mm off a circle in a plane (limit {limit:.4f} mm): the tip slipped, the ring is dirty, or the tip is off.</source>
+        <translation>{run} 的触测点最多偏离平面圆 {form:.4f} mm（限值 {limit:.4f} mm）：测头滑动，环不清洁，或测头有误。</translation>
+    </message>
+    <message>
+        <source>The verification is done. Put the pen down.</source>
+        <translation>验证已完成。可以放下光笔。</translation>
+    </message>
+    <message>
+        <source>The witness moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the witness is not clamped, or the camera was not warm yet. What was measured in between is off by as much.</source>
+        <translation>监视点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或监视点没有夹紧，或相机尚未预热。其间的测量结果也有同样的偏差。</translation>
+    </message>
+    <message>
+        <source>The witness stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>监视点的移动在 {distance:.4f} mm 以内（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The witness was visited once, which tells nothing of a drift. Touch it before, during and after the session.</source>
+        <translation>监视点只触测了一次，看不出漂移。请在工作之前、期间和之后各触测一次。</translation>
+    </message>
+    <message>
         <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
         <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
+    </message>
+    <message>
+        <source>There are {n_postures} postures, {needed} are needed: upright, and leant to four sides.</source>
+        <translation>共有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
         <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
         <translation>测头 {tip}、光笔 {pen} 的这一结果已不再生效。撤回之前，请先查看现在生效的是哪一个。</translation>
     </message>
     <message>
+        <source>Touch one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
+        <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
+    </message>
+    <message>
+        <source>Touch the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees by {n_touches} touches.</source>
+        <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip. Touch each end more often, and lay the length across the view.</source>
+        <translation>{run} 处长度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。请对每端多次触测，并使长度方向横对视线。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the radius is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip.</source>
+        <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
+    </message>
+    <message>
         <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
         <translation>测球与锥孔不够圆。请换用更好的，并给出其形状误差</translation>
+    </message>
+    <message>
+        <source>calibration</source>
+        <translation>标定结果</translation>
     </message>
     <message>
         <source>camera {number} of {name}</source>
@@ -3728,12 +3928,24 @@
         <translation>{n_images} 幅图像中有 {n_dropped} 幅未参与计算。若测头滑动过，请重做摆动。</translation>
     </message>
     <message>
+        <source>{n_failed} of {n_trials} trials gave no tip: the swing is too poor to be repeated by simulation. Capture more images in other postures.</source>
+        <translation>{n_trials} 次模拟中有 {n_failed} 次求不出测头：该摆动太差，无法用模拟重复。请以其他姿态采集更多图像。</translation>
+    </message>
+    <message>
         <source>{n_images} {reason}</source>
         <translation>{reason} {n_images} 幅</translation>
     </message>
     <message>
         <source>{n_left_out} of {n_poses} poses agree with no common tip and were left out: {poses}. Look for what disturbed the tracking.</source>
         <translation>{n_poses} 个位姿中有 {n_left_out} 个与共同的测头不符，已剔除：{poses}。请查找干扰跟踪的原因。</translation>
+    </message>
+    <message>
+        <source>{n_left_out} of {n_touches} touches lie elsewhere and were left out, the first {first}: the pen was lifted there, or slipped.</source>
+        <translation>{n_touches} 次触测中有 {n_left_out} 次位于别处，已剔除，第一次为 {first}：光笔在该处抬起或滑动。</translation>
+    </message>
+    <message>
+        <source>{n_left_out} touches lie off the ring and were left out, the first {first}: the pen was lifted there, or slipped.</source>
+        <translation>{n_left_out} 次触测不在环上，已剔除，第一次为 {first}：光笔在该处抬起或滑动。</translation>
     </message>
     <message>
         <source>{n_pairs} of {n_moments} moments show the pen to camera {camera} and to another one; {needed} are needed to tell how both stand. Give the images of one moment the same name, and turn the cameras so that each sees the pen.</source>
@@ -3746,6 +3958,18 @@
     <message>
         <source>{n_poses} poses are usable; the two-stage method starts from {needed}. Capture more images.</source>
         <translation>可用位姿 {n_poses} 个；两步法至少需要 {needed} 个。请采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_swings} swings are given; {needed} are needed to pool, and one more to confirm what comes of them.</source>
+        <translation>给出了 {n_swings} 次摆动；合并需要 {needed} 次，另需一次来确认所得结果。</translation>
+    </message>
+    <message>
+        <source>{n_tips} calibration tells nothing of how well it repeats; give two at least, ten are usual.</source>
+        <translation>{n_tips} 次标定看不出重复性；请至少给出两次，通常为十次。</translation>
+    </message>
+    <message>
+        <source>{n_touches} touches of the point can be used, at least {needed} are needed, {usual} are usual. Touch the cone again, each time in another posture.</source>
+        <translation>该点有 {n_touches} 次可用的触测，至少需要 {needed} 次，通常为 {usual} 次。请再次触测锥孔，每次换一个姿态。</translation>
     </message>
     <message>
         <source>{n_usable} of {n_images} images are usable</source>
@@ -3920,10 +4144,6 @@
         <translation>{name} 是列表；LED 文件应为含 leds 和 units 的映射。请照此编写。</translation>
     </message>
     <message>
-        <source>{name} is a table, which has no place for the name and the nominal tip of the pen. Choose a name that ends in .json.</source>
-        <translation>{name} 是表格，无法存放光笔的名称和标称测头。请选择以 .json 结尾的名称。</translation>
-    </message>
-    <message>
         <source>{name} is an animation. Save its images one by one.</source>
         <translation>{name} 是动画。请将其中的图像逐幅保存。</translation>
     </message>
@@ -3950,6 +4170,10 @@
     <message>
         <source>{name} has the {what} {number:g}. A number above {least:g} and up to {most:g} is needed; leave it away if it is not known.</source>
         <translation>{name} 中的 {what} 为 {number:g}。需要大于 {least:g} 且不超过 {most:g} 的数；若未知请略去。</translation>
+    </message>
+    <message>
+        <source>{name} is a table, which has no place for the name, the nominal tip and the covariance of the pen. Choose a name that ends in .json.</source>
+        <translation>{name} 是表格，无处存放光笔的名称、标称测头和协方差。请选择以 .json 结尾的文件名。</translation>
     </message>
     <message>
         <source>{name} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
@@ -3992,6 +4216,10 @@
         <translation>{others}和{last}</translation>
     </message>
     <message>
+        <source>{other} was made with another pen file than {first}. Give calibrations of one pen with one pen file.</source>
+        <translation>{other} 所用的光笔文件与 {first} 不同。请给出同一支光笔、同一光笔文件的标定结果。</translation>
+    </message>
+    <message>
         <source>{path} cannot be written: it is a folder. Name a file.</source>
         <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
     </message>
@@ -4008,8 +4236,16 @@
         <translation>{path} 已损坏。请用备份恢复。</translation>
     </message>
     <message>
+        <source>{path} is no record of a calibration. Give what the command calibrate wrote, or an accepted result.</source>
+        <translation>{path} 不是标定记录。请给出 calibrate 命令写出的文件，或已接受的结果。</translation>
+    </message>
+    <message>
         <source>{path} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} is of several cameras; only calibrations of a single camera are solved again. Leave it out.</source>
+        <translation>{path} 来自多台相机；只能重新求解单台相机的标定。请将其去掉。</translation>
     </message>
     <message>
         <source>{path} was written by a later version of the program (format {number}; this version reads up to {known}). Open the record with that version.</source>
@@ -4040,12 +4276,40 @@
         <translation>{place}：法向量 {normal} 的长度不为 1。请改正；若所有发光面都朝 +z，可以不给法向量。</translation>
     </message>
     <message>
+        <source>{posture} has {n_touches} touches that can be used, {needed} are needed in each posture.</source>
+        <translation>{posture} 有 {n_touches} 次可用的触测，每个姿态需要 {needed} 次。</translation>
+    </message>
+    <message>
         <source>{reason}. Choose another folder or name.</source>
         <translation>{reason}。请选择其他文件夹或名称。</translation>
     </message>
     <message>
+        <source>{run} has {n_touches} touches that can be used; a circle needs at least {needed}, 20 are usual. Touch the ring all round.</source>
+        <translation>{run} 有 {n_touches} 次可用的触测；圆至少需要 {needed} 次，通常为 20 次。请沿环一周触测。</translation>
+    </message>
+    <message>
+        <source>{run} has {n_touches} touches that can be used; a length needs both its ends. Touch each end once at least.</source>
+        <translation>{run} 有 {n_touches} 次可用的触测；长度需要两端。请对每一端至少触测一次。</translation>
+    </message>
+    <message>
+        <source>{run}: none of the {n_images} images shows the pen ({why}). {advice}</source>
+        <translation>{run}：{n_images} 幅图像均未显示光笔（{why}）。{advice}</translation>
+    </message>
+    <message>
+        <source>{run}: the LED positions do not fit the images: {rms:.1f} px, {usual} px or less is usual. Check that the images are of this pen and this camera.</source>
+        <translation>{run}：LED 位置与图像不符：{rms:.1f} px，通常不超过 {usual} px。请检查图像是否属于这支光笔和这台相机。</translation>
+    </message>
+    <message>
+        <source>{run}: the pen was held still nowhere for {n_frames} images. Hold it still on each point, or take each image for a touch.</source>
+        <translation>{run}：光笔没有在任何一处保持不动达 {n_frames} 幅图像。请在每个点上保持不动，或把每幅图像当作一次触测。</translation>
+    </message>
+    <message>
         <source>{told} They have the size of {other}: the images may be given in another order than the cameras of the rig file.</source>
         <translation>{told}它们的尺寸与 {other} 相符：给出图像的顺序可能与相机组文件中相机的顺序不同。</translation>
+    </message>
+    <message>
+        <source>{touch} lies {distance:.2f} mm from where the others are: the pen was lifted, or slipped. Touch that posture again.</source>
+        <translation>{touch} 与其余各点相距 {distance:.2f} mm：光笔曾抬起或滑动。请在该姿态下重新触测。</translation>
     </message>
     <message>
         <source>{unit} is not a unit of length known here. Choose one of {known}.</source>

@@ -278,3 +278,23 @@ def test_a_pen_that_keeps_its_lean_has_no_forms() -> None:
     upright = np.tile(np.eye(3), (5, 1, 1))
 
     assert not lean_forms(upright).any()
+
+
+def test_a_stated_covariance_tells_which_leds_may_be_off() -> None:
+    measured = perturbed(0.002, 1, stated=0.002)
+    variances = np.full((PEN.n_leds, 3), 0.002**2)
+    variances[6] = 0.05**2
+    told = replace(measured, led_covariance=np.diag(variances.ravel()))
+    moved = told.leds.copy()
+    moved[6] += [0.04, 0.0, -0.05]
+    told = replace(told, leds=moved)
+
+    result = calibrated(told, 0.03, 1)
+
+    # What the file allows for is put right, and is no contradiction.
+    assert result.bundle.components.leds.sigma == 0
+    np.testing.assert_allclose(
+        result.bundle.led_corrections[6] - result.bundle.led_corrections[5],
+        [-0.04, 0.0, 0.05],
+        atol=0.012,
+    )

@@ -429,10 +429,14 @@ def test_a_pen_is_written_as_csv_or_json_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "pen",
-    [Pen(LEDS, FACING, name="LP04"), Pen(LEDS, FACING, nominal_tip=np.zeros(3))],
+    [
+        Pen(LEDS, FACING, name="LP04"),
+        Pen(LEDS, FACING, nominal_tip=np.zeros(3)),
+        Pen(LEDS, FACING, led_covariance=np.eye(3 * len(LEDS))),
+    ],
 )
 def test_what_a_table_has_no_place_for_is_not_dropped(tmp_path: Path, pen: Pen) -> None:
-    with pytest.raises(UsageError, match=r"no place for the name and the nominal tip"):
+    with pytest.raises(UsageError, match=r"no place for the name, the nominal tip"):
         write_pen(pen, tmp_path / "pen.csv")
 
 
@@ -535,3 +539,14 @@ def test_what_is_no_number_cannot_be_read_to_be_mended_either(tmp_path: Path) ->
 
     with pytest.raises(FileError, match=r"Line 3 of leds\.csv"):
         read_unchecked_pen(path)
+
+
+def test_a_covariance_that_is_none_is_refused(tmp_path: Path) -> None:
+    lopsided = np.eye(3 * len(LEDS))
+    lopsided[0, 1] = 0.5
+    negative = np.eye(3 * len(LEDS))
+    negative[2, 2] = -1.0
+    for matrix in (lopsided, negative):
+        write_pen(Pen(LEDS, FACING, led_covariance=matrix), tmp_path / "pen.json")
+        with pytest.raises(FileError, match=r"led_covariance of pen.json is none"):
+            read_pen(tmp_path / "pen.json")
