@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
 from lightpen.estimation.instrument import instrument_of_files
 from lightpen.simulator.camera import SimulatedCamera
@@ -20,6 +21,7 @@ from lightpen.verification.session import (
 
 LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict
 GIVE_UP = 240.0  # s
+FRAME_RATE = 10.0  # 1/s: half of the usual one, as each image is rendered
 
 
 def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
@@ -35,10 +37,12 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
         length=artefacts.length,
         cone_cam=scene.cone_cam,
         n_touches=6,
+        n_frames=3,
     )
     clock = SkippingClock()
     camera = SimulatedCamera(scene, clock)
     camera.open()
+    camera.configure(CameraSettings(frame_rate=FRAME_RATE))
     camera.start()
     toucher = Toucher(camera.operator, artefacts)
     state, before, finished, first = SessionState(), None, [], None
