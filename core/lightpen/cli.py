@@ -1,4 +1,4 @@
-"""The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
+"""The window, or a command: ``lightpen calibrate | simulate | pivot | pen | ...``.
 
 Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable input.
 """
@@ -13,7 +13,7 @@ from functools import partial
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
-from typing import NoReturn, TypeAlias
+from typing import NoReturn, Protocol
 
 import cv2
 import numpy as np
@@ -78,6 +78,11 @@ from lightpen.record.reading import (
 from lightpen.record.solving import record_inputs, solve_record
 from lightpen.sentences import Sentence, sentence
 
+# A word that is none of these may be a file to open.
+COMMANDS = (
+    *("open", "calibrate", "simulate", "pivot", "pen", "verify", "repeatability"),
+    *("recalculate", "improve-pen"),
+)
 LARGEST_SHARE = 0.1
 COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
@@ -102,25 +107,43 @@ ADVICE = {
 }
 
 
-ShowWindow: TypeAlias = Callable[[bool], int]
 
 
-def main(
-    arguments: Sequence[str] | None = None, show_window: ShowWindow | None = None
-) -> int:
+class Desktop(Protocol):
+    """What the command line starts beside its commands; each returns an exit status."""
+
+    def show_window(self, swing: Path | None) -> int:
+        """Open the window; with what leads to a recorded swing, show that."""
+
+    def play_demo(self) -> int:
+        """Play a calibration with a simulated operator."""
+
+    def test_itself(self, report: Path) -> int:
+        """Try what the program needs, and write a report."""
+
+    def install_entry(self) -> int:
+        """Put the program into the menu of the desktop."""
+
+    def remove_entry(self) -> int:
+        """Take it out of the menu again."""
+
+
+def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
     """Run the command line and return the exit status.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the process unless given.
-    show_window : callable, optional
-        Opens the program's window, or its demo if its argument is True, and returns
-        the exit status. Without it a command must be given.
+    desktop : Desktop, optional
+        Without it a command must be given.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    parser = _parser(desktop)
+    if desktop is not None and _is_file_to_open(given):
+        given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
-    options = _parser(show_window).parse_args(
+    options = parser.parse_args(
         [f" {text}" if NEGATIVE_NUMBER.match(text) else text for text in given]
     )
     for stream in (sys.stdout, sys.stderr):
@@ -153,8 +176,8 @@ class _Parser(argparse.ArgumentParser):
         super().error(shown(message))
 
 
-def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
-    has_window = show_window is not None
+def _parser(desktop: Desktop | None) -> argparse.ArgumentParser:
+    has_window = desktop is not None
     parser = _Parser(
         prog="lightpen",
         description="Calibrate the probe tip of a light pen."
@@ -163,14 +186,10 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
         "unreadable input.",
     )
     parser.add_argument("--version", action="version", version=version("lightpen"))
-    if show_window is not None:
-        parser.set_defaults(run=lambda options: show_window(options.demo))
-        parser.add_argument(
-            "--demo",
-            action="store_true",
-            help="play a whole calibration with a simulated operator",
-        )
-    commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
+    commands = parser.add_subparsers(required=desktop is None, metavar="COMMAND")
+    if desktop is not None:
+        _add_desktop(parser, desktop)
+        _add_open(commands.add_parser("open", help="show a recorded swing"), desktop)
     _add_calibrate(commands.add_parser("calibrate", help="find the tip from a swing"))
     _add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
     _add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
@@ -188,6 +207,57 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
         commands.add_parser("improve-pen", help="a better LED file by several swings")
     )
     return parser
+
+
+def _is_file_to_open(given: Sequence[str]) -> bool:
+    """Return whether there is nothing but a file, as icons hand it over."""
+    return len(given) == 1 and given[0] not in COMMANDS and Path(given[0]).exists()
+
+
+def _add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
+    parser.set_defaults(run=partial(_start_desktop, desktop))
+    starts = parser.add_mutually_exclusive_group()
+    starts.add_argument(
+        "--demo",
+        action="store_true",
+        help="play a whole calibration with a simulated operator",
+    )
+    starts.add_argument(
+        "--self-test",
+        type=Path,
+        metavar="REPORT.json",
+        help="try all that the program needs on this computer, and write a report",
+    )
+    starts.add_argument(
+        "--install-desktop-entry",
+        action="store_true",
+        help="put the program into the menu of a Linux desktop",
+    )
+    starts.add_argument(
+        "--remove-desktop-entry", action="store_true", help="take it out again"
+    )
+
+
+def _start_desktop(desktop: Desktop, options: argparse.Namespace) -> int:
+    if options.demo:
+        return desktop.play_demo()
+    if options.self_test is not None:
+        return desktop.test_itself(options.self_test)
+    if options.install_desktop_entry:
+        return desktop.install_entry()
+    if options.remove_desktop_entry:
+        return desktop.remove_entry()
+    return desktop.show_window(None)
+
+
+def _add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
+    parser.set_defaults(run=lambda options: desktop.show_window(options.swing))
+    parser.add_argument(
+        "swing",
+        type=Path,
+        metavar="SWING",
+        help="the record of a swing, the file swing.lightpen in it, or a result",
+    )
 
 
 def _add_calibrate(parser: argparse.ArgumentParser) -> None:

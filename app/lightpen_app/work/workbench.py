@@ -70,11 +70,14 @@ class Workbench(QObject):
         So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
+    swing_wanted(Path)
+        What leads to a recorded swing was opened from outside the program.
     """
 
     changed = Signal()
     subject_changed = Signal(object)
     others_counted = Signal(int)
+    swing_wanted = Signal(object)
     troubled = Signal(str)
 
     def __init__(

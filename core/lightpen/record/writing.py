@@ -38,6 +38,7 @@ from lightpen.record.reading import (
     FORMAT,
     HEADER,
     IMAGES,
+    OPENER,
     FileCopy,
     FileEntry,
     Header,
@@ -48,6 +49,8 @@ from lightpen.record.reading import (
     open_record,
 )
 from lightpen.sentences import sentence
+
+OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
 
 
 class RecordWriter:
@@ -96,6 +99,7 @@ class RecordWriter:
             write_whole(folder / copy_name("camera", header.camera), header.camera.data)
             write_whole(folder / copy_name("pen", header.pen), header.pen.data)
             write_whole(folder / HEADER, _header_bytes(header))
+            write_whole(folder / OPENER, OPENER_TEXT)
             _sync_folder(folder)
             _sync_folder(folder.parent)
             stack.pop_all()
