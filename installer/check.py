@@ -1,0 +1,182 @@
+"""Try an installer for real: ``python installer/check.py SETUP.exe``.
+
+On Linux in a fresh Wine prefix, on Windows in the user's own account. Prints what it
+tries; the exit status is 1 if anything is not as it must be. See installer/README.md.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from installer import bad_conditions, life
+from installer.build import Packing, pack, project_version
+from installer.launchers import ToolMissingError
+from installer.machine import Machine, OwnMachine, WineMachine
+from installer.places import IS_WINDOWS
+from installer.trial import Trial, await_so
+from installer.wine.prefix import Prefix
+
+# A user whose name a Windows of another language cannot spell.
+USER = "Jörg 王"
+DISPLAY = 93
+NEWER = "999.0.0"
+START_LIMIT_S = 8.0
+TIP_LIMIT = 1e-6  # mm between the tips of Linux and Windows
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Try it, and return the exit status."""
+    options = _parser().parse_args(arguments)
+    began = time.monotonic()
+    try:
+        with _machine() as machine, TemporaryDirectory() as work:
+            trial = Trial(machine, options.setup.absolute())
+            if options.quick:
+                try_quickly(trial)
+            else:
+                try_all(trial, Path(work), options.setup.absolute().parent / "payload")
+    except ToolMissingError as error:
+        print(f"check.py: {error}", file=sys.stderr)
+        return 1
+    print(f"{len(trial.troubles)} troubles, {time.monotonic() - began:.0f} s")
+    return 1 if trial.troubles else 0
+
+
+def try_quickly(trial: Trial) -> None:
+    """Install, self-test and uninstall."""
+    files, registry = trial.machine.files(), trial.machine.registry()
+    life.try_installation(trial, project_version())
+    compare_tips(trial, life.try_self_test(trial, "offscreen"))
+    life.try_removal(trial, files, registry)
+
+
+def try_all(trial: Trial, work: Path, payload: Path) -> None:
+    """Try all that an installation goes through, and what goes wrong with it.
+
+    Parameters
+    ----------
+    payload : Path
+        The folder that the installer was packed from, for one of a newer version.
+    """
+    version = project_version()
+    files, registry = trial.machine.files(), trial.machine.registry()
+    bad_conditions.try_no_right(trial)
+    bad_conditions.try_full_disk(trial)
+    bad_conditions.try_other_folder(trial)
+    life.try_installation(trial, version)
+    compare_tips(trial, life.try_self_test(trial, "offscreen"))
+    with _screen(trial) as seen:
+        if seen is not None:
+            life.try_self_test(seen, "windows")
+    try_start(trial)
+    life.try_entry_points(trial, version)
+    life.try_demo(trial)
+    life.try_double_click(trial)
+    life.try_refusals(trial)
+    bad_conditions.try_damage(trial)
+    bad_conditions.try_interruption(trial)
+    newer = work / "newer-setup.exe"
+    pack(payload, work, newer, NEWER, Packing.STORED)
+    life.try_upgrade(trial, newer, version, NEWER)
+    life.try_removal(trial, files, registry)
+
+
+def compare_tips(trial: Trial, there: Mapping[str, Any]) -> None:
+    """Compare the tip of a self-test with that of one on this computer."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "report.json"
+        words = [sys.executable, "-m", "lightpen_app", "--self-test", str(file)]
+        environment = os.environ | {"QT_QPA_PLATFORM": "offscreen"}
+        subprocess.run(words, env=environment, check=True)
+        here = json.loads(file.read_text("utf-8"))
+    if not there["ok"]:
+        return
+    pairs = zip(there["tip"]["found_mm"], here["tip"]["found_mm"], strict=True)
+    apart = max(abs(one - other) for one, other in pairs)
+    trial.expect(f"its tip is that found here, to {apart:.1e} mm", apart <= TIP_LIMIT)
+
+
+def try_start(trial: Trial) -> None:
+    """Start the program twice, and take the time until its window serves.
+
+    The files of the simulated camera are written by a job that the running window
+    starts: then it has been shown, and its events are seen to.
+    """
+    sample = trial.data / "simulated" / "pen.json"
+    for attempt in ("first", "second"):
+        sample.unlink(missing_ok=True)
+        began = time.monotonic()
+        process = trial.start_window()
+        is_open = await_so(sample.exists)
+        seconds = time.monotonic() - began
+        is_soon = attempt == "first" or seconds <= START_LIMIT_S
+        trial.expect(f"{attempt} start, {seconds:.1f} s", is_open and is_soon)
+        trial.end_programs()
+        process.wait()
+
+
+@contextmanager
+def _machine() -> Iterator[Machine]:
+    """Return a machine on which nothing was installed."""
+    if IS_WINDOWS:
+        yield OwnMachine()
+        return
+    with TemporaryDirectory(prefix="lightpen-check-") as name:
+        folder = Path(name) / "prefix"
+        made = Prefix.for_builds()
+        made.await_end()
+        shutil.copytree(made.folder, folder, symlinks=True)
+        machine = WineMachine(folder, user=USER)
+        machine.make_user()
+        machine.with_platform(life.USUAL_PLATFORM)
+        try:
+            yield machine
+        finally:
+            machine.end_all()
+
+
+@contextmanager
+def _screen(trial: Trial) -> Iterator[Trial | None]:
+    """Give the machine a screen, where there is none and one can be made."""
+    if IS_WINDOWS:
+        yield trial
+        return
+    program = shutil.which("Xvfb")
+    if program is None:
+        print("skip what needs a screen: Xvfb is not installed")
+        yield None
+        return
+    words = [program, f":{DISPLAY}", "-screen", "0", "1600x1200x24"]
+    server = subprocess.Popen(words, stderr=subprocess.DEVNULL)
+    try:
+        await_so(Path(f"/tmp/.X11-unix/X{DISPLAY}").exists)
+        machine = trial.machine.with_display(f":{DISPLAY}")
+        yield replace(trial, machine=machine)
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description="Try an installer for real.")
+    parser.add_argument("setup", type=Path, metavar="SETUP.exe")
+    parser.add_argument(
+        "--quick", action="store_true", help="only install, self-test and uninstall"
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
