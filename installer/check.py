@@ -23,13 +23,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from installer import bad_conditions, life
 from installer.build import Packing, pack, project_version
 from installer.launchers import ToolMissingError
-from installer.machine import Machine, OwnMachine, WineMachine
+from installer.machine import fresh_machine
 from installer.places import IS_WINDOWS
 from installer.trial import Trial, await_so
-from installer.wine.prefix import Prefix
 
-# A user whose name a Windows of another language cannot spell.
-USER = "Jörg 王"
 DISPLAY = 93
 NEWER = "999.0.0"
 START_LIMIT_S = 8.0
@@ -41,12 +38,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     began = time.monotonic()
     try:
-        with _machine() as machine, TemporaryDirectory() as work:
+        with fresh_machine(life.USUAL_PLATFORM) as machine:
             trial = Trial(machine, options.setup.absolute())
             if options.quick:
                 try_quickly(trial)
             else:
-                try_all(trial, Path(work), options.setup.absolute().parent / "payload")
+                try_all(trial, options.setup.absolute().parent / "payload")
     except ToolMissingError as error:
         print(f"check.py: {error}", file=sys.stderr)
         return 1
@@ -62,7 +59,7 @@ def try_quickly(trial: Trial) -> None:
     life.try_removal(trial, files, registry)
 
 
-def try_all(trial: Trial, work: Path, payload: Path) -> None:
+def try_all(trial: Trial, payload: Path) -> None:
     """Try all that an installation goes through, and what goes wrong with it.
 
     Parameters
@@ -87,9 +84,10 @@ def try_all(trial: Trial, work: Path, payload: Path) -> None:
     life.try_refusals(trial)
     bad_conditions.try_damage(trial)
     bad_conditions.try_interruption(trial)
-    newer = work / "newer-setup.exe"
-    pack(payload, work, newer, NEWER, Packing.STORED)
-    life.try_upgrade(trial, newer, version, NEWER)
+    with TemporaryDirectory() as work:
+        newer = Path(work) / "newer-setup.exe"
+        pack(payload, Path(work), newer, NEWER, Packing.STORED)
+        life.try_upgrade(trial, newer, version, NEWER)
     life.try_removal(trial, files, registry)
 
 
@@ -125,26 +123,6 @@ def try_start(trial: Trial) -> None:
         trial.expect(f"{attempt} start, {seconds:.1f} s", is_open and is_soon)
         trial.end_programs()
         process.wait()
-
-
-@contextmanager
-def _machine() -> Iterator[Machine]:
-    """Return a machine on which nothing was installed."""
-    if IS_WINDOWS:
-        yield OwnMachine()
-        return
-    with TemporaryDirectory(prefix="lightpen-check-") as name:
-        folder = Path(name) / "prefix"
-        made = Prefix.for_builds()
-        made.await_end()
-        shutil.copytree(made.folder, folder, symlinks=True)
-        machine = WineMachine(folder, user=USER)
-        machine.make_user()
-        machine.with_platform(life.USUAL_PLATFORM)
-        try:
-            yield machine
-        finally:
-            machine.end_all()
 
 
 @contextmanager

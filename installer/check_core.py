@@ -18,10 +18,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from installer import runtime
 from installer.downloads import download_wheels
 from installer.locked import windows_pins
-from installer.machine import OwnMachine
+from installer.machine import fresh_machine
 from installer.payload import unpack_wheels
-from installer.places import IS_WINDOWS, ROOT
-from installer.wine.prefix import Prefix
+from installer.places import ROOT
 
 # Of the tools in requirements-dev.lock, what the tests import.
 TOOLS = {
@@ -35,8 +34,10 @@ PATHS_FILE = runtime.LIBRARY.replace(".zip", "._pth")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run them, and return the exit status of pytest."""
     options = _parser().parse_args(arguments)
-    machine = OwnMachine() if IS_WINDOWS else Prefix.for_builds()
-    with TemporaryDirectory(prefix="lightpen-core-") as name:
+    with (
+        fresh_machine("offscreen") as machine,
+        TemporaryDirectory(prefix="lightpen-core-") as name,
+    ):
         folder = Path(name) / "program"
         tools = Path(name) / "tools"
         shutil.copytree(options.payload, folder, copy_function=os.link)

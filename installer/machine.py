@@ -2,18 +2,23 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Protocol, Self
 
+from installer.places import IS_WINDOWS
 from installer.wine.prefix import Outcome, Prefix
 
 VOLATILE = ("/Temp/", "/Recent/", "/Microsoft/", "/windows/")
 WORD = "lightpen"
+USER = "Jörg 王"  # whom a Windows of another language cannot spell
 PLATFORM = "QT_QPA_PLATFORM"
 TEMPORARY = "AppData/Local/Temp"
 SHELL_KEY = (
@@ -221,3 +226,31 @@ class OwnMachine:
         outcome = self.run(["reg", "query", r"HKCU\Software", "/s", "/f", WORD])
         lines = outcome.output.splitlines()
         return frozenset(line for line in lines if WORD in line.lower())
+
+
+@contextmanager
+def fresh_machine(platform: str) -> Iterator[Machine]:
+    """Give a machine on which nothing was installed; under Wine it is gone afterwards.
+
+    Parameters
+    ----------
+    platform : str
+        Through which Qt draws.
+    """
+    if IS_WINDOWS:
+        yield OwnMachine(platform)
+        return
+    made = Prefix.for_builds()
+    made.await_end()
+    with TemporaryDirectory(prefix="lightpen-machine-") as name:
+        folder = Path(name) / "prefix"
+        without = shutil.ignore_patterns("Temp")
+        shutil.copytree(made.folder, folder, symlinks=True, ignore=without)
+        machine = WineMachine(folder, user=USER)
+        machine.make_user()
+        machine.with_platform(platform)
+        try:
+            yield machine
+        finally:
+            machine.end_all()
+            machine.await_end()
