@@ -52,9 +52,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         paths.write_text(runtime.PATHS + "\r\n".join([*places, ""]), newline="")
         python = machine.windows_path(folder / "runtime" / "python.exe")
         words = [python, "-B", "-m", "pytest", *(options.words or USUAL)]
-        outcome = machine.run(words, folder=ROOT)
-    print(outcome.output)
-    return outcome.status
+        process = machine.start(words, ROOT)
+        if process.stdout is not None:
+            for line in process.stdout:  # told as it comes: it takes many minutes
+                sys.stdout.write(line.decode("utf-8", errors="replace"))
+                sys.stdout.flush()
+        return process.wait()
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
+from lightpen.formats.file_locks import locked, unlock
 from lightpen.formats.files import (
     create_whole,
     printable,
@@ -345,6 +346,18 @@ def test_a_new_file_on_a_full_disk_is_none(tmp_path: Path) -> None:
     )
     assert "the file would be larger than allowed" in result
     assert names_in(tmp_path) == []
+
+
+def test_a_lock_leaves_a_file_where_its_writer_was(tmp_path: Path) -> None:
+    path = tmp_path / "locked"
+    with path.open("wb") as stream:
+        assert locked(stream.fileno())
+        stream.write(b"first ")
+        stream.flush()
+        unlock(stream.fileno())
+        stream.write(b"second")
+
+    assert path.read_bytes() == b"first second"
 
 
 def test_the_digest_is_that_of_the_content(tmp_path: Path) -> None:
