@@ -107,8 +107,6 @@ ADVICE = {
 }
 
 
-
-
 class Desktop(Protocol):
     """What the command line starts beside its commands; each returns an exit status."""
 
