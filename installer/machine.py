@@ -112,7 +112,8 @@ class WineMachine(Prefix):
 
     def open_document(self, path: Path) -> None:
         """Open a file as a double click does."""
-        self.run(["start", self.windows_path(path)])
+        # Not waited for: the program that opens holds the end of the output.
+        self.start(["start", self.windows_path(path)])
 
     def _set_variable(self, name: str, value: str) -> None:
         words = ["reg", "add", r"HKCU\Environment", "/v", name, "/d", value, "/f"]

@@ -2520,6 +2520,10 @@
         <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
     </message>
     <message>
+        <source>Desktop entries are of Linux. On Windows the installer makes the entry of the start menu.</source>
+        <translation>桌面条目仅适用于 Linux。在 Windows 上，开始菜单项由安装程序创建。</translation>
+    </message>
+    <message>
         <source>Diameter of the discs: {flaw}</source>
         <translation>发光面直径：{flaw}</translation>
     </message>
@@ -3126,6 +3130,10 @@
     <message>
         <source>The rig file has camera {camera} {angle:.1f} degrees and {distance:.0f} mm away from where the images put it.</source>
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
+    </message>
+    <message>
+        <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
+        <translation>校准结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
     </message>
     <message>
         <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
@@ -4220,6 +4228,10 @@
         <translation>{other} 所用的光笔文件与 {first} 不同。请给出同一支光笔、同一光笔文件的标定结果。</translation>
     </message>
     <message>
+        <source>{path} cannot be changed: {reason}. Make sure that it is yours to write.</source>
+        <translation>无法更改 {path}：{reason}。请确认您有写入权限。</translation>
+    </message>
+    <message>
         <source>{path} cannot be written: it is a folder. Name a file.</source>
         <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
     </message>
@@ -4234,6 +4246,10 @@
     <message>
         <source>{path} is damaged. Restore it from a copy.</source>
         <translation>{path} 已损坏。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} is neither a recorded swing nor a result. Open the file swing.lightpen in the folder of a swing, or a file in the folder results.</source>
+        <translation>{path} 既不是摆动记录，也不是校准结果。请打开摆动记录文件夹中的 swing.lightpen，或 results 文件夹中的文件。</translation>
     </message>
     <message>
         <source>{path} is no record of a calibration. Give what the command calibrate wrote, or an accepted result.</source>
