@@ -185,6 +185,8 @@ def find_pen_contradictions(
     size, scale = _denied(
         [_Entry(SCALE, "", 1.0, one, one)], bundle, at.scale, priors.scale
     )
+    if any(each.wanted_uncertainty > VAGUE for each in size):
+        size, scale = [], priors.scale
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)
 
