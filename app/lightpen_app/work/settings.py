@@ -169,7 +169,7 @@ class Settings(QObject):
 
     def cameras(self) -> dict[str, CameraSettings]:
         """Return how cameras were set up last, by their serial numbers."""
-        kept: dict[str, Any] = self._content.get("cameras", {})
+        kept = self._content.get("cameras", {})
         return {
             serial: _camera_settings(_read(entries, KeptCamera()))
             for serial, entries in kept.items()

@@ -128,6 +128,11 @@ class Stats:
         names = [item.name for item in fields(self)]
         return Stats(*(getattr(self, name) - getattr(earlier, name) for name in names))
 
+    def and_then(self, later: "Stats") -> "Stats":
+        """Return the counts of both."""
+        names = [item.name for item in fields(self)]
+        return Stats(*(getattr(self, name) + getattr(later, name) for name in names))
+
 
 @dataclass(frozen=True)
 class Range:

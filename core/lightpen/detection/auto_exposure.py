@@ -27,7 +27,7 @@ MAX_STEPS = 15
 MAX_BLIND = 40  # images without LEDs in succession: two seconds
 
 
-class Outcome(StrEnum):
+class Standing(StrEnum):
     """How an adjustment stands."""
 
     ADJUSTING = "adjusting"
@@ -53,7 +53,7 @@ class AutoExposure:
     """
 
     asked: CameraSettings
-    outcome: Outcome = Outcome.ADJUSTING
+    outcome: Standing = Standing.ADJUSTING
     level: float = 0.0
     saturating: float = inf
     n_steps: int = 0
@@ -66,46 +66,36 @@ class AutoExposure:
             CameraSettings(exposure_us=settings.exposure_us, gain_db=settings.gain_db)
         )
 
-    def fed(
-        self, frame: Frame, spots: Spots, leds: Inspection, chosen: IntArray, caps: Caps
-    ) -> Self:
-        """Return the adjustment after another image.
-
-        Parameters
-        ----------
-        leds : Inspection
-            Of the image.
-        chosen : (N,) array of int
-            Which of the spots are LEDs.
-        """
-        if self.outcome is not Outcome.ADJUSTING or not self._is_of_asked(frame):
+    def fed(self, frame: Frame, spots: Spots, leds: Inspection, caps: Caps) -> Self:
+        """Return the adjustment after another image, which was inspected."""
+        if self.outcome is not Standing.ADJUSTING or not self._is_of_asked(frame):
             return self
-        if len(chosen) == 0:
+        if len(leds.chosen) == 0:
             n_blind = self.n_blind + 1
-            outcome = Outcome.NO_LEDS if n_blind >= MAX_BLIND else self.outcome
+            outcome = Standing.NO_LEDS if n_blind >= MAX_BLIND else self.outcome
             return replace(self, n_blind=n_blind, outcome=outcome)
-        level = brightest_level(frame, spots, chosen)
+        level = brightest_level(frame, spots, leds.chosen)
         light = _light(self.asked)
         seen = replace(self, level=level, n_blind=0, n_steps=self.n_steps + 1)
         if leds.exposure.n_saturated:
             seen = replace(seen, saturating=min(self.saturating, light))
-            return seen._ask(light * SATURATED_STEP, caps, Outcome.TOO_BRIGHT)
+            return seen._ask(light * SATURATED_STEP, caps, Standing.TOO_BRIGHT)
         wanted = min(
             light * min(TARGET / max(level, TARGET / LARGEST_STEP), LARGEST_STEP),
             BELOW_SATURATION * self.saturating,
         )
         if abs(wanted / light - 1) <= TOLERANCE / TARGET:
-            return replace(seen, outcome=Outcome.DONE)
+            return replace(seen, outcome=Standing.DONE)
         if seen.n_steps >= MAX_STEPS:
-            return replace(seen, outcome=Outcome.UNSTEADY)
-        limit = Outcome.TOO_DARK if wanted > light else Outcome.TOO_BRIGHT
+            return replace(seen, outcome=Standing.UNSTEADY)
+        limit = Standing.TOO_DARK if wanted > light else Standing.TOO_BRIGHT
         return seen._ask(wanted, caps, limit)
 
     def _is_of_asked(self, frame: Frame) -> bool:
         asked = self.asked
         return (frame.exposure_us, frame.gain_db) == (asked.exposure_us, asked.gain_db)
 
-    def _ask(self, light: float, caps: Caps, limit: Outcome) -> Self:
+    def _ask(self, light: float, caps: Caps, limit: Standing) -> Self:
         """Return the adjustment that asks for so much light, or is at its limit."""
         exposures, gains = caps.exposure_us, caps.gain_db
         now = self.asked

@@ -213,7 +213,8 @@ class Live:
         image = self._look(frame, wanted)
         caps = self._worker.caps
         n_images = None if caps is None else caps.n_images
-        self._runner.take(frame, image.sighting, setup, n_images)
+        stats = self._worker.stats
+        self._runner.take(frame, image.sighting, setup, n_images, stats)
         self._listener.on_image(image)
 
     def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:

@@ -1,6 +1,7 @@
 """From a live image to a longer record: decide, and put on disk what is kept."""
 
 from lightpen.arrays import Image
+from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import RecordWriter
@@ -16,6 +17,7 @@ def capture_image(
     sighting: Sighting,
     time: float,
     device_time_ns: int | None = None,
+    stats: Stats | None = None,
 ) -> Transition:
     """Take one live image into a swing.
 
@@ -31,6 +33,8 @@ def capture_image(
         When it was taken, s.
     device_time_ns : int, optional
         By the clock of the camera.
+    stats : Stats, optional
+        What became of the camera's images since the swing began.
 
     Returns
     -------
@@ -61,5 +65,6 @@ def capture_image(
                 sighting.translation,
                 time,
                 device_time_ns,
+                stats,
             )
     return transition

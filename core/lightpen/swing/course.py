@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import LightpenError
@@ -45,6 +45,7 @@ from lightpen.swing.rules import (
 from lightpen.swing.serial_queue import Act, Report, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.tally import Tally
 
 T = TypeVar("T")
 
@@ -96,6 +97,7 @@ class SwingCourse:
         self._limits = SwingLimits()
         self._writer: RecordWriter | None = None
         self._n_since_kept = 0
+        self._tally = Tally()
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
@@ -230,6 +232,7 @@ class SwingCourse:
         self._writer = writer
         self._limits = limits  # asking for more does not raise them
         self._n_since_kept = 0
+        self._tally = Tally(record.stats)
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
         self._relieve()
@@ -249,6 +252,7 @@ class SwingCourse:
         sighting: Sighting | None,
         setup: SwingSetup | None,
         n_images: int | None,
+        stats: Stats | None,
     ) -> None:
         """Take an image, as `SwingRunner.take` has it."""
         status, choices = self._status, self._attendance.choices
@@ -262,6 +266,8 @@ class SwingCourse:
         elif status.state.phase is Phase.VERDICT:
             self._watch(status.state, sighting, frame)
         elif status.is_capturing and setup is status.setup:
+            if stats is not None:
+                self._tally = self._tally.after(stats)
             self._capture(status.state, sighting, frame, n_images)
 
     def _capture(
@@ -278,7 +284,7 @@ class SwingCourse:
         try:
             transition = capture_image(
                 *(setup, before, writer, frame.image, sighting, time),
-                frame.device_ts_ns,
+                *(frame.device_ts_ns, self._tally.total),
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)

@@ -8,8 +8,9 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.replay import RECORDED
 from lightpen.cameras.source import Needs, Source
-from lightpen.cameras.sources import RECORDED, SIMULATED, source_named
+from lightpen.cameras.sources import SIMULATED, source_named
 from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile

@@ -38,6 +38,7 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
@@ -79,7 +80,7 @@ def exposure(seen: "Seen") -> str:
 
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
-    page = CameraPage(workbench)
+    page = CameraPage(workbench, Silence())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -894,6 +895,9 @@ def test_every_control_is_named_and_reached_by_tab(
         "Live image",
         "Exposure",
         "Gain",
+        "Set by the LEDs",
+        "Frame rate",
+        "Pixel format",
     }
 
 
