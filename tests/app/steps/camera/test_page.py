@@ -305,7 +305,8 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
 
     live.wait(
         "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
-        "Choose the file for this camera or switch off binning."
+        "Choose the file for this camera, set the region to the whole sensor, or "
+        "switch off binning."
     )
     assert not live.page.is_complete()
     assert "another size" in live.page.main_action().why_not
