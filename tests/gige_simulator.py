@@ -34,6 +34,8 @@ class GigeSimulator:
         library.arv_fake_camera_set_fill_pattern.argtypes = [
             *(c_void_p, _Fill, c_void_p, c_void_p)
         ]
+        library.arv_fake_camera_get_payload.restype = c_size_t
+        library.arv_fake_camera_get_payload.argtypes = [c_void_p]
         library.arv_buffer_get_data.restype = c_void_p
         library.arv_buffer_get_data.argtypes = [c_void_p, POINTER(c_size_t)]
         self._fill = _Fill(self._on_fill)  # the library calls it as long as it runs
@@ -71,9 +73,11 @@ class GigeSimulator:
     ) -> None:
         assert self._scene is not None
         image = np.ascontiguousarray(self._scene(exposure_us, gain))
-        size = c_size_t()
-        data = self._library.arv_buffer_get_data(buffer, ctypes.byref(size))
-        ctypes.memmove(data, image.ctypes.data, min(image.nbytes, size.value))
+        library = self._library
+        fake = library.arv_gv_fake_camera_get_fake_camera(self._simulator)
+        size = library.arv_fake_camera_get_payload(fake)
+        data = library.arv_buffer_get_data(buffer, None)
+        ctypes.memmove(data, image.ctypes.data, min(image.nbytes, size))
 
 
 if __name__ == "__main__":

@@ -146,8 +146,8 @@ def _infos() -> Iterator[tuple[Any, Any]]:
     for name in LAYERS:
         if name in known:
             layer = factory.CreateTl(name)
-            for info in layer.EnumerateDevices():
-                yield layer, info
+            if layer is not None:  # what it needs of the system is not there
+                yield from ((layer, info) for info in layer.EnumerateDevices())
 
 
 def _find(producer: str) -> tuple[FoundDevice, ...]:

@@ -408,11 +408,14 @@ class CameraWorker:
         self._settings = merged(before, self._applied)
 
     def _set_exposure(self, exposure_us: float) -> None:
+        # Where the camera is lost over it, it is set when it comes back.
+        self._settings = replace(self._settings, exposure_us=exposure_us)
         applied = self._camera.set_exposure(exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         self._apply(replace(self._applied, exposure_us=applied))
 
     def _set_gain(self, gain_db: float) -> None:
+        self._settings = replace(self._settings, gain_db=gain_db)
         applied = self._camera.set_gain(gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         self._apply(replace(self._applied, gain_db=applied))

@@ -9,12 +9,12 @@ import pytest
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Caps, Frame, Range
 from lightpen.detection.auto_exposure import (
-    LONGEST_EXPOSURE_US,
     MAX_BLIND,
     TARGET,
     AutoExposure,
     Standing,
 )
+from lightpen.detection.exposure_advice import LONGEST_EXPOSURE_US
 from lightpen.detection.inspection import inspect
 from lightpen.detection.sighting import look
 from lightpen.simulator.camera import SimulatedCamera
