@@ -31,6 +31,7 @@ from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
 
+LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 SAMPLES = "simulated"  # folder of the files that go with the simulated camera
 
 
@@ -163,11 +164,13 @@ class Workbench(QObject):
         """Look for the cameras of a source; `cameras_found` or `search_failed` tells.
 
         A camera that is open is closed first: some libraries end the stream of one
-        while they look for others.
+        while they look for others. Of a search before nothing is told any more.
         """
         source = source_named(kind)
-        if source is None or self.is_searching:
+        if source is None:
             return
+        if self._search is not None:
+            self._search.cancel()
         was_open = self.live.is_open
         self.live.close()
         find, live = source.find, self.live
@@ -181,13 +184,8 @@ class Workbench(QObject):
         # Connections
         job.succeeded.connect(self._on_cameras_found)
         job.failed.connect(self._on_search_failed)
-        job.ended.connect(partial(self._on_search_ended, opens=was_open))
+        job.ended.connect(partial(self._on_search_ended, job, opens=was_open))
         job.start()
-
-    @property
-    def is_searching(self) -> bool:
-        """Whether cameras are being looked for."""
-        return self._search is not None
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
@@ -207,7 +205,9 @@ class Workbench(QObject):
         self.run.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
-        has_closed = self.live.await_closed(max(0.0, deadline - monotonic()))
+        # A dead camera may take longer, and has nothing to tell any more.
+        of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
+        has_closed = self.live.await_closed(of_camera)
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
@@ -295,7 +295,9 @@ class Workbench(QObject):
     def _on_search_failed(self, why: str) -> None:
         self.search_failed.emit(why)
 
-    def _on_search_ended(self, *, opens: bool) -> None:
+    def _on_search_ended(self, job: Job, *, opens: bool) -> None:
+        if job is not self._search:
+            return
         self._search = None
         if opens and not self.live.is_open:
             self.open_camera()
