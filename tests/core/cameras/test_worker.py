@@ -526,7 +526,7 @@ def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
     workbench.wait_until(Connection.CLOSED)
 
     assert "Another program" in workbench.events.troubles(DeviceBusy)[0]
-    assert camera.opened_at[-1] == pytest.approx(4.0)
+    assert camera.opened_at[-1] == pytest.approx(8.0)
 
 
 def test_a_missing_camera_ends_the_worker(benches: Benches) -> None:
