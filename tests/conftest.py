@@ -46,6 +46,17 @@ def no_power_cut() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_broadcast() -> Iterator[None]:
+    """No test asks the network for cameras, whatever keys it presses."""
+    from lightpen.cameras import aravis, basler
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(aravis, "_listed", lambda library: range(0))
+        patch.setattr(basler, "LAYERS", ("BaslerCamEmu",))
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Return the folder of image sets with truth, or skip the test without it."""
