@@ -42,8 +42,10 @@ from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pairing import pair_images
 from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
 from lightpen.formats.rig_files import read_rig
+from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import DISC_DIAMETER, Pen
 from lightpen.record.reading import (
     is_record,
@@ -401,6 +403,7 @@ class _Calibrated:
     calibration: Calibration
     nominal_tip: FloatArray | None
     limits: SwingLimits
+    origin: Origin | None
     inputs: Callable[[], Inputs]
 
 
@@ -424,7 +427,8 @@ def _calibrate(options: argparse.Namespace) -> None:
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        calibration, options.method, calibrated.nominal_tip, verdict
+        *(calibration, options.method, calibrated.nominal_tip, verdict),
+        calibrated.origin,
     )
     print(_shown(text))
     if options.json is not None:
@@ -466,6 +470,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         solution.calibration,
         solution.source.pen.nominal_tip,
         recorded_limits(record),
+        solution.source.origin,
         lambda: record_inputs(solution.source),
     )
 
@@ -546,17 +551,25 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         _require_other_file(options.json, *files)
         with _progress("Finding LEDs") as report:
             observations = observe_images(source, camera, pen, report)
+    origin = _origin(options.camera, options.pen, *files[:1])
     return _Calibrated(
         calibrate(camera, pen, observations, _assumptions(options)),
         pen.nominal_tip,
         SwingLimits(),
+        origin,
         lambda: Inputs(
             camera=hashed(options.camera),
             pen=hashed(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
+            origin=origin,
         ),
     )
+
+
+def _origin(*files: Path) -> Origin:
+    """Return what a calibration from files is of."""
+    return Origin.SIMULATED if any(map(is_simulated, files)) else Origin.RECORDED
 
 
 def _read_pen(options: argparse.Namespace) -> Pen:
@@ -607,16 +620,19 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
                 "first of each camera are taken as one moment, and so on.",
             )
         )
+    origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
         calibrate_rig(rig, pen, observations, _assumptions(options)),
         pen.nominal_tip,
         SwingLimits(),
+        origin,
         lambda: Inputs(
             camera=hashed(rig_file.camera_files[0]),
             pen=hashed(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
             rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
+            origin=origin,
         ),
     )
 

@@ -26,6 +26,7 @@ class Code(StrEnum):
     PEN_LOST = "swing.pen-lost"
     PEN_LIFTED = "swing.pen-lifted"
     TIP_ELSEWHERE = "swing.tip-elsewhere"
+    IMAGES_READ = "swing.images-read"
     PAUSED = "swing.paused"
     SOLVING = "swing.solving"
     TOO_FEW_IMAGES = "verdict.too-few-images"
@@ -42,6 +43,8 @@ class Code(StrEnum):
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NOT_SIMULTANEOUS = "verdict.not-simultaneous"
+    TIP_CHANGED = "verdict.tip-changed"
+    LAST_UNKNOWN = "verdict.last-unknown"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
 
@@ -127,6 +130,16 @@ def tip_elsewhere(distance: float) -> Sentence:
         "It rests {distance:.2f} mm from where it was. Put it back into the cone; "
         "check that the cone is clamped.",
         distance=distance,
+    )
+
+
+def images_read(n_read: int, n_images: int) -> Sentence:
+    """Tell how many images of a recording are read."""
+    return sentence(
+        Code.IMAGES_READ,
+        "All recorded images are read, then the tip is computed.",
+        n_read=n_read,
+        n_images=n_images,
     )
 
 
@@ -232,6 +245,44 @@ def not_simultaneous(camera: str, lag: float) -> Sentence:
         "each image.",
         camera=camera,
         lag=-lag,
+    )
+
+
+def tip_changed(
+    distance: float, date: str, axis: str, difference: float, uncertainty: float
+) -> Sentence:
+    """Tell that a tip is not where it was, beyond what U explains.
+
+    Parameters
+    ----------
+    distance : float
+        How far it is from there, mm.
+    date : str
+        Of the earlier result.
+    axis : str
+        Of the pen's frame, along which it is least explained.
+    difference, uncertainty : float
+        Along it, with U (k = 2) by both results, mm.
+    """
+    return sentence(
+        Code.TIP_CHANGED,
+        "The tip lies {distance:.4f} mm from that of {date}: along {axis} "
+        "{difference:.4f} mm, where U (k = 2) of both explains {uncertainty:.4f} mm. "
+        "Was it exchanged, bent, or mounted anew?",
+        distance=distance,
+        date=date,
+        axis=axis,
+        difference=difference,
+        uncertainty=uncertainty,
+    )
+
+
+def last_unknown(why: Sentence) -> Sentence:
+    """Tell that a tip cannot be compared with the one in force."""
+    return sentence(
+        Code.LAST_UNKNOWN,
+        "The tip cannot be compared with the one in force. {why}",
+        why=why,
     )
 
 

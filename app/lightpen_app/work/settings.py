@@ -33,12 +33,15 @@ class Preferences:
     ----------
     distance_m : float
         From the operator's eyes to the screen, m.
+    data_folder : str
+        For swings and results, from the next start on; empty for the usual one.
     """
 
     language: Language = Language.ENGLISH
     appearance: Appearance = Appearance.SYSTEM
     muted: bool = False
     distance_m: float = 3.0
+    data_folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -188,6 +191,15 @@ class Settings(QObject):
         """Remember which station is used."""
         self._save("last", {"station": name})
 
+    def export_folder(self) -> str:
+        """Return the folder that results were saved in last; empty at first."""
+        saved = self._content.get("last", {}).get("export folder")
+        return saved if isinstance(saved, str) else ""
+
+    def set_export_folder(self, folder: str) -> None:
+        """Remember where results are saved."""
+        self._save("last", {"export folder": folder})
+
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""
         saved = self._content.get("windows", {}).get(window.objectName())
@@ -249,8 +261,10 @@ def settings_file() -> Path:
     return platformdirs.user_config_path("lightpen", appauthor=False) / "lightpen.json"
 
 
-def data_folder() -> Path:
-    """Return where records and crash reports of this user belong on this system."""
+def data_folder(preferences: Preferences) -> Path:
+    """Return where records and crash reports are kept, as chosen or as is usual."""
+    if preferences.data_folder:
+        return Path(preferences.data_folder)
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 

@@ -1,23 +1,32 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
 
 import numpy as np
-from PySide6.QtCore import QObject, QThreadPool, Signal
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.source import FoundDevice, Needs
 from lightpen.cameras.sources import source_named
 from lightpen.formats.opened_files import OpenedFiles, open_files
-from lightpen.live.sources import Surroundings, camera_of, sample_files
+from lightpen.live.sources import (
+    Surroundings,
+    camera_of,
+    files_of_before,
+    sample_files,
+)
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
+from lightpen.record.presence import Presence
+from lightpen.record.recordings import FilesBeside
 from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
     CameraInUse,
@@ -32,7 +41,23 @@ from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
-SAMPLES = "simulated"  # folder of the files that go with the simulated camera
+COUNTING_MS = 5000  # from one look for other windows to the next
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is calibrated, for all that is shown besides the steps.
+
+    Attributes
+    ----------
+    names : Names
+        Of the swing there is; else those that are chosen.
+    origin : Origin or None
+        What its images are of; None where a swing of an earlier version does not say.
+    """
+
+    names: Names
+    origin: Origin | None
 
 
 class Workbench(QObject):
@@ -47,6 +72,10 @@ class Workbench(QObject):
     -------
     changed()
         `preparation` is different.
+    subject_changed(Subject)
+        `subject` is different.
+    others_counted(int)
+        So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
     cameras_found(tuple of FoundDevice)
@@ -55,6 +84,8 @@ class Workbench(QObject):
     """
 
     changed = Signal()
+    subject_changed = Signal(object)
+    others_counted = Signal(int)
     troubled = Signal(str)
     cameras_found = Signal(object)
     search_failed = Signal(str)
@@ -76,6 +107,12 @@ class Workbench(QObject):
         self._reading: Job | None = None
         self._search: Job | None = None
         self._unread = Station()
+        self._presence = Presence(folder)
+        self._n_others = 0
+        self._counter: Job | None = None
+        self._counting = QTimer(self)
+        self._counting.setInterval(COUNTING_MS)
+        self._subject_told: Subject | None = None
         self.run = SwingRun(folder, self._around.now, self)
         self.live = LiveView(self.run, self)
 
@@ -85,12 +122,28 @@ class Workbench(QObject):
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
         self.run.troubled.connect(self.troubled)
+        self._counting.timeout.connect(self._count_others)
+        self.run.changed.connect(self._tell_subject)
+        self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
 
     @property
     def preparation(self) -> Preparation:
         """What was chosen so far."""
         return self._preparation
+
+    @property
+    def folder(self) -> Path:
+        """For records, results and sample files."""
+        return self._folder
+
+    @property
+    def subject(self) -> Subject:
+        """What is calibrated: by the swing there is, else by what is chosen."""
+        status, chosen = self.run.status, self._preparation
+        if status.state is not None:
+            return Subject(status.names, status.origin)
+        return Subject(chosen.names, chosen.origin)
 
     @property
     def around(self) -> Surroundings:
@@ -108,6 +161,8 @@ class Workbench(QObject):
             self._on_settings_troubled(self._settings.trouble)
         folder = self._folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
+        self._count_others()
+        self._counting.start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
         if self._reading is None:
@@ -146,6 +201,18 @@ class Workbench(QObject):
         self._remember_station()
         self._remember()
         self._follow(before)
+
+    def export_folder(self) -> str:
+        """Return the folder that results were saved in last; empty at first."""
+        return self._settings.export_folder()
+
+    def set_export_folder(self, folder: str) -> None:
+        """Remember where results are saved."""
+        self._settings.set_export_folder(folder)
+
+    def use_files(self, files: FilesBeside) -> None:
+        """Choose the files that stand beside recorded images, once they are read."""
+        self._start(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
     def open_camera(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
@@ -189,8 +256,8 @@ class Workbench(QObject):
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
-        around, folder = self._around, self._folder / SAMPLES
-        self._start(lambda _: sample_files(around, folder), self._on_samples_written)
+        around, folder = self._around, self._folder / SIMULATED
+        self._start(lambda _: sample_files(around, folder), self._on_chosen_read)
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel what is under way, and wait until all has ended.
@@ -202,6 +269,7 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
+        self._counting.stop()
         self.run.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
@@ -209,6 +277,7 @@ class Workbench(QObject):
         of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
         has_closed = self.live.await_closed(of_camera)
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
+        self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 
@@ -220,8 +289,10 @@ class Workbench(QObject):
         units = station.pen_units or None
         if camera_path is not None or pen_path is not None:
             self._unread = station
+            samples = self._folder / SIMULATED
             self._start(
-                lambda _: open_files(camera_path, pen_path, units), self._on_files_read
+                lambda _: files_of_before(samples, camera_path, pen_path, units),
+                self._on_files_read,
             )
 
     def _start(
@@ -268,13 +339,16 @@ class Workbench(QObject):
         if wants_samples and simulated and has_none:
             self.use_sample_files()
 
-    def _on_samples_written(self, samples: OpenedFiles) -> None:
+    def _on_chosen_read(self, opened: OpenedFiles) -> None:
         self._reading = None
+        for trouble in opened.troubles:
+            self.troubled.emit(worded(trouble))
+        now = self._preparation
         self.set_preparation(
             replace(
-                self._preparation,
-                camera_file=samples.camera_file,
-                pen_file=samples.pen_file,
+                now,
+                camera_file=opened.camera_file or now.camera_file,
+                pen_file=opened.pen_file or now.pen_file,
             )
         )
 
@@ -288,6 +362,29 @@ class Workbench(QObject):
             self.open_camera()
         self.live.set_aim(now.aim)
         self.changed.emit()
+
+    def _count_others(self) -> None:
+        """See whether other windows use the same data folder."""
+        if self._counter is not None:  # a disk that does not answer is asked once
+            return
+        presence = self._presence
+        self._counter = job = Job(lambda _: presence.count_others(), self)
+
+        # Connections
+        job.succeeded.connect(self._on_others_counted)
+        job.start()
+
+    def _on_others_counted(self, n_others: int) -> None:
+        self._counter = None
+        if n_others != self._n_others:
+            self._n_others = n_others
+            self.others_counted.emit(n_others)
+
+    def _tell_subject(self) -> None:
+        subject = self.subject
+        if subject != self._subject_told:
+            self._subject_told = subject
+            self.subject_changed.emit(subject)
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
         self.cameras_found.emit(found)

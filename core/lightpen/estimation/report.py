@@ -95,6 +95,7 @@ def calibration_record(
     record = {
         "program": _program(),
         "created": local_now().isoformat(timespec="seconds"),
+        "origin": None if inputs.origin is None else inputs.origin.value,
         "method": method,
         "tip_pen_mm": tip,
         "cone_cam_mm": result.cone_cam,

@@ -53,6 +53,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.pen_files import PEN_FILE, read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.journal import (
     JOURNAL,
@@ -260,6 +261,8 @@ class RecordSource:
         loaded.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
+    origin : Origin or None
+        What the images are of; None where the record does not say.
     """
 
     folder: Path
@@ -269,6 +272,7 @@ class RecordSource:
     mask: FloatArray
     camera_file: Path
     pen_file: Path
+    origin: Origin | None = None
 
 
 def open_record(folder: Path) -> Record:
@@ -395,6 +399,7 @@ def source(record: Record) -> RecordSource:
         mask=header.mask,
         camera_file=camera_file,
         pen_file=pen_file,
+        origin=recorded_origin(record),
     )
 
 
@@ -522,6 +527,21 @@ def recorded_names(record: Record) -> Names:
         cone=header.cone,
         ball_diameter=_number(header.settings, "ball_diameter_mm", 0.0) or None,
     )
+
+
+def recorded_origin(record: Record) -> Origin | None:
+    """Return what the images of a record are of; None if it does not say.
+
+    Records of earlier versions name the kind of the source alone.
+    """
+    settings = record.header.settings
+    said = settings.get("origin", settings.get("source"))
+    return Origin(said) if said in set(Origin) else None
+
+
+def is_of_recording(record: Record) -> bool:
+    """Return whether the images of a record were recorded before its swing."""
+    return record.header.settings.get("source") == Origin.RECORDED
 
 
 def recorded_limits(record: Record) -> SwingLimits:

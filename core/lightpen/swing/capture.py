@@ -1,5 +1,8 @@
 """From a live image to a longer record: decide, and put on disk what is kept."""
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
@@ -7,6 +10,8 @@ from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.rules import Transition, advance
 from lightpen.swing.state import Happening, SwingSetup, SwingState
+
+Rule: TypeAlias = Callable[[SwingSetup, SwingState, Sighting, float], Transition]
 
 
 def capture_image(
@@ -18,8 +23,9 @@ def capture_image(
     time: float,
     device_time_ns: int | None = None,
     stats: Stats | None = None,
+    rule: Rule | None = None,
 ) -> Transition:
-    """Take one live image into a swing.
+    """Take one image into a swing.
 
     Parameters
     ----------
@@ -35,6 +41,8 @@ def capture_image(
         By the clock of the camera.
     stats : Stats, optional
         What became of the camera's images since the swing began.
+    rule : Rule, optional
+        What the image does to the swing; that of a live one by default.
 
     Returns
     -------
@@ -51,7 +59,7 @@ def capture_image(
             f"The swing is at image {state.next_number}, the record at "
             f"{writer.next_number}."
         )
-    transition = advance(setup, state, sighting, time)
+    transition = (rule or advance)(setup, state, sighting, time)
     # The image last: if the disk fails before, state and record both go without it.
     for event in transition.events:
         if event.what is Happening.SLIPPED and event.numbers:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from importlib.metadata import version
+from typing import Self
 
 import numpy as np
 
@@ -18,12 +19,13 @@ from lightpen.formats.pen_files import PEN_FILE
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.names import Names
 from lightpen.record.reading import FileCopy, Header, Plain
-from lightpen.swing.state import (
-    SwingSetup,
-)
+from lightpen.record.recordings import is_simulated_recording
+from lightpen.record.results import Result
+from lightpen.swing.state import SwingSetup
 
 
 class SourceKind(StrEnum):
@@ -137,6 +139,58 @@ class Preparation:
         return replace(self.pen_file.pen, nominal_tip=self.nominal_tip)
 
     @property
+    def origin(self) -> Origin:
+        """What its images are of: nothing is real that needs a simulated file."""
+        files = self.camera_file, self.pen_file
+        if any(file is not None and file.is_simulated for file in files):
+            return Origin.SIMULATED
+        return _ORIGINS.get(self.source.kind, Origin.LIVE)
+
+    def with_source(self, source: SourceChoice) -> Self:
+        """Return it with images of another source.
+
+        The files of a simulated pen are not those of another source, nor is the stray
+        light.
+        """
+        if source == self.source:
+            return self
+        simulates = source.kind == SourceKind.SIMULATED
+        camera_file, pen_file = self.camera_file, self.pen_file
+        if camera_file is not None and camera_file.is_simulated is not simulates:
+            camera_file = None
+        if pen_file is not None and pen_file.is_simulated is not simulates:
+            pen_file = None
+        return replace(
+            self,
+            source=source,
+            camera_file=camera_file,
+            pen_file=pen_file,
+            mask=np.zeros((0, 3)),
+        )
+
+    def renamed(self, names: Names) -> Self:
+        """Return it with other names; another tip has another ball and nominal centre.
+
+        They are forgotten, unless a diameter was given with the name.
+        """
+        now = self.names
+        if names.tip == now.tip:
+            return replace(self, names=names)
+        if names.ball_diameter == now.ball_diameter:
+            names = replace(names, ball_diameter=None)
+        return replace(self, names=names, nominal_tip=None)
+
+    def with_last(self, last: Result) -> Self:
+        """Return it for the tip of a result, whose ball and nominal centre it has."""
+        tip, ball_diameter = last.names.tip, last.names.ball_diameter
+        names = replace(self.names, tip=tip, ball_diameter=ball_diameter)
+        nominal_tip = last.nominal_tip
+        of_file = None if self.pen_file is None else self.pen_file.pen.nominal_tip
+        if _same(nominal_tip, of_file):  # it is not the tip's own
+            nominal_tip = None
+        return replace(self, names=names, nominal_tip=nominal_tip)
+
+    @property
     def aim(self) -> Aim:
         """What to look for in the images."""
         return Aim(self.camera, self.pen, self.mask)
@@ -185,7 +239,8 @@ class Preparation:
         camera, pen = self.camera, self.pen
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
-        return SwingSetup(camera, pen, self.limits, self.mask)
+        is_recording = self.source.kind == SourceKind.RECORDED
+        return SwingSetup(camera, pen, self.limits, self.mask, is_recording)
 
     def swings_like(self, other: "Preparation") -> bool:
         """Return whether a swing begun with the other would be the same."""
@@ -202,7 +257,9 @@ class Preparation:
         """Return the header of a record that begins now; files are read again."""
         if self.camera_file is None or self.pen_file is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
-        limits = self.limits
+        limits, origin = self.limits, self.origin
+        if origin is Origin.RECORDED and is_simulated_recording(self.source.place):
+            origin = Origin.SIMULATED
         return Header(
             camera=FileCopy.of(self.camera_file.path, CAMERA_FILE),
             pen=FileCopy.of(self.pen_file.path, PEN_FILE),
@@ -218,6 +275,7 @@ class Preparation:
             settings={
                 "pen": self.names.pen,
                 "ball_diameter_mm": self.names.ball_diameter,
+                "origin": str(origin),
                 "source": str(self.source.kind),
                 "source_place": self.source.place,
                 **_camera_entries(self.camera_in_use),
@@ -249,6 +307,12 @@ def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
         else f"{region.width} x {region.height} at {region.x}, {region.y}",
     }
     return {name: entry for name, entry in entries.items() if entry is not None}
+
+
+_ORIGINS: dict[str, Origin] = {
+    SourceKind.SIMULATED: Origin.SIMULATED,
+    SourceKind.RECORDED: Origin.RECORDED,
+}
 
 
 def _same(one: FloatArray | None, other: FloatArray | None) -> bool:

@@ -55,6 +55,29 @@
     </message>
 </context>
 <context>
+    <name>DataFolderPanel</name>
+    <message>
+        <source>Data folder</source>
+        <translation>数据文件夹</translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation>打开文件夹</translation>
+    </message>
+    <message>
+        <source>Open the data folder</source>
+        <translation>打开数据文件夹</translation>
+    </message>
+    <message>
+        <source>Swings and results are kept here. Options choose another folder.</source>
+        <translation>摆动记录和结果保存在这里。可在“选项”中另选文件夹。</translation>
+    </message>
+    <message>
+        <source>Other windows of the program that use this folder: {0}. All of them put their tips in force here.</source>
+        <translation>使用此文件夹的其他程序窗口：{0} 个。它们接受的测头都在这里生效。</translation>
+    </message>
+</context>
+<context>
     <name>Demo</name>
     <message>
         <source>The demo ends here: there is no tip to accept.</source>
@@ -662,12 +685,40 @@
 <context>
     <name>LastResultPanel</name>
     <message>
+        <source>Last practice with this pen and tip</source>
+        <translation>本光笔和测头的上次练习</translation>
+    </message>
+    <message>
         <source>Last calibration of this pen and tip</source>
         <translation>本光笔和测头的上次校准</translation>
     </message>
     <message>
+        <source>Take back...</source>
+        <translation>撤回…</translation>
+    </message>
+    <message>
+        <source>Put the result before in force again; both are kept.</source>
+        <translation>使之前的结果重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>Take this acceptance back? The result before is in force again.</source>
+        <translation>撤回此次接受吗？之前的结果将重新生效。</translation>
+    </message>
+    <message>
+        <source>Take back</source>
+        <translation>撤回</translation>
+    </message>
+    <message>
+        <source>Leave it in force</source>
+        <translation>保持生效</translation>
+    </message>
+    <message>
         <source>None yet</source>
         <translation>尚无结果</translation>
+    </message>
+    <message>
+        <source>What you accept is kept apart from the tips of real pens.</source>
+        <translation>在此接受的结果与真实光笔的测头分开保存。</translation>
     </message>
     <message>
         <source>The tip that you accept will be the first in force.</source>
@@ -688,6 +739,10 @@
     <message>
         <source>U (k = 2) / mm</source>
         <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Accepted with the reason: {0}</source>
+        <translation>接受理由：{0}</translation>
     </message>
     <message>
         <source>It is dated later than now. Check the clock here.</source>
@@ -1058,6 +1113,14 @@
         <translation>声音已打开。</translation>
     </message>
     <message>
+        <source>Data folder</source>
+        <translation>数据文件夹</translation>
+    </message>
+    <message>
+        <source>Swings and results are kept in {0} from the next start of the program on. Those of now stay where they are.</source>
+        <translation>从下次启动起，摆动记录和结果保存在 {0}。现有的仍留在原处。</translation>
+    </message>
+    <message>
         <source>Stay</source>
         <translation>不关闭</translation>
     </message>
@@ -1232,6 +1295,21 @@
     </message>
 </context>
 <context>
+    <name>NextTipsRow</name>
+    <message>
+        <source>Next tip</source>
+        <translation>下一个测头</translation>
+    </message>
+    <message>
+        <source>Next tip {0}</source>
+        <translation>下一个测头 {0}</translation>
+    </message>
+    <message>
+        <source>Calibrate tip {0} next, with its ball and nominal centre</source>
+        <translation>接着标定测头 {0}，并采用其测球直径和标称中心</translation>
+    </message>
+</context>
+<context>
     <name>NoticeBar</name>
     <message>
         <source>Close</source>
@@ -1278,6 +1356,10 @@
     <message>
         <source>Mute the sounds</source>
         <translation>关闭声音</translation>
+    </message>
+    <message>
+        <source>Data folder...</source>
+        <translation>数据文件夹…</translation>
     </message>
     <message>
         <source>About Lightpen</source>
@@ -1486,18 +1568,46 @@
     </message>
 </context>
 <context>
-    <name>ReviewDoubts</name>
+    <name>ResultTools</name>
     <message>
-        <source>This swing is of tip {0}, pen {1}, whatever the step Start names now: tip {2}, pen {3}.</source>
-        <translation>本次摆动属于测头 {0}、光笔 {1}；“开始”步骤现在填写的是测头 {2}、光笔 {3}。</translation>
+        <source>Open the folder of the swing</source>
+        <translation>打开本次摆动的文件夹</translation>
     </message>
     <message>
-        <source>The tip lies {0} mm from the calibration of {1} (usual change: {2} mm). Was the tip exchanged?</source>
-        <translation>测头与 {1} 的校准相差 {0} mm（通常变化：{2} mm）。是否更换过测头？</translation>
+        <source>Copy x, y, z in mm, parted by tabs</source>
+        <translation>复制 x、y、z（mm，以制表符分隔）</translation>
     </message>
     <message>
-        <source>The tip lies {0} mm from its nominal place. Is it the tip that is named?</source>
-        <translation>测头偏离标称位置 {0} mm。是否为所填写的测头？</translation>
+        <source>Save results and plots under the name of pen, tip and date</source>
+        <translation>以光笔、测头和日期命名，保存结果和图</translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation>打开文件夹</translation>
+    </message>
+    <message>
+        <source>Copy the tip</source>
+        <translation>复制测头坐标</translation>
+    </message>
+    <message>
+        <source>Save...</source>
+        <translation>保存…</translation>
+    </message>
+    <message>
+        <source>All at once...</source>
+        <translation>全部一次保存…</translation>
+    </message>
+    <message>
+        <source>Record (JSON)...</source>
+        <translation>记录（JSON）…</translation>
+    </message>
+    <message>
+        <source>Tip and images (CSV)...</source>
+        <translation>测头和图像（CSV）…</translation>
+    </message>
+    <message>
+        <source>All plots (PNG)...</source>
+        <translation>全部图（PNG）…</translation>
     </message>
 </context>
 <context>
@@ -1523,16 +1633,16 @@
         <translation>请先摆动光笔。</translation>
     </message>
     <message>
-        <source>The tip is in force.</source>
-        <translation>测头已生效。</translation>
-    </message>
-    <message>
         <source>Start the next calibration</source>
         <translation>开始下一次校准</translation>
     </message>
     <message>
         <source>Accept</source>
         <translation>接受</translation>
+    </message>
+    <message>
+        <source>Check the files</source>
+        <translation>检查文件</translation>
     </message>
     <message>
         <source>The tip is not accepted. The swing is kept and offered again at the next start.</source>
@@ -1583,6 +1693,14 @@
         <translation>重做</translation>
     </message>
     <message>
+        <source>Since {0}, to be checked; accepted with the reason: {1}</source>
+        <translation>自 {0} 起，需检查；接受理由：{1}</translation>
+    </message>
+    <message>
+        <source>This swing is of tip {0}, pen {1}, whatever the step Start names now: tip {2}, pen {3}.</source>
+        <translation>本次摆动属于测头 {0}、光笔 {1}；“开始”步骤现在填写的是测头 {2}、光笔 {3}。</translation>
+    </message>
+    <message>
         <source>Repeat the swing from the start? These images stay on the disk.</source>
         <translation>从头重做摆动吗？这些图像仍保留在磁盘上。</translation>
     </message>
@@ -1593,6 +1711,42 @@
     <message>
         <source>The tip is being computed.</source>
         <translation>正在计算测头。</translation>
+    </message>
+    <message>
+        <source>Next: record more images, and read them all again.</source>
+        <translation>下一步：补录图像，然后重新读取全部图像。</translation>
+    </message>
+    <message>
+        <source>The tip is accepted.</source>
+        <translation>测头已接受。</translation>
+    </message>
+    <message>
+        <source>Accept...</source>
+        <translation>接受…</translation>
+    </message>
+    <message>
+        <source>Take back...</source>
+        <translation>撤回…</translation>
+    </message>
+    <message>
+        <source>Put the result before in force again; both are kept.</source>
+        <translation>使之前的结果重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>The tip is to be checked. Why is it accepted nevertheless? The reason is stored with it.</source>
+        <translation>该测头需检查。为何仍要接受？理由将随结果保存。</translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Accept with this reason</source>
+        <translation>按此理由接受</translation>
+    </message>
+    <message>
+        <source>Do not accept</source>
+        <translation>不接受</translation>
     </message>
     <message>
         <source>The swing goes on.</source>
@@ -1611,6 +1765,10 @@
         <translation>测头已接受；请开始下一次校准。</translation>
     </message>
     <message>
+        <source>All recorded images are read.</source>
+        <translation>录制的图像已全部读取。</translation>
+    </message>
+    <message>
         <source>Add images to this swing</source>
         <translation>为本次摆动增加图像</translation>
     </message>
@@ -1619,12 +1777,36 @@
         <translation>不用这些图像，重新摆动</translation>
     </message>
     <message>
+        <source>Put it in force with a reason</source>
+        <translation>注明理由后使其生效</translation>
+    </message>
+    <message>
         <source>Since {0}. Earlier results are kept.</source>
         <translation>自 {0} 起。更早的结果均保留。</translation>
     </message>
     <message>
-        <source>IN FORCE</source>
-        <translation>已生效</translation>
+        <source>Take this acceptance back? The result before is in force again; both are kept.</source>
+        <translation>撤回此次接受吗？之前的结果将重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>Take back</source>
+        <translation>撤回</translation>
+    </message>
+    <message>
+        <source>Leave it in force</source>
+        <translation>保持生效</translation>
+    </message>
+    <message>
+        <source>The tip is copied: x, y, z in mm.</source>
+        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
+    </message>
+    <message>
+        <source>Folder to save in</source>
+        <translation>保存到的文件夹</translation>
+    </message>
+    <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
     </message>
     <message>
         <source>The tip shows here once the pen is swung.</source>
@@ -1733,6 +1915,18 @@
 <context>
     <name>Sidebar</name>
     <message>
+        <source>Pen {0}</source>
+        <translation>光笔 {0}</translation>
+    </message>
+    <message>
+        <source>Tip {0}</source>
+        <translation>测头 {0}</translation>
+    </message>
+    <message>
+        <source>Cone {0}</source>
+        <translation>锥孔 {0}</translation>
+    </message>
+    <message>
         <source>Pen tip calibration</source>
         <translation>光笔测头校准</translation>
     </message>
@@ -1835,6 +2029,22 @@
         <translation>正在搜索相机。</translation>
     </message>
     <message>
+        <source> and </source>
+        <translation> 和 </translation>
+    </message>
+    <message>
+        <source>Beside the images: {0}</source>
+        <translation>图像旁边有：{0}</translation>
+    </message>
+    <message>
+        <source>Use both</source>
+        <translation>两者都用</translation>
+    </message>
+    <message>
+        <source>Use it</source>
+        <translation>使用</translation>
+    </message>
+    <message>
         <source>Source of the images</source>
         <translation>图像来源</translation>
     </message>
@@ -1902,14 +2112,6 @@
         <translation>继续：相机</translation>
     </message>
     <message>
-        <source>Pen {0}</source>
-        <translation>光笔 {0}</translation>
-    </message>
-    <message>
-        <source>Cone {0}</source>
-        <translation>锥孔 {0}</translation>
-    </message>
-    <message>
         <source>The last calibration cannot be shown.</source>
         <translation>无法显示上次校准。</translation>
     </message>
@@ -1920,6 +2122,10 @@
     <message>
         <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
         <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
+        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
     </message>
     <message>
         <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
@@ -1939,6 +2145,10 @@
     <message>
         <source>done</source>
         <translation>已完成</translation>
+    </message>
+    <message>
+        <source>done, with doubts</source>
+        <translation>已完成，需检查</translation>
     </message>
     <message>
         <source>now</source>
@@ -2149,6 +2359,10 @@
         <translation>继续采集</translation>
     </message>
     <message>
+        <source>All recorded images are read.</source>
+        <translation>录制的图像已全部读取。</translation>
+    </message>
+    <message>
         <source>Begin anew? The images of this swing ({0}) are set aside; they stay on the disk.</source>
         <translation>重新开始？本次摆动的图像（{0} 幅）将被搁置，但仍保留在磁盘上。</translation>
     </message>
@@ -2200,6 +2414,10 @@
     <message>
         <source>images kept, at most {0} are taken</source>
         <translation>为已保留的图像，最多采集 {0} 幅</translation>
+    </message>
+    <message>
+        <source>recorded images</source>
+        <translation>录制的图像</translation>
     </message>
     <message>
         <source>{0}; {1} dropped</source>
@@ -2270,8 +2488,16 @@
         <translation>已停止</translation>
     </message>
     <message>
+        <source>READING</source>
+        <translation>读取中</translation>
+    </message>
+    <message>
         <source>NOT KEPT</source>
         <translation>未保留</translation>
+    </message>
+    <message>
+        <source>{0} of {1} read</source>
+        <translation>已读取 {0} / {1}</translation>
     </message>
     <message>
         <source>TIP SLIPPED</source>
@@ -2280,10 +2506,6 @@
     <message>
         <source>The tip is used from now on.</source>
         <translation>从现在起使用该测头。</translation>
-    </message>
-    <message>
-        <source>IN FORCE</source>
-        <translation>已生效</translation>
     </message>
     <message>
         <source>{0} of at least {1}</source>
@@ -2327,6 +2549,13 @@
     <message>
         <source>Images hang together: their noise counts {0} times (variance).</source>
         <translation>各图像相关：噪声方差按 {0} 倍计。</translation>
+    </message>
+</context>
+<context>
+    <name>Wizard</name>
+    <message>
+        <source>Other windows of the program use the data folder {0}. All of them put their tips in force there.</source>
+        <translation>其他程序窗口也在使用数据文件夹 {0}。它们接受的测头都在那里生效。</translation>
     </message>
 </context>
 <context>
@@ -2392,6 +2621,10 @@
     <message>
         <source>All of them were taken, so the tip lies between both.</source>
         <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
+    </message>
+    <message>
+        <source>All recorded images are read, then the tip is computed.</source>
+        <translation>先读取全部录制的图像，再计算测头。</translation>
     </message>
     <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
@@ -2698,6 +2931,10 @@
         <translation>下一步：压紧测头，重做摆动。</translation>
     </message>
     <message>
+        <source>Next: see that it is the tip that is named, clean and tight, then repeat.</source>
+        <translation>下一步：确认测头与所填写的一致、清洁且已拧紧，然后重做。</translation>
+    </message>
+    <message>
         <source>No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.</source>
         <translation>没有安装 GenTL 生产者：{variable} 指定的文件夹中没有 {suffix} 文件。请安装相机的软件，或打开它的 {suffix} 文件。</translation>
     </message>
@@ -3002,6 +3239,26 @@
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
     </message>
     <message>
+        <source>The tip cannot be accepted. {why}</source>
+        <translation>不能接受该测头。{why}</translation>
+    </message>
+    <message>
+        <source>The tip cannot be compared with the one in force. {why}</source>
+        <translation>无法与已生效的测头比较。{why}</translation>
+    </message>
+    <message>
+        <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
+        <translation>该测头需检查。{why}请注明理由后接受，否则不要接受。</translation>
+    </message>
+    <message>
+        <source>The tip lies {distance:.1f} mm from its nominal place. Is it the tip that is named?</source>
+        <translation>测头偏离标称位置 {distance:.1f} mm。是否为所填写的测头？</translation>
+    </message>
+    <message>
+        <source>The tip lies {distance:.4f} mm from that of {date}: along {axis} {difference:.4f} mm, where U (k = 2) of both explains {uncertainty:.4f} mm. Was it exchanged, bent, or mounted anew?</source>
+        <translation>测头与 {date} 的结果相差 {distance:.4f} mm：沿 {axis} 方向相差 {difference:.4f} mm，而两者的 U (k = 2) 只能解释 {uncertainty:.4f} mm。测头是否更换、弯曲或重新安装过？</translation>
+    </message>
+    <message>
         <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
@@ -3012,6 +3269,10 @@
     <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
         <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
+    </message>
+    <message>
+        <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
+        <translation>测头 {tip}、光笔 {pen} 的这一结果已不再生效。撤回之前，请先查看现在生效的是哪一个。</translation>
     </message>
     <message>
         <source>Webcam, to try it</source>
@@ -4129,6 +4390,10 @@
         <translation>{seconds} 秒后开始</translation>
     </message>
     <message>
+        <source>Reading</source>
+        <translation>读取中</translation>
+    </message>
+    <message>
         <source>More images</source>
         <translation>继续采集</translation>
     </message>
@@ -4171,6 +4436,14 @@
     <message>
         <source>Not at the same time</source>
         <translation>拍摄不同时</translation>
+    </message>
+    <message>
+        <source>Tip has changed</source>
+        <translation>测头有变化</translation>
+    </message>
+    <message>
+        <source>Nothing to compare with</source>
+        <translation>无从比较</translation>
     </message>
     <message>
         <source>No tip found</source>
@@ -4309,6 +4582,22 @@
         <translation>测头移位</translation>
     </message>
     <message>
+        <source>LIVE CAMERA</source>
+        <translation>实时相机</translation>
+    </message>
+    <message>
+        <source>RECORDED</source>
+        <translation>录制图像</translation>
+    </message>
+    <message>
+        <source>SIMULATED</source>
+        <translation>模拟</translation>
+    </message>
+    <message>
+        <source>ORIGIN NOT STATED</source>
+        <translation>来源未注明</translation>
+    </message>
+    <message>
         <source>PASS</source>
         <translation>合格</translation>
     </message>
@@ -4411,6 +4700,18 @@
     <message>
         <source>{0} images</source>
         <translation>{0} 幅图像</translation>
+    </message>
+    <message>
+        <source>IN FORCE</source>
+        <translation>已生效</translation>
+    </message>
+    <message>
+        <source>PRACTICE KEPT</source>
+        <translation>练习已保存</translation>
+    </message>
+    <message>
+        <source>A simulated tip is in force for no pen; it is kept apart.</source>
+        <translation>模拟测头不对任何光笔生效，单独保存。</translation>
     </message>
 </context>
 <context>

@@ -17,6 +17,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
+from lightpen.model.origin import Origin
+from lightpen.record.names import Names
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.placement import fitted_place
@@ -24,6 +26,7 @@ from lightpen_app.shell.step_states import StepState
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Subject
 
 Key = Qt.Key
 
@@ -425,13 +428,17 @@ def test_f11_in_the_operator_view_leaves_it(shell: Shell, qtbot: QtBot) -> None:
 def test_a_page_speaks_through_the_window(shell: Shell) -> None:
     page = shell.pages[0]
     page.status_changed.emit("21 images a second")
-    page.subject_changed.emit("Pen LP-04")
+    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.SIMULATED))
     page.notice_raised.emit("The file holds no LED.")
     page.operator_value_changed.emit(OperatorValue(instruction="Lean right"))
 
     words = shell.window.words()
 
-    assert {"21 images a second", "Pen LP-04", "The file holds no LED."} <= set(words)
+    assert {
+        "21 images a second",
+        "Pen\xa0LP-04  \u00b7  Tip\xa0T-10",
+        "The file holds no LED.",
+    } <= set(words)
     assert shell.window.operator_view().value().instruction == "Lean right"
     page.notice_raised.emit("")
     assert "The file holds no LED." not in shell.window.words()

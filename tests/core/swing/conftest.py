@@ -26,8 +26,7 @@ def solved(
 @pytest.fixture
 def in_force(solved: "Station") -> "Station":
     """A swing whose tip was accepted."""
-    solved.runner.accept()
-    solved.wait_until(lambda: solved.status.result is not None)
+    solved.accept()
     return solved
 
 

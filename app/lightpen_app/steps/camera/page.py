@@ -22,8 +22,9 @@ from lightpen.detection.auto_exposure import AutoExposure
 from lightpen.detection.inspection import Exposure, Inspection, inspect
 from lightpen.formats.opened_files import CameraFile
 from lightpen.live.looking import LiveImage
+from lightpen.record.recordings import FilesBeside, files_beside
 from lightpen.simulator.hand import Doing
-from lightpen.swing.preparation import Lack, SourceChoice
+from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sound, Sounds
@@ -64,6 +65,9 @@ class CameraPage(Rearranged, Page):
         self._sentence = ""  # why no images come
         self._reading: Job | None = None
         self._adjustment: AutoExposure | None = None
+        self._looking: Job | None = None
+        self._looked_beside = SourceChoice()
+        self._beside = FilesBeside()
 
         # Widgets
         self._swing_remark = SignLabel()
@@ -83,6 +87,7 @@ class CameraPage(Rearranged, Page):
         self._source.retry_requested.connect(self._workbench.open_camera)
         self._source.search_requested.connect(self._on_search_requested)
         self._more.settings_changed.connect(self._live.configure)
+        self._source.files_requested.connect(self._workbench.use_files)
         self._intrinsics.path_chosen.connect(self._on_path_chosen)
         self._source.samples_requested.connect(self._on_samples_requested)
         self._stray.found_changed.connect(self._mark)
@@ -149,8 +154,9 @@ class CameraPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
-        if self._reading is not None:
-            self._reading.cancel()
+        for job in (self._reading, self._looking):
+            if job is not None:
+                job.cancel()
 
     @override
     def _retranslate(self) -> None:
@@ -202,17 +208,50 @@ class CameraPage(Rearranged, Page):
     def _on_workbench_changed(self) -> None:
         now = self._workbench.preparation
         self._source.set_value(now.source)
+        if now.source != self._looked_beside:
+            self._look_beside(now.source)
+        self._offer_beside()
         self._intrinsics.set_value(now.camera_file)
         self._intrinsics.set_image_size(now.image_size)
         self._stray.set_n_masked(len(now.mask))
         self._mark()
         self.changed.emit()
 
+    def _look_beside(self, source: SourceChoice) -> None:
+        """Look for the files that go with recorded images."""
+        self._looked_beside, self._beside = source, FilesBeside()
+        if self._looking is not None:
+            self._looking.cancel()
+        if source.kind != SourceKind.RECORDED or not source.place:
+            return
+        self._looking = job = Job(lambda _: files_beside(source.place), self)
+
+        # Connections
+        job.succeeded.connect(self._on_beside_found)
+        job.start()
+
+    def _on_beside_found(self, files: FilesBeside) -> None:
+        self._beside = files
+        self._offer_beside()
+
+    def _offer_beside(self) -> None:
+        """Offer the files beside the images, unless they are in use."""
+        now, beside = self._workbench.preparation, self._beside
+        camera = None if now.camera_file is None else now.camera_file.path
+        pen = None if now.pen_file is None else now.pen_file.path
+        others = FilesBeside(
+            None if beside.camera == camera else beside.camera,
+            None if beside.pen == pen else beside.pen,
+        )
+        self._source.set_beside(others)
+
     def _on_source_chosen(self, source: SourceChoice) -> None:
         self._forget_trouble()
-        now = self._workbench.preparation
-        mask = now.mask if source == now.source else np.zeros((0, 3))
-        self._workbench.set_preparation(replace(now, source=source, mask=mask))
+        chosen = self._workbench.preparation.with_source(source)
+        self._workbench.set_preparation(chosen)
+        has_files = chosen.camera_file is not None or chosen.pen_file is not None
+        if source.kind == SourceKind.SIMULATED and not has_files:
+            self._workbench.use_sample_files()
 
     def _look_for_libraries(self) -> None:
         """Find out which libraries of cameras are installed, beside the window."""

@@ -17,12 +17,14 @@ from PySide6.QtWidgets import (
 from lightpen.cameras.source import FoundDevice, Needs
 from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
+from lightpen.record.recordings import FilesBeside
 from lightpen.sentences import Sentence
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.camera.device_field import DeviceField
+from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
@@ -41,12 +43,15 @@ class SourcePanel(Translated, QGroupBox):
         The files of the simulated pen are to be used.
     retry_requested()
         Open the same source once more.
+    files_requested(FilesBeside)
+        The files beside the recorded images are to be used.
     """
 
     value_changed = Signal(object)
     search_requested = Signal()
     samples_requested = Signal()
     retry_requested = Signal()
+    files_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -75,6 +80,9 @@ class SourcePanel(Translated, QGroupBox):
         self._told = SignLabel()
         self._samples = PushButton()
         self._retry = PushButton()
+        self._beside = FilesBeside()
+        self._found = SignLabel()
+        self._use_found = PushButton()
 
         # Layout
         layout = QVBoxLayout(self)
@@ -93,6 +101,8 @@ class SourcePanel(Translated, QGroupBox):
         second.addWidget(self._search)
         layout.addLayout(second)
         layout.addWidget(self._told)
+        layout.addWidget(self._found)
+        layout.addWidget(self._use_found)
         layout.addWidget(self._retry)
 
         # Connections
@@ -104,6 +114,8 @@ class SourcePanel(Translated, QGroupBox):
         self._folder.triggered.connect(self._on_folder_triggered)
         self._file.triggered.connect(self._on_file_triggered)
         self._search.clicked.connect(self.search_requested)
+        self._use_found.clicked.connect(self._on_use_found_clicked)
+        FileDrops(self).dropped.connect(self._on_dropped)
         self._samples.clicked.connect(self.samples_requested)
         self._retry.clicked.connect(self.retry_requested)
 
@@ -161,6 +173,11 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome = Remark(why, Sign.CROSS, Tone.BAD)
         self._refresh()
 
+    def set_beside(self, files: FilesBeside) -> None:
+        """Offer files that stand beside the recorded images, or none."""
+        self._beside = files
+        self._refresh_beside()
+
     def set_faulty(self, faulty: bool) -> None:
         """Mark the source as one that could not be opened, and offer to try again."""
         self._place.set_faulty(faulty)
@@ -202,6 +219,14 @@ class SourcePanel(Translated, QGroupBox):
             self.tr("GenTL producers ({0})").format("*.cti"),
         )
 
+    def _on_use_found_clicked(self) -> None:
+        self.files_requested.emit(self._beside)
+
+    def _on_dropped(self, path: str) -> None:
+        """Take images that are dropped here, whatever the source was."""
+        self._place.set_value(path)
+        self._choose(SourceChoice(SourceKind.RECORDED, path))
+
     def _on_folder_triggered(self) -> None:
         self._place.pick(
             QFileDialog.FileMode.Directory, self.tr("Folder of the recorded images")
@@ -233,6 +258,7 @@ class SourcePanel(Translated, QGroupBox):
         )
         self._samples.setVisible(self._value.kind == SourceKind.SIMULATED)
         self._told.set_value(self._remark(absent))
+        self._refresh_beside()
 
     def _remark(self, absent: Sentence | None) -> Remark:
         if not self._has_device:
@@ -244,7 +270,18 @@ class SourcePanel(Translated, QGroupBox):
             return Remark(words, Sign.WAIT, Tone.ACTIVE)
         return self._outcome
 
+    def _refresh_beside(self) -> None:
+        files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]
+        is_offered = bool(files) and self._needs is Needs.FILES
+        names = self.tr(" and ").join(file.name for file in files)
+        text = self.tr("Beside the images: {0}").format(names) if is_offered else ""
+        self._found.set_value(Remark(text, Sign.RING, Tone.ACTIVE))
+        use = self.tr("Use both") if len(files) > 1 else self.tr("Use it")
+        self._use_found.setText(use)
+        self._use_found.setVisible(is_offered)
+
     def _retranslate(self) -> None:
+        self._refresh_beside()
         self.setTitle(self.tr("Source of the images"))
         for index, source in enumerate(SOURCES):
             name = worded(source.name)

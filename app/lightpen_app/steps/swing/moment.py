@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject
 from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
 from lightpen.messages import SHOW_PEN, Code
+from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture, posture_of
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
@@ -17,6 +18,7 @@ from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
     Phrase,
+    accepted_phrase,
     grade_text,
     lean_phrase,
     n_images_text,
@@ -64,6 +66,8 @@ class Moment:
         Whether the tip is in force.
     stillness : float
         How long the pen has been upright and still after the verdict: 1 is enough.
+    origin : Origin or None
+        What the images are of.
     is_simulated : bool
         Whether the pen is led by the mouse, so that it leans as the camera sees it.
     """
@@ -78,6 +82,7 @@ class Moment:
     verdict: Verdict | None = None
     is_accepted: bool = False
     stillness: float = 0.0
+    origin: Origin | None = None
     is_simulated: bool = False
 
     @property
@@ -137,6 +142,8 @@ class SwingWords(QObject):
         """Return what the count leaves out: the limit, and what was of no use."""
         limit = moment.setup.limits.max_images
         text = self.tr("images kept, at most {0} are taken").format(limit)
+        if moment.setup.is_recording:
+            text = self.tr("recorded images")
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
@@ -162,7 +169,8 @@ class SwingWords(QObject):
         if moment.is_accepted:
             return Phrase(self.tr("Accepted"), self.tr("Put the pen down."))
         if moment.verdict is not None:
-            return self._next_step(moment.verdict)
+            is_recording = moment.setup.is_recording
+            return self._next_step(moment.verdict, is_recording=is_recording)
         if moment.is_troubled and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "An image could not be recorded; the notice at the top says why. Mend "
@@ -179,17 +187,18 @@ class SwingWords(QObject):
             return lean_phrase(state.target, _posture(moment), heading)
         return told
 
-    def _next_step(self, verdict: Verdict) -> Phrase:
+    def _next_step(self, verdict: Verdict, *, is_recording: bool) -> Phrase:
         steps = {
             Grade.PASS: self.tr("Done"),
             Grade.CHECK: self.tr("Look at it"),
             Grade.REPEAT: self.tr("Repeat the swing"),
         }
         step = steps[verdict.grade]
-        if not verdict.can_be_accepted and verdict.next_step is NextStep.CAPTURE_MORE:
+        can_go_on = verdict.next_step is NextStep.CAPTURE_MORE and not is_recording
+        if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
         hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
-        return Phrase(step, hint)
+        return Phrase(step, "" if is_recording else hint)
 
     def _no_images(self) -> Phrase:
         return Phrase(
@@ -212,6 +221,8 @@ class SwingWords(QObject):
             fraction = moment.solving
         elif state.phase is Phase.COUNTDOWN:
             fraction = min((state.time - state.since) / COUNTDOWN, 1.0)
+        elif state.phase is Phase.CAPTURING and moment.setup.is_recording:
+            word, tone = self.tr("READING"), Tone.ACTIVE
         elif state.phase is Phase.CAPTURING and has_just_slipped(state):
             word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
         elif state.phase is Phase.CAPTURING and state.message.code in FLAWS:
@@ -228,8 +239,9 @@ class SwingWords(QObject):
                 *_LOOKS[Phase.VERDICT],
             )
         if moment.is_accepted:
-            words = self.tr("The tip is used from now on.")
-            return State(self.tr("IN FORCE"), words, Sign.CHECK, Tone.GOOD)
+            told = accepted_phrase(moment.origin)
+            words = told.hint or self.tr("The tip is used from now on.")
+            return State(told.short, words, *GRADE_MARKS[moment.verdict.grade])
         told = phrase(moment.verdict.reason, moment.state.heading)
         grade = moment.verdict.grade
         sign, tone = GRADE_MARKS[grade]
@@ -242,6 +254,12 @@ class SwingWords(QObject):
             return str(state.message.values["seconds"])
         if state.phase in ENDED:
             return n_images_text(n_kept)
+        if moment.setup.is_recording:
+            progress = state.progress
+            if not progress.n_images:
+                return ""
+            words = self.tr("{0} of {1} read")
+            return words.format(progress.n_read, progress.n_images)
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)
@@ -250,12 +268,14 @@ class SwingWords(QObject):
 
 
 def _fraction(moment: Moment) -> float | None:
-    n_kept = moment.state.n_kept
+    n_kept, progress = moment.state.n_kept, moment.state.progress
     match moment.state.phase:
         case Phase.VERDICT:
             return None
         case Phase.SOLVING:
             return moment.solving or 0.0
+    if moment.setup.is_recording:
+        return progress.n_read / max(progress.n_images, 1)
     return n_kept / max(n_kept + moment.short.n_more, 1)
 
 
@@ -273,7 +293,7 @@ def _dial(moment: Moment) -> DialValue:
     posture, target = _posture(moment), state.target if is_capturing else None
     if state.phase in ENDED or moment.lacks_images:
         posture = None
-    if state.heading is None:
+    if state.heading is None and not moment.setup.is_recording:
         # Nobody knows yet how the operator sees the pen lean; right is his own right.
         if posture is not None and not moment.is_simulated:
             posture = UPRIGHT
