@@ -1,5 +1,6 @@
 """A whole calibration with images that come over GigE Vision, to the accepted tip."""
 
+import shutil
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from lightpen.arrays import Image
 from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.protocol import CameraSettings, Region
 from lightpen.live.sources import Surroundings
+from lightpen.model.origin import Origin
 from lightpen.record.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
@@ -55,6 +57,10 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
 
     gige.serve(seen)
     files = write_sample_files(scene, tmp_path / "files")
+    measured = tmp_path / "measured"  # as for a real pen, without the simulator's mark
+    measured.mkdir()
+    camera_file = shutil.copy(files.camera, measured)
+    pen_file = shutil.copy(files.pen, measured)
     region = Region(0, 0, *scene.camera.image_size)
     settings.set_camera(
         "LP01", CameraSettings(1000.0, None, FRAME_RATE, "Mono8", region, None, 16_000)
@@ -65,8 +71,8 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
             *("Ann", "LP-04", "T-10", "C-1", 10.0),
             source="aravis",
             source_place=ADDRESS,
-            camera_file=str(files.camera),
-            pen_file=str(files.pen),
+            camera_file=str(camera_file),
+            pen_file=str(pen_file),
             max_uncertainty=0.02,
             min_images=15,
             max_images=80,
@@ -98,6 +104,7 @@ def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
     assert result is not None
     error = np.abs(result.tip_pen - scene.tip_pen)
     assert (error < 0.03).all()  # U is 0.02 mm at most
+    assert result.origin is Origin.LIVE
     record = open_record(Path(result.record))
     assert record.header.settings["camera_serial"] == "LP01"
     assert record.header.settings["pixel_format"] == "Mono8"
