@@ -38,7 +38,7 @@ def choose(panel: SourcePanel, key: str) -> None:
 
 
 def told(panel: SourcePanel) -> SignLabel:
-    (label,) = panel.findChildren(SignLabel)
+    (label,) = (each for each in panel.findChildren(SignLabel) if each.isVisible())
     return label
 
 
