@@ -114,6 +114,7 @@ _LACKS: dict[Lack, str] = {
     Lack.SOURCE_PLACE: QT_TRANSLATE_NOOP(
         "phrases", "Choose the folder of the recorded images."
     ),
+    Lack.DEVICE: QT_TRANSLATE_NOOP("phrases", "Search for the camera and choose it."),
     Lack.IMAGES: QT_TRANSLATE_NOOP("phrases", "No image has come from the camera yet."),
     Lack.CAMERA_FILE: QT_TRANSLATE_NOOP("phrases", "Open the intrinsics file."),
     Lack.IMAGE_SIZE: QT_TRANSLATE_NOOP(

@@ -22,6 +22,7 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
+from lightpen.cameras.source import Needs, Source, SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
@@ -231,7 +232,7 @@ class ReplayCamera:
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
             pixel_format=self.caps.pixel_formats[0],
-            bits=8 * image.itemsize,
+            bits=_bits(image),
         )
 
     def _name(self, seq: int) -> str:
@@ -246,6 +247,13 @@ class ReplayCamera:
         files = self._source.files
         is_there = not files or any(os.access(file, os.R_OK) for file in files)
         return not is_there or self._n_unread >= len(self._source.names)
+
+
+def _bits(image: Image) -> int:
+    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
+    if image.itemsize == 1:
+        return 8
+    return 12 if int(image.max(initial=0)) < 2**12 else 16
 
 
 def _first_image(source: ImageSource, where: str) -> Image:
@@ -296,3 +304,12 @@ def _already_taken(what: Sentence) -> ConfigError:
             what=what,
         )
     )
+
+
+def _camera(place: SourcePlace, clock: Clock) -> ReplayCamera:
+    return ReplayCamera(place.name, loops=True, clock=clock)
+
+
+RECORDED = Source(
+    "recorded", sentence("source.recorded", "Recorded images"), Needs.FILES, _camera
+)

@@ -4,8 +4,8 @@ Every call of the camera is made in this thread. Frames leave it two ways: throu
 for the newest one, for showing, and through a queue that loses nothing, for measuring.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import Enum, auto
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
+from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.protocol import (
     CameraFailure,
     CameraSettings,
@@ -38,9 +39,10 @@ LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is
 LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
 LONGEST_READ = 2.0  # s, after which requests are served at the latest
 BUSY_PAUSE = 0.5  # s
-# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
-LONGEST_BUSY = 4.0  # s
-BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
+# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat;
+# that it is not free yet may take 5 s to find out.
+LONGEST_BUSY = 8.0  # s
+BACK_OFF = (0.5, 1.0, 2.0)  # s between attempts to reconnect; the last repeats
 LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # Of the images since measuring began, skipped by a computer that is too slow; fewer
 # are skipped when something else holds it up once.
@@ -110,6 +112,8 @@ class CameraWorker:
         Not open yet. Nobody else may call it any more.
     settings : CameraSettings
         To be applied, again at each reconnection.
+    known : mapping of str to CameraSettings
+        By serial numbers; a camera that is among them gets these instead.
     on_event : callable
         Called in the thread of the worker with what happens; must return at once and
         not call `stop`.
@@ -127,9 +131,11 @@ class CameraWorker:
         *,
         clock: Clock | None = None,
         n_queued: int = N_QUEUED,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
         self._camera = camera
         self._settings = settings
+        self._known = dict(known or {})
         self._applied = settings
         self._caps: Caps | None = None
         self._on_event = on_event
@@ -146,6 +152,7 @@ class CameraWorker:
         self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
         self._heard_ns = 0
+        self._link = LinkWatch()
 
     @property
     def serial(self) -> str:
@@ -225,6 +232,10 @@ class CameraWorker:
         """Ask for another gain while images come."""
         self._requests.put(lambda: self._set_gain(gain_db))
 
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask for other settings, for which images stop coming for a moment."""
+        self._requests.put(lambda: self._configure(settings))
+
     def _run(self) -> None:
         try:
             self._open_first()
@@ -256,6 +267,7 @@ class CameraWorker:
             return
         except FrameIncomplete as error:
             self._hear()
+            self._count()
             self._on_event(Troubled(error))
         else:
             self._hear()
@@ -267,7 +279,7 @@ class CameraWorker:
             self._on_event(FrameReady())
         if self._measures.is_set():
             self._enqueue(frame)
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        self._count()
 
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
@@ -292,7 +304,7 @@ class CameraWorker:
 
     def _watch(self) -> None:
         """Find out whether a camera that sent nothing for long is still there."""
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        self._count()
         silence = round((self._clock.now_ns() - self._heard_ns) * 1e-9, 3)
         if silence >= self._quiet_time():
             self._change(Connection.SILENT)
@@ -310,6 +322,15 @@ class CameraWorker:
 
     def _hear(self) -> None:
         self._heard_ns = self._clock.now_ns()
+
+    def _count(self) -> None:
+        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        if self._camera.caps.has_link:
+            self._link, trouble = self._link.after(
+                self._stats, self._heard_ns * 1e-9, self._applied
+            )
+            if trouble is not None:
+                self._on_event(Troubled(trouble))
 
     def _open_first(self) -> None:
         """Open the camera, waiting a little for another program to let go of it."""
@@ -343,10 +364,25 @@ class CameraWorker:
 
     def _connect(self) -> None:
         self._camera.open()
+        known = self._known.pop(self._camera.serial, None)
+        if known is None:
+            self._start(self._settings)
+            return
+        self._settings = known
+        try:
+            self._start(known)
+        except ConfigError as error:  # it is not what it was when they were kept
+            self._on_event(Troubled(error))
+            self._settings = CameraSettings()
+            self._start(self._settings)
+
+    def _start(self, settings: CameraSettings) -> None:
+        """Set up the open camera and let its images come."""
+        self._applied = self._camera.configure(settings)
         self._caps = self._camera.caps
-        self._applied = self._camera.configure(self._settings)
         self._camera.start()
         self._hear()
+        self._link = LinkWatch()
         self._on_event(SettingsApplied(self._applied))
         self._change(Connection.STREAMING)
 
@@ -361,12 +397,25 @@ class CameraWorker:
             except ConfigError as error:
                 self._on_event(Troubled(error))
 
+    def _configure(self, settings: CameraSettings) -> None:
+        before = self._settings
+        self._camera.stop()
+        try:
+            self._start(settings)
+        except ConfigError:
+            self._start(before)
+            raise
+        self._settings = merged(before, self._applied)
+
     def _set_exposure(self, exposure_us: float) -> None:
+        # Where the camera is lost over it, it is set when it comes back.
+        self._settings = replace(self._settings, exposure_us=exposure_us)
         applied = self._camera.set_exposure(exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         self._apply(replace(self._applied, exposure_us=applied))
 
     def _set_gain(self, gain_db: float) -> None:
+        self._settings = replace(self._settings, gain_db=gain_db)
         applied = self._camera.set_gain(gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         self._apply(replace(self._applied, gain_db=applied))
@@ -379,6 +428,12 @@ class CameraWorker:
         if connection is not self._connection:
             self._connection = connection
             self._on_event(ConnectionChanged(connection))
+
+
+def merged(before: CameraSettings, now: CameraSettings) -> CameraSettings:
+    """Return settings, and of what they leave open those before."""
+    given = {f.name: getattr(now, f.name) for f in fields(now)}
+    return replace(before, **{n: v for n, v in given.items() if v is not None})
 
 
 def is_too_slow(n_missed: int, n_offered: int) -> bool:

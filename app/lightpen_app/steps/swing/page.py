@@ -152,7 +152,7 @@ class SwingPage(Page):
     @override
     def entered(self) -> None:
         self._is_entered = True
-        is_recording = self._workbench.preparation.source.kind is SourceKind.RECORDED
+        is_recording = self._workbench.preparation.source.kind == SourceKind.RECORDED
         if is_recording and self._run.status.state is None:
             self._workbench.open_camera()  # it begins with its first image
         self._runner.come()

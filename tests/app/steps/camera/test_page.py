@@ -39,6 +39,7 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
@@ -81,7 +82,7 @@ def exposure(seen: "Seen") -> str:
 
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
-    page = CameraPage(workbench)
+    page = CameraPage(workbench, Silence())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -306,7 +307,8 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
 
     live.wait(
         "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
-        "Choose the file for this camera or switch off binning."
+        "Choose the file for this camera, set the region to the whole sensor, or "
+        "switch off binning."
     )
     assert not live.page.is_complete()
     assert "another size" in live.page.main_action().why_not
@@ -937,6 +939,9 @@ def test_every_control_is_named_and_reached_by_tab(
         "Live image",
         "Exposure",
         "Gain",
+        "Set by the LEDs",
+        "Frame rate",
+        "Pixel format",
     }
 
 
