@@ -20,6 +20,8 @@ from lightpen.cameras.features import (
 )
 from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
 from lightpen.cameras.protocol import (
+    EXPOSURE,
+    GAIN,
     CameraSettings,
     Caps,
     ConfigError,
@@ -159,7 +161,7 @@ class DeviceCamera:
         """Set the exposure, also while images come; return what is in force, us."""
         applied = self._set(EXPOSURES, exposure_us)
         if applied is None:
-            raise _cannot_be_set(sentence("camera.exposure", "exposure"))
+            raise _cannot_be_set(EXPOSURE)
         self._settings = replace(self._settings, exposure_us=applied)
         return applied
 
@@ -167,7 +169,7 @@ class DeviceCamera:
         """Set the gain, also while images come; return what is in force, dB."""
         applied = self._set(GAINS, gain_db)
         if applied is None:
-            raise _cannot_be_set(sentence("camera.gain", "gain"))
+            raise _cannot_be_set(GAIN)
         self._settings = replace(self._settings, gain_db=applied)
         return applied
 

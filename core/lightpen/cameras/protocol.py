@@ -12,6 +12,10 @@ from typing import Protocol
 
 from lightpen.arrays import Image
 from lightpen.errors import LightpenError
+from lightpen.sentences import sentence
+
+EXPOSURE = sentence("camera.exposure", "exposure")
+GAIN = sentence("camera.gain", "gain")
 
 
 class CameraFailure(LightpenError):  # noqa: N818 - its children tell what is wrong

@@ -9,6 +9,8 @@ from math import inf
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import (
+    EXPOSURE,
+    GAIN,
     CameraSettings,
     Caps,
     ConfigError,
@@ -128,11 +130,11 @@ class ReplayCamera:
 
     def set_exposure(self, exposure_us: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken(sentence("camera.exposure", "exposure"))
+        raise _already_taken(EXPOSURE)
 
     def set_gain(self, gain_db: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken(sentence("camera.gain", "gain"))
+        raise _already_taken(GAIN)
 
     def start(self) -> None:
         """Let images come from the first on; nothing if they do."""

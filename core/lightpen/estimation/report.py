@@ -24,6 +24,7 @@ from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.own_json import with_checksum
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
@@ -185,6 +186,11 @@ def pivot_record(
         ],
     }
     return {name: plain(entry) for name, entry in record.items()}
+
+
+def record_bytes(record: Mapping[str, Any]) -> bytes:
+    """Return a record as JSON that tells when it was changed."""
+    return with_checksum(json_bytes(record)) + b"\n"
 
 
 def json_bytes(record: Mapping[str, Any]) -> bytes:

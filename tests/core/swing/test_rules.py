@@ -64,7 +64,7 @@ PERIOD = 0.1  # s, twice the usual one: what is decided takes longer than either
 
 
 # With these files any U can be reached.
-EXACT_PEN = replace(paper_pen(), scale_sigma=1e-9, diameter_sigma=1e-6)
+EXACT_PEN = replace(paper_pen(), scale_sigma=1e-9, diameter_sigma=1e-6, expansion=0.0)
 
 
 class Station:

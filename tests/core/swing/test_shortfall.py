@@ -38,7 +38,7 @@ CAMERA, PEN = paper_camera(), paper_pen()
 
 
 # With these files any U can be reached.
-EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6)
+EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6, expansion=0.0)
 
 
 def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
