@@ -496,8 +496,15 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                 "detail": str(observations.details[i] or ""),
                 "rms_px": rms[i],
                 "tip_cam_mm": tips[i],
+                "edge_width_px": observations.edge_widths[i],
                 "leds": [
-                    {"led": j + 1, "x_px": x, "y_px": y, "used": leds_used[i][j]}
+                    {
+                        "led": j + 1,
+                        "x_px": x,
+                        "y_px": y,
+                        "area_px2": observations.areas[i, j],
+                        "used": leds_used[i][j],
+                    }
                     for j, (x, y) in enumerate(pixels[i])
                     if seen[i][j]
                 ],
