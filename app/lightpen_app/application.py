@@ -84,7 +84,7 @@ class Wizard(QObject):
         # Connections
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
-        self.workbench.run.relieved.connect(self.window.drop_notice)
+        self.workbench.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)

@@ -91,6 +91,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._settings = settings
         self._now = 0
         self._notice_is_of_page = False
+        self._status_holds: Callable[[], bool] | None = None  # None: until another
         self._asks = True
 
         # Widgets: the order of making them is the order of the Tab key
@@ -145,11 +146,12 @@ class MainWindow(Rearranged, QMainWindow):
             return
         why_closed = self._pages[index].why_closed()
         if why_closed:
-            self._action_bar.set_status(why_closed)
+            asked = self._pages[index]
+            self._say_while(why_closed, lambda: asked.why_closed() == why_closed)
             return
         self.page().left()
         self._now = index
-        self._action_bar.set_status("")
+        self._set_status("")
         if self._notice_is_of_page:
             self._notice.clear()
         self._area.show_page(self.page())
@@ -271,7 +273,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
-        page.status_changed.connect(self._action_bar.set_status)
+        page.status_changed.connect(self._set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.subject_changed.connect(self._sidebar.set_subject)
         page.operator_value_changed.connect(self._operator_view.set_value)
@@ -348,8 +350,20 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.title(), page.lead())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
+        if self._status_holds is not None and not self._status_holds():
+            self._set_status("")
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
+
+    def _set_status(self, text: str) -> None:
+        """Show a sentence in the status line until there is another."""
+        self._status_holds = None
+        self._action_bar.set_status(text)
+
+    def _say_while(self, text: str, holds: Callable[[], bool]) -> None:
+        """Show a sentence in the status line as long as it is true."""
+        self._set_status(text)
+        self._status_holds = holds
 
     def _focus_page(self) -> None:
         """Put the focus on the control that the page chose, or on its first one."""
@@ -379,7 +393,8 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_advance_pressed(self) -> None:
         """Do as a presenter's remote asks, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
-            self._action_bar.set_status(self.tr("Press this button at the screen."))
+            words = self.tr("Press this button at the screen.")
+            self._say_while(words, lambda: self.page().main_action().at_screen)
         else:
             self._action_bar.press_main()
 
@@ -417,7 +432,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_mute_toggled(self, muted: bool) -> None:
         words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
-        self._action_bar.set_status(words)
+        self._set_status(words)
 
     def _on_about_chosen(self) -> None:
         About(versions(), self).exec()

@@ -12,6 +12,7 @@ from lightpen.cameras.protocol import (
     CameraSettings,
     Caps,
     DeviceLost,
+    FramesSkipped,
     ImageCamera,
     Stats,
 )
@@ -20,6 +21,7 @@ from lightpen.cameras.worker import (
     ConnectionChanged,
     Ended,
     Failed,
+    KeepsUp,
     SettingsApplied,
     Troubled,
     WorkerEvent,
@@ -73,6 +75,8 @@ class LiveView(QObject):
         A sentence to be read; the camera carries on.
     failed(str)
         A sentence to be read; no more images come until another `open`.
+    relieved(str)
+        The sentence of one of these whose cause is gone.
     """
 
     image_shown = Signal(object)
@@ -80,6 +84,7 @@ class LiveView(QObject):
     settings_applied = Signal(object)
     troubled = Signal(str)
     failed = Signal(str)
+    relieved = Signal(str)
 
     def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -90,6 +95,7 @@ class LiveView(QObject):
         self._operator: Operator | None = None
         self._teller: _Teller | None = None
         self._closing: list[Thread] = []
+        self._without_images = self._skipping = ""  # as was told of them
 
     def open(
         self, camera: ImageCamera, settings: CameraSettings, clock: Clock | None = None
@@ -117,6 +123,7 @@ class LiveView(QObject):
         if live is None or teller is None:
             return
         teller.blockSignals(True)
+        self._relieve()
         self.set_following(False)
         self._operator = None
         self._closing = [thread for thread in self._closing if thread.is_alive()]
@@ -198,7 +205,20 @@ class LiveView(QObject):
     def _set_connection(self, connection: Connection) -> None:
         if connection is not self._connection:
             self._connection = connection
+            if connection is Connection.STREAMING:
+                self._take_back(self._without_images)
+                self._without_images = ""
             self.connection_changed.emit(connection)
+
+    def _relieve(self) -> None:
+        """Take back all that was told of a camera."""
+        for told in (self._without_images, self._skipping):
+            self._take_back(told)
+        self._without_images = self._skipping = ""
+
+    def _take_back(self, told: str) -> None:
+        if told:
+            self.relieved.emit(told)
 
     def _on_told(self, what: WorkerEvent) -> None:
         match what:
@@ -207,9 +227,17 @@ class LiveView(QObject):
             case SettingsApplied(settings):
                 self.settings_applied.emit(settings)
             case Failed(error):
-                self.failed.emit(worded(error.sentence))
+                self._without_images = worded(error.sentence)
+                self.failed.emit(self._without_images)
+            case Troubled(FramesSkipped() as trouble):
+                self._skipping = worded(trouble.sentence)
+                self.troubled.emit(self._skipping)
             case Troubled(trouble):
-                self.troubled.emit(worded(trouble.sentence))
+                self._without_images = worded(trouble.sentence)
+                self.troubled.emit(self._without_images)
+            case KeepsUp():
+                self._take_back(self._skipping)
+                self._skipping = ""
 
 
 class _Teller(QObject):

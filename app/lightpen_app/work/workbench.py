@@ -41,10 +41,13 @@ class Workbench(QObject):
         `preparation` is different.
     troubled(str)
         A sentence to be read.
+    relieved(str)
+        A sentence of `troubled` whose cause is gone.
     """
 
     changed = Signal()
     troubled = Signal(str)
+    relieved = Signal(str)
 
     def __init__(
         self,
@@ -63,6 +66,7 @@ class Workbench(QObject):
         self._wants_samples = False
         self._reading: Job | None = None
         self._unread = Station()
+        self._file_troubles: list[str] = []
         self.run = SwingRun(folder, self._around.now, self)
         self.live = LiveView(self.run, self)
 
@@ -71,8 +75,11 @@ class Workbench(QObject):
         self.live.settings_applied.connect(self._on_settings_applied)
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
+        self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
+        self.run.relieved.connect(self.relieved)
         settings.troubled.connect(self._on_settings_troubled)
+        settings.relieved.connect(self._on_settings_relieved)
 
     @property
     def preparation(self) -> Preparation:
@@ -109,6 +116,7 @@ class Workbench(QObject):
         """Take over what was chosen last at a station."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
+        self._relieve_of_files()
         self._preparation = replace(
             before,
             names=Names(
@@ -135,6 +143,9 @@ class Workbench(QObject):
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
         before, self._preparation = self._preparation, preparation
+        files = before.camera_file, before.pen_file
+        if (preparation.camera_file, preparation.pen_file) != files:
+            self._relieve_of_files()
         self._remember_station()
         self._remember()
         self._follow(before)
@@ -155,6 +166,10 @@ class Workbench(QObject):
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
+        self._relieve_of_files()
+        self._write_samples()
+
+    def _write_samples(self) -> None:
         around, folder = self._around, self._folder / SAMPLES
         self._start(lambda _: sample_files(around, folder), self._on_samples_written)
 
@@ -203,7 +218,17 @@ class Workbench(QObject):
 
     def _on_refused(self, sentence: str) -> None:
         self._reading = None
+        self._tell_of_file(sentence)
+
+    def _tell_of_file(self, sentence: str) -> None:
+        """Tell why a file is not chosen, until another is."""
+        self._file_troubles.append(sentence)
         self.troubled.emit(sentence)
+
+    def _relieve_of_files(self) -> None:
+        """Take back why a file was not chosen: others are."""
+        while self._file_troubles:
+            self.relieved.emit(self._file_troubles.pop())
 
     def _stop_reading(self) -> None:
         job, self._reading = self._reading, None
@@ -213,7 +238,7 @@ class Workbench(QObject):
     def _on_files_read(self, opened: OpenedFiles) -> None:
         self._reading, self._unread = None, Station()
         for trouble in opened.troubles:
-            self.troubled.emit(worded(trouble))
+            self._tell_of_file(worded(trouble))
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -230,17 +255,16 @@ class Workbench(QObject):
         simulated = now.source.kind is SourceKind.SIMULATED
         has_none = now.camera_file is None and now.pen_file is None
         if wants_samples and simulated and has_none:
-            self.use_sample_files()
+            self._write_samples()
 
     def _on_samples_written(self, samples: OpenedFiles) -> None:
         self._reading = None
-        self.set_preparation(
-            replace(
-                self._preparation,
-                camera_file=samples.camera_file,
-                pen_file=samples.pen_file,
-            )
+        before = self._preparation
+        self._preparation = replace(
+            before, camera_file=samples.camera_file, pen_file=samples.pen_file
         )
+        self._remember()
+        self._follow(before)
 
     def _follow(self, before: Preparation) -> None:
         """Let the camera and its images follow the choices."""
@@ -305,6 +329,9 @@ class Workbench(QObject):
 
     def _on_settings_troubled(self, why: Sentence) -> None:
         self.troubled.emit(worded(why))
+
+    def _on_settings_relieved(self, why: Sentence) -> None:
+        self.relieved.emit(worded(why))
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

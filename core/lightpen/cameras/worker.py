@@ -85,6 +85,11 @@ class Troubled:
 
 
 @dataclass(frozen=True)
+class KeepsUp:
+    """No image is skipped any more, after it was told that they were."""
+
+
+@dataclass(frozen=True)
 class Failed:
     """Something went wrong that ended the worker."""
 
@@ -97,7 +102,13 @@ class Ended:
 
 
 WorkerEvent: TypeAlias = (
-    FrameReady | ConnectionChanged | SettingsApplied | Troubled | Failed | Ended
+    FrameReady
+    | ConnectionChanged
+    | SettingsApplied
+    | Troubled
+    | KeepsUp
+    | Failed
+    | Ended
 )
 
 
@@ -199,9 +210,9 @@ class CameraWorker:
         if measures and not self._measures.is_set():
             self._queue.clear()
             self._n_offered = self._n_missed = 0
-            self._told_of_skipping = False
             self._measures.set()
         elif not measures:
+            self._n_offered = self._n_missed = 0
             self._measures.clear()
             self._queue.clear()  # a recording may wait for room in it
 
@@ -243,6 +254,7 @@ class CameraWorker:
         """Run the camera for one image, or reconnect."""
         try:
             self._serve_requests()
+            self._tell_of_keeping_up()
             self._read()
         except DeviceLost as error:
             self._on_event(Troubled(error))
@@ -279,9 +291,16 @@ class CameraWorker:
         self._n_skipped += 1
         self._n_missed += 1
         is_slow = is_too_slow(self._n_missed, self._n_offered)
-        if is_slow and not self._told_of_skipping:  # once is enough until measured anew
+        if is_slow and not self._told_of_skipping:  # once is enough until it is over
             self._told_of_skipping = True
             self._on_event(Troubled(_too_slow(self._n_missed, self._n_offered)))
+
+    def _tell_of_keeping_up(self) -> None:
+        """Tell that it is over with skipping, as when no more images are measured."""
+        is_slow = is_too_slow(self._n_missed, self._n_offered)
+        if self._told_of_skipping and not is_slow:
+            self._told_of_skipping = False
+            self._on_event(KeepsUp())
 
     def _quiet_time(self) -> float:
         """Return how long no image may come before the camera is probed, s."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -13,12 +13,14 @@ from PySide6.QtWidgets import (
     QMessageBox,
     QPushButton,
     QVBoxLayout,
+    QWidget,
 )
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.shell.placement import fitted_place
 from lightpen_app.shell.step_states import StepState
 from lightpen_app.steps.page import MainAction, Page
@@ -508,6 +510,63 @@ def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
     shell.window.drop_notice("The disk is full.")
 
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
+def test_a_notice_moves_nothing_on_the_page(shell: Shell) -> None:
+    page, window = shell.pages[0], shell.window
+    places = [each.mapTo(window, QPoint()) for each in (page.field, page.button)]
+
+    window.show_notice("The disk is full. " * 8)
+
+    assert places == [
+        each.mapTo(window, QPoint()) for each in (page.field, page.button)
+    ]
+    window.resize(940, 500)
+    notice = notice_of(window)
+    assert notice.parentWidget().rect().contains(notice.geometry())
+
+
+def test_a_notice_leaves_the_field_that_is_typed_in_to_be_seen(shell: Shell) -> None:
+    window, field = shell.window, shell.pages[0].field
+    assert QApplication.focusWidget() is field
+
+    window.show_notice("The disk is full. " * 60)
+
+    notice = notice_of(window)
+    seen = QRect(field.mapTo(window, QPoint()), field.size())
+    assert not seen.intersects(QRect(notice.mapTo(window, QPoint()), notice.size()))
+
+
+def notice_of(window: MainWindow) -> QWidget:
+    (notice,) = window.findChildren(NoticeBar)
+    assert isinstance(notice, NoticeBar)
+    return notice
+
+
+def test_why_a_step_was_closed_is_said_until_it_is_open(shell: Shell) -> None:
+    shell.pages[2].closed_because = "Swing the pen first."
+    shell.window.go_to(2)
+    shell.pages[0].changed.emit()
+    assert "Swing the pen first." in shell.window.words()
+
+    shell.pages[2].closed_because = ""
+    shell.pages[0].changed.emit()
+
+    assert "Swing the pen first." not in shell.window.words()
+
+
+def test_that_someone_must_be_at_the_screen_is_said_until_they_need_not(
+    shell: Shell,
+) -> None:
+    shell.pages[0].at_screen = True
+    QTest.keyClick(shell.window, Key.Key_PageDown)
+    shell.pages[0].changed.emit()
+    assert "Press this button at the screen." in shell.window.words()
+
+    shell.pages[0].at_screen = False  # as once the tip is accepted
+    shell.pages[0].changed.emit()
+
+    assert "Press this button at the screen." not in shell.window.words()
 
 
 def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:

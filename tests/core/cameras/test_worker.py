@@ -32,6 +32,7 @@ from lightpen.cameras.worker import (
     Ended,
     Failed,
     FrameReady,
+    KeepsUp,
     SettingsApplied,
     Troubled,
     WorkerEvent,
@@ -379,6 +380,19 @@ def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
     workbench.wait_for_frames(30)
 
     assert len(workbench.events.troubles(FramesSkipped)) == 2
+
+
+def test_it_is_told_when_no_image_is_skipped_any_more(benches: Benches) -> None:
+    workbench = benches.live(n_queued=1)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_trouble(FramesSkipped)
+    assert KeepsUp() not in workbench.events.all
+
+    workbench.worker.measure(False)
+    workbench.wait_for_frames(3)
+
+    assert workbench.events.all.count(KeepsUp()) == 1
 
 
 def test_a_recording_that_waits_for_its_reader_goes_on_when_nobody_measures(
