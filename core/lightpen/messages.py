@@ -41,7 +41,7 @@ class Code(StrEnum):
     FILE_UNCERTAIN = "verdict.file-uncertain"
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
-    NOT_SIMULTANEOUS = "verdict.not-simultaneous"
+    OUT_OF_REACH = "swing.out-of-reach"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
 
@@ -62,11 +62,14 @@ PEN_LOST = sentence(
 )
 PEN_LIFTED = sentence(Code.PEN_LIFTED, "The pen is lifted. Put the tip back to go on.")
 PAUSED = sentence(Code.PAUSED, "The swing is paused.")
-SOLVING = sentence(Code.SOLVING, "The tip is being computed. Put the pen down.")
+SOLVING = sentence(Code.SOLVING, "The tip is being computed. Keep the pen at hand.")
 UNKNOWN = sentence(
     Code.UNKNOWN,
     "The images do not tell yet where the tip is. Lean the pen to all sides.",
 )
+
+LED_FILE = sentence("file.leds", "LED file")
+INTRINSICS_FILE = sentence("file.intrinsics", "intrinsics file")
 
 # By the directions of the dial, as the camera sees them: against the clock from above.
 SIDES = (
@@ -169,6 +172,26 @@ def uncertain(uncertainty: float, limit: float) -> Sentence:
         "Capture more images in postures that differ.",
         uncertainty=uncertainty,
         limit=limit,
+    )
+
+
+def cannot_get_below(floor: float, limit: float, *, by_intrinsics: bool) -> Sentence:
+    """Tell that U (k = 2) stays above its limit whatever is captured, mm.
+
+    Parameters
+    ----------
+    by_intrinsics : bool
+        Whether that is for what the intrinsics file leaves open, not the LED file.
+    """
+    file = INTRINSICS_FILE if by_intrinsics else LED_FILE
+    return sentence(
+        Code.OUT_OF_REACH,
+        "U (k = 2) cannot get below {floor:.1f} \N{MICRO SIGN}m with this {file}; the "
+        "limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than the "
+        "postures need.",
+        floor=1000 * floor,
+        limit=1000 * limit,
+        file=file,
     )
 
 

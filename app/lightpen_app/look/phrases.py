@@ -76,7 +76,7 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
-    Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
+    Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),
 }
@@ -113,7 +113,7 @@ _LACKS: dict[Lack, str] = {
     ),
     Lack.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
     Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
-        "phrases", "Save or discard the changes of the LED table."
+        "phrases", "The LED table is not that of the file in use: save or discard it."
     ),
 }
 # A word for a sign to stand beside, read from a distance.

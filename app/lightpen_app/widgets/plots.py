@@ -18,7 +18,15 @@ from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.files import write_whole
-from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, font
+from lightpen_app.look.theme import (
+    GRID,
+    Colors,
+    TextSize,
+    Tone,
+    colors_of,
+    font,
+    scaled,
+)
 
 PNG_SCALE = 2
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
@@ -193,7 +201,7 @@ class Plot(QWidget):
         """Colour what is there already; a subclass colours its curves besides."""
         colors = colors_of(self.palette())
         self._graphics.setBackground(colors.panel)
-        size = f"{TextSize.SMALL}px"
+        size = f"{scaled(TextSize.SMALL)}px"
         title = {"color": colors.text, "size": size, "justify": "left"}
         self._item.setTitle(self._axes.title, **title)
         for side, words in (("left", self._axes.y), ("bottom", self._axes.x)):
@@ -201,7 +209,7 @@ class Plot(QWidget):
             axis.setPen(pg.mkPen(colors.line))
             axis.setTextPen(pg.mkPen(colors.muted))
             axis.setTickFont(font(TextSize.SMALL))
-            label = {"color": colors.muted, "font-size": f"{TextSize.SMALL}px"}
+            label = {"color": colors.muted, "font-size": f"{scaled(TextSize.SMALL)}px"}
             if words:
                 axis.setLabel(words, **label)
             else:
@@ -304,6 +312,11 @@ class TracePlot(Plot):
         self._limit.hide()
         self._item.addItem(self._limit)
         self._item.vb.sigResized.connect(self._on_area_resized)
+        self._restyle()
+
+    def set_names(self, *names: str) -> None:
+        """Change the names of the curves, as when the language changes."""
+        self._legend = names
         self._restyle()
 
     def set_data(self, x: FloatArray, *values: FloatArray) -> None:
