@@ -79,11 +79,13 @@ class Wizard(QObject):
         pages = make_pages(self.workbench, self._sounds)
         self.window = MainWindow(pages, settings, self._preferences)
         self.window.setMinimumSize(LEAST_SIZE)
+        self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
+        self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)

@@ -30,7 +30,7 @@ from lightpen.detection.aim import Aim
 from lightpen.live.looking import Live, LiveImage
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
-from lightpen.simulator.hand import Operator
+from lightpen.simulator.hand import Doing, Operator
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
@@ -92,6 +92,7 @@ class LiveView(QObject):
         self._live: Live | None = None
         self._connection = Connection.CLOSED
         self._aim = Aim()
+        self._is_watched = True
         self._operator: Operator | None = None
         self._teller: _Teller | None = None
         self._closing: list[Thread] = []
@@ -110,6 +111,7 @@ class LiveView(QObject):
         teller.told.connect(self._on_told)
         self._live = live = Live(camera, settings, teller, self._run.runner, clock)
         live.set_aim(self._aim)
+        live.set_watched(self._is_watched)
         live.start()
 
     def close(self) -> None:
@@ -179,6 +181,12 @@ class LiveView(QObject):
         if self._live is not None:
             self._live.set_aim(aim)
 
+    def set_watched(self, watched: bool) -> None:
+        """Say whether anybody looks at the images, of this camera and later ones."""
+        self._is_watched = watched
+        if self._live is not None:
+            self._live.set_watched(watched)
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask the camera for another exposure."""
         if self._live is not None:
@@ -188,6 +196,14 @@ class LiveView(QObject):
         """Ask the camera for another gain."""
         if self._live is not None:
             self._live.set_gain(gain_db)
+
+    def show_pen(self) -> None:
+        """Let the simulated operator bring the pen, so that there is something to see.
+
+        Only while he does nothing else.
+        """
+        if self._operator is not None and self._operator.doing is Doing.ABSENT:
+            self._operator.seat()
 
     def set_following(self, follows: bool) -> None:
         """Let the simulated operator do what the swing asks for, or leave it."""

@@ -38,6 +38,7 @@ LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is
 LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
 LONGEST_READ = 2.0  # s, after which requests are served at the latest
 BUSY_PAUSE = 0.5  # s
+PROBING = 2.0  # s, after which a camera of which nobody wants images is looked after
 # A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
 LONGEST_BUSY = 4.0  # s
 BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
@@ -149,6 +150,10 @@ class CameraWorker:
         self._queue = FrameQueue(n_queued)
         self._requests: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._stopping = Event()
+        self._wake = Event()
+        self._rest: float | None = 0.0
+        self._is_rested = False
+        self._n_missed_read = self._n_missed_resting = 0
         self._measures = Event()
         self._thread = Thread(target=self._run, name="camera", daemon=True)
         self._connection: Connection | None = None
@@ -186,6 +191,7 @@ class CameraWorker:
             The camera did not come back from a call within ``timeout_s``.
         """
         self._stopping.set()
+        self._wake.set()
         self._queue.end()
         if self._thread.ident is None:
             return
@@ -228,13 +234,28 @@ class CameraWorker:
         """
         return self._queue.take(timeout_s)
 
+    def set_rest(self, rest: float | None) -> None:
+        """Leave the camera alone between two images.
+
+        Parameters
+        ----------
+        rest : float or None
+            s; None for as long as no other is set. Images that are missed meanwhile
+            count as neither missed nor skipped, and the next may be as old as the rest.
+        """
+        if rest != self._rest:
+            self._rest = rest
+            self._wake.set()
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask for another exposure while images come."""
         self._requests.put(lambda: self._set_exposure(exposure_us))
+        self._wake.set()
 
     def set_gain(self, gain_db: float) -> None:
         """Ask for another gain while images come."""
         self._requests.put(lambda: self._set_gain(gain_db))
+        self._wake.set()
 
     def _run(self) -> None:
         try:
@@ -255,10 +276,32 @@ class CameraWorker:
         try:
             self._serve_requests()
             self._tell_of_keeping_up()
-            self._read()
+            if self._is_wanted():
+                self._read()
         except DeviceLost as error:
             self._on_event(Troubled(error))
             self._reconnect()
+
+    def _is_wanted(self) -> bool:
+        """Return whether an image is wanted, after the rest before it."""
+        rest = self._rest
+        if rest == 0.0:
+            return True
+        self._wake.clear()
+        if rest != self._rest or self._stopping.is_set():  # just before
+            return False
+        self._is_rested = True
+        if rest is not None:
+            self._clock.wait(rest, self._wake)
+        else:
+            if not self._camera.caps.waits:  # a recording would begin anew
+                self._camera.stop()
+            self._wake.wait(PROBING)
+            self._camera.probe()
+            if self._rest is not None:
+                self._camera.start()
+        self._hear()
+        return rest is not None
 
     def _read(self) -> None:
         try:
@@ -279,7 +322,18 @@ class CameraWorker:
             self._on_event(FrameReady())
         if self._measures.is_set():
             self._enqueue(frame)
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        self._count()
+
+    def _count(self) -> None:
+        """Take what became of the images, but of those that nobody wanted."""
+        stats = self._camera.stats()
+        if self._is_rested:
+            self._is_rested = False
+            self._n_missed_resting = stats.missed - self._n_missed_read
+        self._n_missed_read = stats.missed - self._n_missed_resting
+        self._stats = replace(
+            stats, skipped=self._n_skipped, missed=self._n_missed_read
+        )
 
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
@@ -311,7 +365,7 @@ class CameraWorker:
 
     def _watch(self) -> None:
         """Find out whether a camera that sent nothing for long is still there."""
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        self._count()
         silence = round((self._clock.now_ns() - self._heard_ns) * 1e-9, 3)
         if silence >= self._quiet_time():
             self._change(Connection.SILENT)
