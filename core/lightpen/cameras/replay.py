@@ -230,9 +230,16 @@ class ReplayCamera:
             image=sealed(image),
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
+            device_ts_ns=self._recorded_ns(seq),
             pixel_format=self.caps.pixel_formats[0],
             bits=8 * image.itemsize,
         )
+
+    def _recorded_ns(self, seq: int) -> int:
+        """Return a time by which an image is known again when the recording is."""
+        names = () if self._source is None else self._source.names
+        number = seq % len(names) if names else seq
+        return round(number * 1e9 / USUAL_FRAME_RATE)
 
     def _name(self, seq: int) -> str:
         """Return the file of an image; after the last one comes the first."""

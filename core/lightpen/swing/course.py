@@ -96,6 +96,7 @@ class SwingCourse:
         self._limits = SwingLimits()
         self._writer: RecordWriter | None = None
         self._n_since_kept = 0
+        self._recorded = frozenset[int]()  # times of the images in the record
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
@@ -230,6 +231,8 @@ class SwingCourse:
         self._writer = writer
         self._limits = limits  # asking for more does not raise them
         self._n_since_kept = 0
+        times = (image.device_time_ns for image in record.images)
+        self._recorded = frozenset(time for time in times if time is not None)
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
         self._relieve()
@@ -275,6 +278,11 @@ class SwingCourse:
         assert setup is not None
         assert writer is not None
         time = frame.host_ts_ns * 1e-9
+        if n_images is not None and frame.device_ts_ns in self._recorded:
+            self._n_since_kept += 1  # a recording gone on with: this one was taken
+            if self._n_since_kept >= n_images:
+                self._become(finish(before))
+            return
         try:
             transition = capture_image(
                 *(setup, before, writer, frame.image, sighting, time),

@@ -13,6 +13,7 @@ import pytest
 
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import WorkerEvent
+from lightpen.detection.sighting import look
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import PenFile
@@ -426,6 +427,31 @@ def test_an_abandoned_swing_is_resumed_with_all_its_images(
 
     assert station.state.n_kept == len(open_record(interrupted).images) == N_IMAGES + 2
     assert station.status.names == names
+
+
+def test_a_resumed_recording_takes_no_photograph_twice(
+    station: "Station", interrupted: Path
+) -> None:
+    station.go_on(interrupted)
+    station.keep(2)
+    station.runner.abandon()
+    station.wait_until(lambda: station.status.state is None)
+    station.go_on(interrupted)
+    setup = station.status.setup
+    assert setup is not None
+    frame = station.camera.read(1.0)
+    sighting = look(frame.image, setup.camera, setup.pen, setup.mask)
+
+    def show(time_ns: int) -> Phase:
+        again = replace(frame, device_ts_ns=time_ns)
+        station.runner.take(again, sighting, setup, n_images=1000)
+        return station.state.phase
+
+    images = open_record(interrupted).images
+    times = [each.device_time_ns for each in images if each.device_time_ns is not None]
+    assert len(times) >= 2
+    assert {show(time) for time in times} == {Phase.WAIT}  # passed over altogether
+    assert show(max(times) + 1) is Phase.SEEN
 
 
 def test_a_resumed_swing_goes_by_its_own_files_and_limits(
