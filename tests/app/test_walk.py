@@ -306,7 +306,7 @@ def _watch_the_swing(walker: "Walker") -> None:
     n_inputs = walker.n_inputs
     walker.until_tells("Starts in ")
     walker.until_says("Lean RIGHT")
-    walker.until(lambda: bool(re.search(r"\d+ of about \d+", _told(walker))))
+    walker.until(lambda: bool(re.search(r"\d+ kept, \d+ to go", _told(walker))))
     walker.until_says("CAPTURING")
     walker.until_tells("10 of 10 LEDs, ")
     assert walker.main_button().isEnabled()

@@ -65,6 +65,8 @@ class MainWindow(Rearranged, QMainWindow):
     -------
     preferences_changed(Preferences)
         The user chose otherwise.
+    attention_changed(bool)
+        Whether anybody may be looking at live images now.
     closing()
         The pages are shut down; what they share must be, too, and whoever does so
         waits for what is still under way.
@@ -73,6 +75,7 @@ class MainWindow(Rearranged, QMainWindow):
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     preferences_changed = Signal(object)
+    attention_changed = Signal(bool)
     closing = Signal()
 
     def __init__(
@@ -119,9 +122,9 @@ class MainWindow(Rearranged, QMainWindow):
         self._options.mute_action.toggled.connect(self._on_mute_toggled)
         self._options.about_chosen.connect(self._on_about_chosen)
         self._operator_view.closed.connect(self._on_operator_view_closed)
-        self._operator_view.advance_requested.connect(self._on_advance_pressed)
-        self._operator_view.back_requested.connect(self.go_back)
+        self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
+        self._notice.value_changed.connect(self._operator_view.set_notice)
         for page in self._pages:
             self._connect_page(page)
 
@@ -155,6 +158,7 @@ class MainWindow(Rearranged, QMainWindow):
         if self._notice_is_of_page:
             self._notice.clear()
         self._area.show_page(self.page())
+        self._tell_attention()
         self.page().entered()
         self._refresh()
         self._focus_page()
@@ -216,6 +220,10 @@ class MainWindow(Rearranged, QMainWindow):
         )
         return tuple(filter(None, said))
 
+    def is_seen(self) -> bool:
+        """Return whether it, or the operator view, is on a screen."""
+        return not self.isMinimized() or self._operator_view.isVisible()
+
     def help_window(self) -> HelpWindow:
         """Return the help."""
         return self._help_window
@@ -264,6 +272,8 @@ class MainWindow(Rearranged, QMainWindow):
     @override
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
+        if event.type() == QEvent.Type.WindowStateChange:
+            self._tell_attention()
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()
             self._refresh()
@@ -276,6 +286,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.status_changed.connect(self._set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.subject_changed.connect(self._sidebar.set_subject)
+        page.subject_changed.connect(self._operator_view.set_subject)
         page.operator_value_changed.connect(self._operator_view.set_value)
 
     def _make_actions(self) -> None:
@@ -288,7 +299,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._action(Qt.Key.Key_F10, self._show_options)
         # A presenter's remote sends the page keys.
         self._hands_free_actions = (
-            self._action(Qt.Key.Key_Space, self._on_pause_pressed),
+            self._action(Qt.Key.Key_Space, self._on_space_pressed),
             self._action(Qt.Key.Key_PageDown, self._on_advance_pressed),
             self._action(Qt.Key.Key_PageUp, self.go_back),
         )
@@ -398,6 +409,12 @@ class MainWindow(Rearranged, QMainWindow):
         else:
             self._action_bar.press_main()
 
+    def _on_advance_wanted_afar(self) -> None:
+        """Go on for an operator who does not see the page: never ask anything on it."""
+        page = self.page()
+        if page.is_hands_free() and page.is_complete():
+            self._on_advance_pressed()
+
     def _on_step_requested(self, key: str) -> None:
         keys = [page.key for page in self._pages]
         self.go_to(keys.index(key))
@@ -408,6 +425,14 @@ class MainWindow(Rearranged, QMainWindow):
             self._notice.show_text(text)
         elif self._notice_is_of_page:
             self._notice.clear()
+
+    def _on_space_pressed(self) -> None:
+        """Press the button that has the focus; pause where none has."""
+        focused = QApplication.focusWidget()
+        if isinstance(focused, QAbstractButton) and focused.isEnabled():
+            focused.click()
+        else:
+            self._on_pause_pressed()
 
     def _on_pause_pressed(self) -> None:
         self.page().toggle_pause()
@@ -422,6 +447,12 @@ class MainWindow(Rearranged, QMainWindow):
             self._operator_view.open_beside(self)
         else:
             self._operator_view.close()
+        self._tell_attention()
+
+    def _tell_attention(self) -> None:
+        """Tell whether live images can be seen now."""
+        is_seen = self.is_seen()
+        self.attention_changed.emit(self.page().shows_images and is_seen)
 
     def _on_operator_view_closed(self) -> None:
         self._operator_action.setChecked(False)

@@ -3,6 +3,7 @@
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
+from lightpen_app.look.announcements import announce
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -55,6 +56,7 @@ class NoticeBar(Translated, QFrame):
         self._text.setAccessibleName(text)
         set_tone(self, tone)
         self.show()
+        announce(self, text)
         self.value_changed.emit(text)
 
     def clear(self) -> None:

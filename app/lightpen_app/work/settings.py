@@ -116,13 +116,9 @@ class Settings(QObject):
         self._why_unwritten: Sentence | None = None
         self._lock = Lock()
         self._thread: Thread | None = None
-        self._again = QTimer(self)
-        self._again.setSingleShot(True)
-        self._again.setInterval(AGAIN_MS)
 
         # Connections
         self._written.connect(self._on_written, Qt.ConnectionType.QueuedConnection)
-        self._again.timeout.connect(self._write_soon)
 
     @property
     def file(self) -> Path:
@@ -214,14 +210,15 @@ class Settings(QObject):
                 trouble, unwritten = save(self._file, self._content, changes), {}
             except LightpenError as error:
                 trouble, unwritten = error.sentence, changes
-            self._written.emit(trouble, not unwritten)
+            if trouble is not None or self._why_unwritten is not None:
+                self._written.emit(trouble, not unwritten)
 
     def _on_written(self, trouble: Sentence | None, is_written: bool) -> None:
         """Tell what went wrong, once, and when it is over; until then try again."""
         before = self._why_unwritten
         self._why_unwritten = None if is_written else trouble
         if not is_written:
-            self._again.start()
+            QTimer.singleShot(AGAIN_MS, self._write_soon)
         if before is not None and before != trouble:
             self.relieved.emit(before)
         if trouble is not None and before != trouble:

@@ -24,6 +24,7 @@ from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.shell.placement import fitted_place
 from lightpen_app.shell.step_states import StepState
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.work.settings import Preferences, Settings
 
@@ -377,22 +378,92 @@ def test_f11_opens_the_operator_view_and_escape_leaves_only_that(
 def test_the_operator_view_takes_the_keys_of_a_remote(
     shell: Shell, qtbot: QtBot
 ) -> None:
-    view = shell.window.operator_view()
+    view, page = shell.window.operator_view(), shell.pages[0]
+    page.hands_free = True
+    page.field.setText("done")
     QTest.keyClick(shell.window, Key.Key_F11)
 
     QTest.keyClick(view, Key.Key_Space)
     QTest.keyClick(view, Key.Key_PageDown)
+
     assert shell.shown == "Camera"
-    QTest.keyClick(view, Key.Key_PageUp)
+    assert page.log == ["entered", "pause", "left"]
+
+
+def test_space_presses_the_button_that_has_the_focus_and_pauses_elsewhere(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    page = shell.pages[0]
+    page.hands_free = True
+    page.changed.emit()
+    page.button.clicked.connect(lambda: page.log.append("clicked"))
+
+    page.button.setFocus()
+    press(Key.Key_Space)
+    page.setFocus()
+    press(Key.Key_Space)
+
+    assert page.log == ["entered", "clicked", "pause"]
+
+
+def test_the_operator_view_goes_nowhere_behind_the_operators_back(shell: Shell) -> None:
+    view, page = shell.window.operator_view(), shell.pages[0]
+    QTest.keyClick(shell.window, Key.Key_F11)
+    keys = (Key.Key_Return, Key.Key_PageDown, Key.Key_PageUp)
+
+    page.field.setText("done")  # but the page is for somebody at the screen
+    for key in keys:
+        QTest.keyClick(view, key)
+    page.hands_free = True
+    page.field.clear()  # and now something is missing, which it would ask about
+    for key in keys:
+        QTest.keyClick(view, key)
 
     assert shell.shown == "Start"
-    assert shell.pages[0].log == ["entered", "pause", "left", "entered"]
+
+
+def test_the_operator_view_names_pen_and_notice_and_the_key_that_leaves_it(
+    shell: Shell,
+) -> None:
+    QTest.keyClick(shell.window, Key.Key_F11)
+    view = shell.window.operator_view()
+
+    shell.pages[0].subject_changed.emit("Pen LP-04, tip T-10")
+    shell.window.show_notice("The disk is full.")
+
+    words = [text.text() for text in view.findChildren(FittedText) if text.isVisible()]
+    assert {"Pen LP-04, tip T-10", "The disk is full."} <= set(words)
+    assert any("Esc" in text for text in words)
+    shell.window.drop_notice("The disk is full.")
+    assert not any(
+        text.isVisible() and "disk" in text.text()
+        for text in view.findChildren(FittedText)
+    )
+
+
+def test_nobody_looks_at_images_on_a_page_without_them_or_at_a_window_put_away(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    told: list[bool] = []
+    shell.window.attention_changed.connect(told.append)
+    shell.pages[1].shows_images = True
+
+    shell.window.go_to(1)
+    shell.window.showMinimized()
+    QTest.keyClick(shell.window, Key.Key_F11)  # the operator still looks
+    QTest.keyClick(shell.window.operator_view(), Key.Key_F11)
+    shell.window.showNormal()
+    shell.window.go_to(0)
+
+    assert told == [True, False, True, False, True, False]
 
 
 def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
     shell: Shell, press: Callable[[Key], None]
 ) -> None:
     shell.pages[0].at_screen = True
+    shell.pages[0].hands_free = True
+    shell.pages[0].field.setText("done")
     view = shell.window.operator_view()
     QTest.keyClick(shell.window, Key.Key_F11)
     QTest.keyClick(view, Key.Key_PageDown)
@@ -513,17 +584,16 @@ def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
 
 
 def test_a_notice_moves_nothing_on_the_page(shell: Shell) -> None:
-    page, window = shell.pages[0], shell.window
-    places = [each.mapTo(window, QPoint()) for each in (page.field, page.button)]
+    window, controls = shell.window, (shell.pages[0].field, shell.pages[0].button)
+    places = [each.mapTo(window, QPoint()) for each in controls]
 
     window.show_notice("The disk is full. " * 8)
 
-    assert places == [
-        each.mapTo(window, QPoint()) for each in (page.field, page.button)
-    ]
+    assert [each.mapTo(window, QPoint()) for each in controls] == places
     window.resize(940, 500)
     notice = notice_of(window)
-    assert notice.parentWidget().rect().contains(notice.geometry())
+    corners = notice.mapTo(window, QPoint()), notice.size()
+    assert window.rect().contains(QRect(*corners))
 
 
 def test_a_notice_leaves_the_field_that_is_typed_in_to_be_seen(shell: Shell) -> None:

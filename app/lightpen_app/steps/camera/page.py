@@ -18,7 +18,6 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.detection.inspection import Exposure, inspect
 from lightpen.formats.opened_files import CameraFile
-from lightpen.simulator.hand import Doing
 from lightpen.swing.preparation import Lack, SourceChoice
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
@@ -44,6 +43,7 @@ class CameraPage(Rearranged, Page):
     """The step Camera."""
 
     key = "camera"
+    shows_images = True
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
@@ -240,7 +240,10 @@ class CameraPage(Rearranged, Page):
         self._images.set_image(shown, self._live.stats)
         self._exposure.set_value(inspection.exposure)
         self._focus.add(inspection)
+        outcome = self._stray.outcome()
         self._stray.feed(seen)
+        if self._stray.outcome() != outcome:
+            self._side.ensureWidgetVisible(self._stray)
 
     def _on_connection_changed(self, connection: Connection) -> None:
         if connection in (Connection.OPENING, Connection.STREAMING):
@@ -305,13 +308,8 @@ class CameraPage(Rearranged, Page):
         return self.tr("No camera is open.")
 
     def _show_pen(self) -> None:
-        """Let the simulated operator bring the pen, so that there is something to see.
-
-        Only while he does nothing else.
-        """
-        operator = self._live.operator
-        if self._is_shown and operator is not None and operator.doing is Doing.ABSENT:
-            operator.seat()
+        if self._is_shown:
+            self._live.show_pen()
 
     def _mark(self) -> None:
         """Mark what is masked, and what the search for stray light found."""

@@ -171,7 +171,10 @@ class SourcePanel(Translated, QGroupBox):
         self.setTitle(self.tr("Source of the images"))
         for index, entry in enumerate(SOURCES):
             self._kind.setItemText(index, self.tr(entry.name))
-        self._kind.setAccessibleName(self.tr("Source of the images"))
+        name = self.tr("Source of the images")
+        self._kind.setAccessibleName(name)
+        # On Linux the name of a list that drops down is what is chosen in it.
+        self._kind.setAccessibleDescription(name)
         edit = self._place.edit()
         edit.setAccessibleName(self.tr("Folder, record or video"))
         edit.setPlaceholderText(self.tr("Folder, record or video"))

@@ -104,6 +104,7 @@ class ImagesPanel(Translated, QWidget):
         self._misfits.number_chosen.connect(self._table.choose)
         self._take_out.clicked.connect(self._on_take_out_clicked)
         self._put_back.clicked.connect(self._on_put_back_clicked)
+        self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._card.saved.connect(self.saved)
         self._card.failed.connect(self.failed)
         self._shortcut(QKeySequence.StandardKey.Delete, self._take_out.click)
@@ -292,6 +293,17 @@ class ImagesPanel(Translated, QWidget):
         self._shown = None
         self._view.set_image(None)
         self._view.set_arrows(NO_ARROWS)
+
+    def _on_enlarge_toggled(self, enlarged: bool) -> None:
+        """Give the plot the place of all that is about it, or no longer."""
+        for widget in (
+            *(self._table, self._count, self._take_out, self._put_back),
+            *(self._view, self._caption),
+        ):
+            widget.setVisible(not enlarged)
+        layout = self.layout()
+        assert isinstance(layout, QGridLayout)
+        layout.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
 
     def _on_take_out_clicked(self) -> None:
         numbers = [row.number for row in self._table.selected() if row.is_used]
