@@ -35,9 +35,9 @@ class OperatorValue:
     hint : str
         A sentence more.
     count : str
-        Such as "184 / 300".
+        Such as "60 kept, 40 to go".
     time_left : str
-        Such as "about 20 s"; empty where nothing is waited for.
+        Such as "about 20 s left"; empty where nothing is waited for.
     fraction : float or None
         How much is done, 0 to 1.
     keys : str

@@ -188,6 +188,7 @@ class SwingFace(Rearranged, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
+        self._side.setColumnStretch(2, 0 if is_small else SIDE_SHARES[2])
         self._side.setRowStretch(1, 0 if is_small else 2)
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
