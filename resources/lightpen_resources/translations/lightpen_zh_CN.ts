@@ -2090,6 +2090,10 @@
         <translation>有图像无法记录，原因见顶部提示。排除后按空格键。</translation>
     </message>
     <message>
+        <source>The tip is being computed.</source>
+        <translation>正在计算测头。</translation>
+    </message>
+    <message>
         <source>Let the simulated operator swing; or press Seat, and lean the pen by dragging the dial.</source>
         <translation>让模拟操作员摆动；或按“就位”，再拖动姿态盘使光笔倾斜。</translation>
     </message>
@@ -2108,6 +2112,10 @@
     <message>
         <source>Capture more</source>
         <translation>继续采集</translation>
+    </message>
+    <message>
+        <source>The review is open at the screen.</source>
+        <translation>复核页已在屏幕上打开。</translation>
     </message>
     <message>
         <source>Put the pen down. The review is open at the screen.</source>

@@ -219,6 +219,8 @@ class SwingWords(QObject):
                 "it, then press Space."
             )
             return Phrase(told.short, hint)
+        if message.code == Code.SOLVING and moment.is_recorded:
+            return Phrase(told.short, self.tr("The tip is being computed."))
         if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat, and lean the pen by "
@@ -238,7 +240,9 @@ class SwingWords(QObject):
         step = steps[verdict.grade]
         if not verdict.can_be_accepted and verdict.next_step is NextStep.CAPTURE_MORE:
             step = self.tr("Capture more")
-        if moment.is_away:
+        if moment.is_away and moment.is_recorded:
+            hint = self.tr("The review is open at the screen.")
+        elif moment.is_away:
             hint = self.tr("Put the pen down. The review is open at the screen.")
         elif moment.is_recorded:
             hint = self.tr("Go on to the review.")
