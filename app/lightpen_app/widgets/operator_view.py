@@ -17,8 +17,9 @@ from lightpen_app.widgets.translated import Translated
 DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
 # Of the height, at most:
-INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.22
-NOTICE_SHARE, SMALL_SHARE = 0.14, 0.045
+INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.2
+NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.03, 0.008
+BESIDE_NOTICE = 0.55  # of their share that instruction and hint have below a notice
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
 CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not tell its size
@@ -94,8 +95,7 @@ class OperatorView(Translated, QWidget):
         self._keys = FittedText(43, 1)
 
         # Layout
-        side = QVBoxLayout()
-        side.setSpacing(3 * GRID)
+        self._side = side = QVBoxLayout()
         side.addStretch(1)
         side.addWidget(self._count)
         side.addWidget(self._progress)
@@ -208,6 +208,7 @@ class OperatorView(Translated, QWidget):
 
     def _resize_letters(self) -> None:
         letters = max(self.letters(), self.height() * LEAST_SHARE)
+        self._side.setSpacing(min(3 * GRID, round(self.height() * GAP_SHARE)))
         self._instruction.set_largest(letters * 1.2)
         self._hint.set_largest(letters * 0.6)
         self._notice.set_largest(letters * 0.45)
@@ -219,9 +220,10 @@ class OperatorView(Translated, QWidget):
         self._banner.set_word_size(letters * (1.6 if has_room else 0.8))
         # Else the dial, which wants to be square, would take the room of the words, and
         # of these one that of another.
+        room = 1.0 if self._notice.isHidden() else BESIDE_NOTICE
         for widget, share in (
-            (self._instruction, INSTRUCTION_SHARE),
-            (self._hint, HINT_SHARE),
+            (self._instruction, room * INSTRUCTION_SHARE),
+            (self._hint, room * HINT_SHARE),
             (self._notice, NOTICE_SHARE),
             (self._subject, SMALL_SHARE),
             (self._time_left, SMALL_SHARE),

@@ -2058,6 +2058,10 @@
         <translation>没有摆动</translation>
     </message>
     <message>
+        <source>at most {0} images</source>
+        <translation>最多 {0} 幅图像</translation>
+    </message>
+    <message>
         <source>{0}; {1} dropped</source>
         <translation>{0}；已丢弃 {1} 幅</translation>
     </message>
@@ -2184,10 +2188,6 @@
     <message>
         <source>It begins as soon as the step Swing is shown at the screen.</source>
         <translation>屏幕上显示“摆动”步骤后即开始。</translation>
-    </message>
-    <message>
-        <source>at most {0} images are taken</source>
-        <translation>最多采集 {0} 幅图像</translation>
     </message>
     <message>
         <source>The tip is used from now on.</source>

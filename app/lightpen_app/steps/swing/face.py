@@ -29,7 +29,8 @@ from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
-SIDE_SHARES = (7, 5, 5)  # of it: numbers, pen in space, live image
+SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
+LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
 ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
@@ -72,10 +73,7 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._banner = StateBanner(TextSize.TITLE)
         self._pen = PenInSpace()
         self._image = ImageView()
-        # Its height is that of the numbers beside it; the plots have the rest.
-        self._image.setSizePolicy(
-            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
-        )
+        self._image.setMinimumWidth(LEAST_IMAGE)
         self._plots = SwingPlots()
 
         # Layout
@@ -192,6 +190,10 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._side.setRowStretch(1, 0 if is_small else 2)
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
+        policy = QSizePolicy.Policy
+        # Beside the numbers it is as high as they are; the plots have the rest.
+        down = policy.Preferred if is_small else policy.Ignored
+        self._image.setSizePolicy(policy.Expanding, down)
         for each in (self._plots, self._image):
             each.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
             each.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)

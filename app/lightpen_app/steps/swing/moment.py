@@ -167,7 +167,7 @@ class SwingWords(QObject):
     def note(self, moment: Moment) -> str:
         """Return what the count leaves out: time, limit, and what was of no use."""
         limit = moment.setup.limits.max_images
-        text = self.tr("at most {0} images are taken").format(limit)
+        text = self.tr("at most {0} images").format(limit)
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
