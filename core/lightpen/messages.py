@@ -68,9 +68,6 @@ UNKNOWN = sentence(
     "The images do not tell yet where the tip is. Lean the pen to all sides.",
 )
 
-LED_FILE = sentence("file.leds", "LED file")
-INTRINSICS_FILE = sentence("file.intrinsics", "intrinsics file")
-
 # By the directions of the dial, as the camera sees them: against the clock from above.
 SIDES = (
     sentence("side.right", "to the right"),
@@ -175,23 +172,15 @@ def uncertain(uncertainty: float, limit: float) -> Sentence:
     )
 
 
-def cannot_get_below(floor: float, limit: float, *, by_intrinsics: bool) -> Sentence:
-    """Tell that U (k = 2) stays above its limit whatever is captured, mm.
-
-    Parameters
-    ----------
-    by_intrinsics : bool
-        Whether that is for what the intrinsics file leaves open, not the LED file.
-    """
-    file = INTRINSICS_FILE if by_intrinsics else LED_FILE
+def cannot_get_below(floor: float, limit: float) -> Sentence:
+    """Tell that U (k = 2) stays above its limit whatever is captured, mm."""
     return sentence(
         Code.OUT_OF_REACH,
-        "U (k = 2) cannot get below {floor:.1f} \N{MICRO SIGN}m with this {file}; the "
-        "limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than the "
+        "U (k = 2) cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file; "
+        "the limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than the "
         "postures need.",
         floor=1000 * floor,
         limit=1000 * limit,
-        file=file,
     )
 
 

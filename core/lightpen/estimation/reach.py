@@ -14,14 +14,8 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import BundleState, eliminate, views_at
 from lightpen.estimation.priors import priors_of
-from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
-from lightpen.estimation.unknowns import (
-    FORMS,
-    NO_COMPONENTS,
-    Columns,
-    Unknowns,
-    inverse,
-)
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.unknowns import FORMS, NO_COMPONENTS, Unknowns, inverse
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -40,14 +34,12 @@ class Reached:
     uncertainty : float
         U (k = 2) along the weakest direction, mm; infinite until it is known.
     floor : float
-        What more images of this kind cannot bring it below, mm.
-    floor_share : ShareName
-        What makes up the most of the floor.
+        What more images of this kind cannot bring it below, mm: what the LED file
+        leaves open, as the images themselves tell of the camera.
     """
 
     uncertainty: float = float("inf")
     floor: float = 0.0
-    floor_share: ShareName = ShareName.LEDS
 
 
 NOT_REACHED = Reached()
@@ -87,19 +79,11 @@ class Reach:
         n = mixing.shape[1]
         prior = unknowns.prior_information(NO_COMPONENTS)[:n, :n]
         known = mixing.T @ self.information @ mixing / sigma**2
-        now = inverse(known + prior)
-        at_last = inverse(ENDLESS * known + prior)
-        variances, directions = np.linalg.eigh(at_last[:3, :3])
-        by_all = directions[:, -1] @ at_last[:3]
-        by_each = {
-            name: sum(float(by_all[at] @ prior[at, at] @ by_all[at]) for at in places)
-            for name, places in _of_files(unknowns.columns).items()
-        }
-        return Reached(
-            uncertainty=COVERAGE_FACTOR * sqrt(np.linalg.eigvalsh(now[:3, :3])[-1]),
-            floor=COVERAGE_FACTOR * sqrt(variances[-1]),
-            floor_share=max(by_each, key=by_each.__getitem__),
+        now, at_last = (
+            float(np.linalg.eigvalsh(inverse(times * known + prior)[:3, :3])[-1])
+            for times in (1.0, ENDLESS)
         )
+        return Reached(COVERAGE_FACTOR * sqrt(now), COVERAGE_FACTOR * sqrt(at_last))
 
 
 def reach_of(
@@ -125,17 +109,6 @@ def reach_of(
         return Reach(_counted(camera, pen, pixels, joint, 0), n_images, n_images)
     fresh = _counted(camera, pen, pixels, joint, before.n_images)
     return replace(before, information=before.information + fresh, n_images=n_images)
-
-
-def _of_files(at: Columns) -> dict[ShareName, tuple[slice, ...]]:
-    """Return where the unknowns stand of which the files say something."""
-    return {
-        ShareName.LEDS: (at.leds,),
-        ShareName.SCALE: (at.scale,),
-        ShareName.DIAMETER: (at.diameter,),
-        ShareName.CAMERA: at.cameras,
-        ShareName.EXTRINSICS: (at.extrinsics,),
-    }
 
 
 def _counted(

@@ -7,7 +7,6 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.sighting import Sighting
-from lightpen.estimation.uncertainty import ShareName
 from lightpen.messages import (
     UNKNOWN,
     cannot_get_below,
@@ -119,11 +118,7 @@ def out_of_reach(limits: SwingLimits, state: SwingState) -> Sentence | None:
     reached = state.kept.reached
     if reached.floor < limits.max_uncertainty:
         return None
-    return cannot_get_below(
-        reached.floor,
-        limits.max_uncertainty,
-        by_intrinsics=reached.floor_share in (ShareName.CAMERA, ShareName.EXTRINSICS),
-    )
+    return cannot_get_below(reached.floor, limits.max_uncertainty)
 
 
 def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:

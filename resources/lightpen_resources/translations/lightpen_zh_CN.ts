@@ -2406,10 +2406,6 @@
         <translation>LED 中心</translation>
     </message>
     <message>
-        <source>LED file</source>
-        <translation>LED 文件</translation>
-    </message>
-    <message>
         <source>LED {led} is listed already on line {line}.</source>
         <translation>LED {led} 已在第 {line} 行列出。</translation>
     </message>
@@ -2846,14 +2842,6 @@
         <translation>正在计算测头。请把光笔放在手边。</translation>
     </message>
     <message>
-        <source>U (k = 2) cannot get below {floor:.1f} µm with this {file}; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
-        <translation>使用此{file}，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
-    </message>
-    <message>
-        <source>intrinsics file</source>
-        <translation>内参文件</translation>
-    </message>
-    <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
@@ -3052,6 +3040,10 @@
     <message>
         <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
         <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
+        <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. Capture more images in postures that differ.</source>
