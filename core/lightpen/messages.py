@@ -177,8 +177,8 @@ def cannot_get_below(floor: float, limit: float) -> Sentence:
     return sentence(
         Code.OUT_OF_REACH,
         "U (k = 2) cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file; "
-        "the limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than the "
-        "postures need.",
+        "the limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than "
+        "the postures need.",
         floor=1000 * floor,
         limit=1000 * limit,
     )

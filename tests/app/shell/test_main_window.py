@@ -319,20 +319,6 @@ def test_every_control_has_a_name_for_screen_readers(shell: Shell) -> None:
         assert button.accessibleName() or button.text()
 
 
-def test_space_pauses_wherever_the_focus_is_while_the_hands_are_at_the_pen(
-    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
-) -> None:
-    page = shell.pages[0]
-    page.hands_free = True
-    page.changed.emit()
-    page.button.setFocus()
-
-    with qtbot.assertNotEmitted(page.button.clicked):
-        press(Key.Key_Space)
-
-    assert page.log == ["entered", "pause"]
-
-
 def test_space_presses_buttons_on_other_pages(
     shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
 ) -> None:
