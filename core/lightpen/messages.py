@@ -41,6 +41,7 @@ class Code(StrEnum):
     FILE_UNCERTAIN = "verdict.file-uncertain"
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
+    NOT_SIMULTANEOUS = "verdict.not-simultaneous"
     OUT_OF_REACH = "swing.out-of-reach"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"

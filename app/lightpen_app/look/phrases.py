@@ -76,6 +76,7 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
+    Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
     Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),

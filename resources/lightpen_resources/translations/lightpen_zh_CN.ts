@@ -2058,10 +2058,6 @@
         <translation>没有摆动</translation>
     </message>
     <message>
-        <source>at most {0} images</source>
-        <translation>最多 {0} 幅图像</translation>
-    </message>
-    <message>
         <source>{0}; {1} dropped</source>
         <translation>{0}；已丢弃 {1} 幅</translation>
     </message>
@@ -2188,6 +2184,10 @@
     <message>
         <source>It begins as soon as the step Swing is shown at the screen.</source>
         <translation>屏幕上显示“摆动”步骤后即开始。</translation>
+    </message>
+    <message>
+        <source>at most {0} images</source>
+        <translation>最多 {0} 幅图像</translation>
     </message>
     <message>
         <source>The tip is used from now on.</source>
@@ -2838,8 +2838,60 @@
         <translation>残差过大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于此相机、镜头和对焦，LED 文件是否属于此光笔。</translation>
     </message>
     <message>
+        <source>The rig file has camera {camera} {angle:.1f} degrees and {distance:.0f} mm away from where the images put it.</source>
+        <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
+    </message>
+    <message>
         <source>The tip is being computed. Keep the pen at hand.</source>
         <translation>正在计算测头。请把光笔放在手边。</translation>
+    </message>
+    <message>
+        <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
+        <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
+        <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
+    </message>
+    <message>
+        <source>camera {number} of {name}</source>
+        <translation>{name} 中的第 {number} 台相机</translation>
+    </message>
+    <message>
+        <source>cameras in {name} is no list of 2 to {most} cameras. One camera alone needs no rig file.</source>
+        <translation>{name} 中的 cameras 不是 2 至 {most} 台相机的列表。单台相机不需要相机组文件。</translation>
+    </message>
+    <message>
+        <source>centimetres</source>
+        <translation>厘米</translation>
+    </message>
+    <message>
+        <source>further turn of cam_from_rig about {axis}</source>
+        <translation>cam_from_rig 绕 {axis} 轴的附加转角</translation>
+    </message>
+    <message>
+        <source>inches</source>
+        <translation>英寸</translation>
+    </message>
+    <message>
+        <source>metres</source>
+        <translation>米</translation>
+    </message>
+    <message>
+        <source>micrometres</source>
+        <translation>微米</translation>
+    </message>
+    <message>
+        <source>no image</source>
+        <translation>无图像</translation>
+    </message>
+    <message>
+        <source>not of the same moment</source>
+        <translation>不是同一时刻</translation>
+    </message>
+    <message>
+        <source>rig file</source>
+        <translation>相机组文件</translation>
     </message>
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
@@ -3040,10 +3092,6 @@
     <message>
         <source>Turn its LEDs to the camera; nothing is lost meanwhile.</source>
         <translation>把 LED 转向相机；期间不会丢失任何数据。</translation>
-    </message>
-    <message>
-        <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
-        <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
     </message>
     <message>
         <source>U (k = 2) of the tip is {uncertainty:.4f} mm, the limit {limit:.4f} mm. Capture more images in postures that differ.</source>
