@@ -247,8 +247,6 @@ def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
     assert chosen.pen_file is not None
     chosen.pen_file.path.unlink()
     stage.start_again()
-    stage.sentences.clear()
-    stage.choose_station(OTHER.station)
     assert stage.sentences
 
     with qtbot.waitSignal(stage.workbench.relieved) as relieved:
