@@ -156,6 +156,19 @@ def _result_is_one(data: Path, told: list[str]) -> bool:
     return not told or (x == y and x >= float(told[-1]))
 
 
+def _taken_back_is_one_step(data: Path, told: list[str]) -> bool:
+    """Check that the tip that stays is in force, or the one beside it, as was told."""
+    found = FolderArchive(data).in_force(NAMES.pen, NAMES.tip)
+    if found is None:
+        return False
+    x, y, _ = found.tip_pen.tolist()
+    last = int(told[-1]) if told else 0
+    stays = bool(x > 0)  # others are negative
+    if last < 0:  # put in force; taking it back may have been under way
+        return stays or bool(x == y == last)
+    return stays or bool(x == y < 0)  # the next may be in force by now
+
+
 def _settings_are_one(data: Path, told: list[str]) -> bool:
     loaded = load(data / "lightpen.json")
     if loaded.trouble is not None:
@@ -179,6 +192,7 @@ CHECKS: dict[str, Check] = {
     "resume": _swings_are_whole,
     "take out": _taken_out_is_one_edit,
     "accept": _result_is_one,
+    "take back": _taken_back_is_one_step,
     "settings": _settings_are_one,
     "json": _json_is_one,
 }

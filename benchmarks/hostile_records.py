@@ -27,6 +27,7 @@ from benchmarks.rows import Row, table
 from lightpen.errors import LightpenError
 from lightpen.estimation.verdict import Grade
 from lightpen.live.sources import Surroundings, sample_files
+from lightpen.model.origin import Origin
 from lightpen.record.archive import Archive
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.journal import JOURNAL
@@ -178,6 +179,7 @@ def _result(x: float, swing: Path) -> Result:
         grade=Grade.PASS,
         record=swing,
         images=tuple(range(1, N_IMAGES + 1)),
+        origin=Origin.LIVE,
         calibration={
             "tip_pen_mm": [x / 3, -90.0 / 7, -25.0 / 3],
             "expanded_uncertainty_mm": [0.001, 0.004 / 3, 0.005 / 3],

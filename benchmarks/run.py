@@ -27,6 +27,7 @@ from benchmarks.rows import NEEDS_DATA, Row, table
 from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
+from benchmarks.verification import verification_rows
 from benchmarks.whole_program import program_rows
 from benchmarks.wizard import idle_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
@@ -45,6 +46,7 @@ SECTIONS: dict[str, Section] = {
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
     "tracker": tracker_rows,
+    "verify": verification_rows,
     "speed": lambda workers, data: speed_rows(workers),
     "program": lambda workers, data: program_rows(data),
     "guided": lambda workers, data: guided_rows(workers),

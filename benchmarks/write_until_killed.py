@@ -80,6 +80,24 @@ def accept(data: Path) -> None:
         tell(n)
 
 
+def take_back(data: Path) -> None:
+    """Put a tip in force beside one that stays, and take it back, again and again."""
+    archive = FolderArchive(data)
+    before = archive.in_force(NAMES.pen, NAMES.tip)
+    assert before is not None
+    if before.tip_pen[0] < 0:  # killed before it was taken back
+        archive.take_back(before, "Ann", before.accepted)
+        before = archive.in_force(NAMES.pen, NAMES.tip)
+        assert before is not None
+    for n in count(1):
+        tip = {"tip_pen_mm": [-float(n), -float(n), 0.0]}
+        result = replace(before, calibration={**before.calibration, **tip})
+        archive.store(result)
+        tell(-n)
+        archive.take_back(result, "Ann", before.accepted)
+        tell(0)
+
+
 def settings(data: Path) -> None:
     """Write two settings that must agree."""
     file = data / "lightpen.json"
@@ -103,6 +121,7 @@ KINDS: dict[str, Callable[[Path], None]] = {
     "resume": resume,
     "take out": take_out,
     "accept": accept,
+    "take back": take_back,
     "settings": settings,
     "json": write_json,
 }

@@ -33,7 +33,8 @@ from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, seale
 from lightpen.detection.sighting import look, sight_centers
 from lightpen.live.looking import LiveImage
 from lightpen.live.sources import Surroundings, sample_files
-from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import RECORDS, SIMULATED, FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.writing import RecordWriter
@@ -57,7 +58,6 @@ from lightpen_app.look.theme import GRID, Appearance
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.settings import Preferences, Settings
-from lightpen_app.work.workbench import SAMPLES
 
 FOLDER = Path(__file__).resolve().parent / "screens"
 DATA = Path("lightpen")  # below the present folder
@@ -120,7 +120,7 @@ class Stage:
         around = Surroundings(self._scene, SkippingClock(), lambda: NOW)
         self.wizard = Wizard(application, make_pages, settings, DATA, around)
         workbench = self._workbench = self.wizard.workbench
-        files = sample_files(around, DATA / SAMPLES)
+        files = sample_files(around, DATA / SIMULATED)
         workbench.set_preparation(
             replace(
                 workbench.preparation,
@@ -265,6 +265,7 @@ def _earlier_result() -> Result:
             "cone_cam_mm": [0.0, 0.0, 1000.0],
             "covariance": np.diag(6 * [0.001**2]).tolist(),
         },
+        origin=Origin.SIMULATED,
     )
 
 

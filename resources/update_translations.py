@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TRANSLATIONS = ROOT / "resources" / "lightpen_resources" / "translations"
 APPLICATION = ROOT / "app" / "lightpen_app"
 CORE = ROOT / "core" / "lightpen"
-COMMAND_LINE = CORE / "cli.py"  # speaks English
+COMMAND_LINE = (CORE / "cli.py", *(CORE / "commands").glob("*.py"))  # speaks English
 CORE_CONTEXT = "core"
 OPTIONS = {
     "lightpen_zh_CN.ts": [],
@@ -70,7 +70,7 @@ def _marked(sources: Iterable[Path]) -> str:
     found = {
         text
         for path in sources
-        if path != COMMAND_LINE
+        if path not in COMMAND_LINE
         for text in templates(path.read_text("utf-8"))
     }
     return "".join(

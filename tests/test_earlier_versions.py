@@ -37,7 +37,7 @@ def tips(version_0_1: Path) -> dict[str, Any]:
 def test_the_result_is_in_force_and_finds_its_record_though_that_has_moved(
     data: Path, tips: dict[str, Any]
 ) -> None:
-    found = FolderArchive(data).in_force("LP-04", "T-10")
+    found = FolderArchive(data).in_force("LP-04", "T-10", is_simulated=True)
 
     assert found is not None
     assert (found.names, found.grade) == (NAMES, "check")
@@ -92,11 +92,29 @@ def test_a_tip_accepted_now_takes_the_place_of_the_earlier_one_and_keeps_it(
     content = earlier.read_bytes()
     solution = solve_record(open_record(data / RECORDS / ACCEPTED))
 
-    result = accept(archive, solution, datetime.now(UTC))
+    result = accept(archive, solution, datetime.now(UTC), "As before.")
 
-    found = archive.in_force("LP-04", "T-10")
+    found = archive.in_force("LP-04", "T-10", is_simulated=True)
     assert found is not None
     assert found.accepted == result.accepted
     assert found.images == (1, 2, 3, *range(5, 15))
-    assert sorted(archive.folder.iterdir())[0] == earlier
+    assert list(archive.folder.iterdir()) == [earlier]
     assert earlier.read_bytes() == content
+
+
+def test_an_earlier_result_of_a_simulated_swing_is_in_force_for_no_pen(
+    data: Path,
+) -> None:
+    assert FolderArchive(data).in_force("LP-04", "T-10") is None
+    assert FolderArchive(data).tips("LP-04") == ()
+    assert FolderArchive(data).tips("LP-04", is_simulated=True) == ("T-10",)
+
+
+def test_an_earlier_result_whose_swing_is_gone_stays_in_force_and_says_nothing_of_it(
+    data: Path,
+) -> None:
+    shutil.rmtree(data / RECORDS)
+    found = FolderArchive(data).in_force("LP-04", "T-10")
+
+    assert found is not None
+    assert found.origin is None

@@ -335,3 +335,28 @@ def test_a_folder_that_is_no_record_still_needs_its_files(
 
     assert outcome.returncode == 2
     assert "--camera FILE is missing. Only a record needs none." in outcome.stderr
+
+
+@pytest.mark.parametrize(
+    ("said", "origin", "line"),
+    [
+        ("live camera", "live camera", "Origin       LIVE CAMERA"),
+        ("recorded", "recorded", "Origin       RECORDED"),
+        ("simulated", "simulated", "SIMULATED: this is the tip of no real pen"),
+        ("of a later version", None, None),
+    ],
+)
+def test_what_the_images_are_of_is_told(
+    calibrated: Calibrated,
+    folder: Path,
+    rewrite_header: Callable[..., None],
+    said: str,
+    origin: str | None,
+    line: str | None,
+) -> None:
+    rewrite_header(folder, {"origin": said})
+    fields, text = calibrated(folder)
+
+    assert fields["origin"] == origin
+    assert ("Origin " in text) is (line is not None)
+    assert line is None or line in text

@@ -28,7 +28,7 @@ from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import Mute, Sounds, find_sounds
-from lightpen_app.look.theme import apply_theme, colors_for, load_fonts
+from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
 from lightpen_app.steps.page import Page
 from lightpen_app.work.garbage import GarbageCollector
@@ -68,6 +68,7 @@ class Wizard(QObject):
         self._application = application
         self._settings = settings
         self._preferences = settings.preferences()
+        self._others_told = ""
         self._languages = LanguageSwitch(application)
         self._languages.set_language(self._preferences.language)
         load_fonts()
@@ -86,10 +87,23 @@ class Wizard(QObject):
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
+        self.workbench.others_counted.connect(self._on_others_counted)
+        self.workbench.subject_changed.connect(self.window.set_subject)
         self.workbench.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
+
+    def _on_others_counted(self, n_others: int) -> None:
+        """Say that other windows use the same data folder, while they do."""
+        self.window.drop_notice(self._others_told)
+        self._others_told = ""
+        if n_others:
+            self._others_told = self.tr(
+                "Other windows of the program use the data folder {0}. All of them put "
+                "their tips in force there."
+            ).format(self.workbench.folder)
+            self.window.show_notice(self._others_told, Tone.WARN)
 
     def _on_preferences_changed(self, preferences: Preferences) -> None:
         before, self._preferences = self._preferences, preferences
@@ -136,7 +150,8 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
     application = make_application(arguments)
     with EndSignals(application) as signals:
         settings = Settings(settings_file())
-        wizard = Wizard(application, make_pages, settings, data_folder())
+        folder = data_folder(settings.preferences())
+        wizard = Wizard(application, make_pages, settings, folder)
         status = _shown(application, wizard, signals)
     return _ended(wizard, status)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from lightpen.estimation.verdict import Grade
 from lightpen.record.names import Names
 from lightpen.swing.state import Phase
 from lightpen_app.look.theme import Tone
@@ -93,7 +94,7 @@ class Demo(QObject):
         status = self._workbench.run.status
         if status.state is None or status.state.phase is not Phase.VERDICT:
             return False
-        return status.verdict is None or not status.verdict.can_be_accepted
+        return status.verdict is None or status.verdict.grade is not Grade.PASS
 
     def _enter(self, key: str) -> None:
         words = {

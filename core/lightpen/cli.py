@@ -1,17 +1,15 @@
-"""The command line: ``lightpen calibrate | simulate | pivot | pen``.
+"""The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
 
 Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable input.
 """
 
 import argparse
-import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import partial
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
@@ -21,29 +19,53 @@ import cv2
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.commands.arguments import add_pen_options, finite, whole_number
+from lightpen.commands.console import (
+    BAD_INPUT,
+    NO_TIP,
+    Command,
+    are_same,
+    lacking,
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.commands.pen_health import add_improve_pen
+from lightpen.commands.recalculate import add_recalculate
+from lightpen.commands.repeatability import add_repeatability
+from lightpen.commands.verify import add_verify
 from lightpen.detection.moments import observe_rig_centers, observe_rig_images
-from lightpen.detection.observations import observe_centers, observe_images
+from lightpen.detection.observations import (
+    Observations,
+    observe_centers,
+    observe_images,
+)
 from lightpen.errors import CalibrationError, LightpenError, UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.pivot_calibration import calibrate_pivot
+from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import (
     METHODS,
     calibration_record,
-    json_bytes,
     pivot_record,
 )
+from lightpen.estimation.second_cone import SecondSwing
 from lightpen.estimation.summary import calibration_text, pivot_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.files import printable, write_whole
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pairing import pair_images
-from lightpen.formats.pen_files import UNITS, read_pen, read_raw_pen, write_pen
+from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
 from lightpen.formats.rig_files import read_rig
+from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
+from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import DISC_DIAMETER, Pen
 from lightpen.record.reading import (
     is_record,
@@ -56,9 +78,8 @@ from lightpen.record.reading import (
 from lightpen.record.solving import record_inputs, solve_record
 from lightpen.sentences import Sentence, sentence
 
-DONE, NO_TIP, BAD_INPUT = 0, 1, 2
-BAR_WIDTH = 72  # characters
 LARGEST_SHARE = 0.1
+COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
@@ -82,7 +103,6 @@ ADVICE = {
 
 
 ShowWindow: TypeAlias = Callable[[bool], int]
-Command: TypeAlias = Callable[[argparse.Namespace], int]
 
 
 def main(
@@ -125,17 +145,12 @@ def main(
 def _complain(trouble: Sentence) -> None:
     """Print what is wrong, and what to type about it."""
     advice = [ADVICE[each.code] for each in trouble.parts() if each.code in ADVICE]
-    print(_shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
-
-
-def _shown(text: str) -> str:
-    """Return a text in which names of files say nothing to the terminal."""
-    return "\n".join(map(printable, text.split("\n")))
+    print(shown(" ".join(map(str, ["lightpen:", trouble, *advice]))), file=sys.stderr)
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        super().error(_shown(message))
+        super().error(shown(message))
 
 
 def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
@@ -160,6 +175,18 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     _add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
     _add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
     _add_pen(commands.add_parser("pen", help="put measured LEDs into the pen frame"))
+    add_verify(commands.add_parser("verify", help="prove a tip by touching"))
+    add_repeatability(
+        commands.add_parser("repeatability", help="compare calibrations of one tip")
+    )
+    add_recalculate(
+        commands.add_parser(
+            "recalculate", help="solve calibrations again, and check U by Monte Carlo"
+        )
+    )
+    add_improve_pen(
+        commands.add_parser("improve-pen", help="a better LED file by several swings")
+    )
     return parser
 
 
@@ -188,7 +215,7 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         "FILE.csv) is then one of each camera, in the order of this file",
     )
     parser.add_argument("--pen", type=Path, metavar="FILE")
-    _add_pen_options(parser)
+    add_pen_options(parser)
     parser.add_argument(
         "--camera-sigma",
         type=_share,
@@ -203,9 +230,50 @@ def _add_calibrate(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty of the pen's scale, such as 20e-6, where the pen "
         "file states none",
     )
+    parser.add_argument(
+        "--temperature",
+        type=_temperature,
+        metavar="CELSIUS",
+        help="of the pen during the swing, which makes it larger than its file says",
+    )
+    parser.add_argument(
+        "--temperature-sigma",
+        type=_positive,
+        metavar="K",
+        help="its standard uncertainty (0.5), or without --temperature how much warmer "
+        "than at its measurement the pen may be (1.5)",
+    )
+    parser.add_argument(
+        "--form-error",
+        type=_positive,
+        metavar="MM",
+        help="standard uncertainty of where the ball sits, as ball and cone are not "
+        "quite round (0.0002)",
+    )
+    parser.add_argument(
+        "--center-bias",
+        type=_positive,
+        metavar="PX",
+        help="standard uncertainty of LED centres that does not average out (0.003)",
+    )
+    parser.add_argument(
+        "--second-cone",
+        metavar="IMAGES",
+        help="images of a swing in a second cone, in the form of those of the first; "
+        "the camera must not have moved",
+    )
+    parser.add_argument(
+        "--distance", type=_positive, metavar="MM", help="of the two cones"
+    )
+    parser.add_argument(
+        "--distance-sigma",
+        type=_positive,
+        metavar="MM",
+        help="its standard uncertainty",
+    )
     parser.add_argument("--method", choices=METHODS, default="joint")
     parser.add_argument(
-        "--nominal-tip", type=_finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+        "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
 
@@ -214,7 +282,7 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_simulate)
     parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
     parser.add_argument("--images", type=_n_images, default=60, metavar="N")
-    parser.add_argument("--seed", type=_whole_number, default=0, metavar="S")
+    parser.add_argument("--seed", type=whole_number, default=0, metavar="S")
     parser.add_argument(
         "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
     )
@@ -264,14 +332,8 @@ def _add_simulate(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _whole_number(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more.")
-    return int(text)
-
-
 def _led_diameter(text: str) -> float:
-    diameter = _finite(text)
+    diameter = finite(text)
     if not MIN_LED_DIAMETER <= diameter <= MAX_LED_DIAMETER:
         raise argparse.ArgumentTypeError(
             f"{text} mm is no diameter from {MIN_LED_DIAMETER:g} to "
@@ -281,7 +343,7 @@ def _led_diameter(text: str) -> float:
 
 
 def _blur(text: str) -> float:
-    sigma = _finite(text)
+    sigma = finite(text)
     if not MIN_BLUR <= sigma <= MAX_BLUR:
         raise argparse.ArgumentTypeError(
             f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
@@ -290,7 +352,7 @@ def _blur(text: str) -> float:
 
 
 def _baseline(text: str) -> float:
-    baseline = _finite(text)
+    baseline = finite(text)
     if not MIN_BASELINE <= baseline <= MAX_BASELINE:
         raise argparse.ArgumentTypeError(
             f"{text} mm is no baseline from {MIN_BASELINE:g} to {MAX_BASELINE:g} mm."
@@ -299,7 +361,7 @@ def _baseline(text: str) -> float:
 
 
 def _n_images(text: str) -> int:
-    number = _whole_number(text)
+    number = whole_number(text)
     if number == 0:
         raise argparse.ArgumentTypeError("at least one image is needed.")
     if number > MAX_RENDERED:
@@ -307,19 +369,25 @@ def _n_images(text: str) -> int:
     return number
 
 
-def _finite(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise argparse.ArgumentTypeError(f"{text} is not a number.")
+def _positive(text: str) -> float:
+    number = finite(text)
+    if not number > 0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0.")
+    return number
+
+
+def _temperature(text: str) -> float:
+    number = finite(text)
+    if not COLDEST <= number <= WARMEST:
+        raise argparse.ArgumentTypeError(
+            f"{text} is no temperature from {COLDEST:g} to {WARMEST:g} degrees Celsius."
+        )
     return number
 
 
 def _share(text: str) -> float:
     """Return a part of one, which may be given in per cent."""
-    number = _finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    number = finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
     if not 0 < number <= LARGEST_SHARE:
         raise argparse.ArgumentTypeError(
             f"{text} is not a share above 0 and up to {LARGEST_SHARE:.0%}."
@@ -333,7 +401,32 @@ def _assumptions(options: argparse.Namespace) -> Assumptions:
         assumed = with_focal_length(assumed, options.camera_sigma)
     if options.scale_sigma is not None:
         assumed = replace(assumed, scale=options.scale_sigma)
+    if options.temperature is not None:
+        assumed = replace(assumed, temperature_c=options.temperature)
+    if options.temperature_sigma is not None:
+        which = "warmth" if options.temperature is None else "temperature"
+        assumed = replace(assumed, **{which: options.temperature_sigma})
+    if options.form_error is not None:
+        assumed = replace(assumed, form_error=options.form_error)
+    if options.center_bias is not None:
+        assumed = replace(assumed, center_bias=options.center_bias)
     return assumed
+
+
+def _separation(options: argparse.Namespace) -> Separation | None:
+    """Return the distance of two cones, if there are two."""
+    given = (options.second_cone, options.distance, options.distance_sigma)
+    if all(each is None for each in given):
+        return None
+    if any(each is None for each in given):
+        raise UsageError(
+            sentence(
+                "cli.second-cone",
+                "A second cone needs three options: --second-cone IMAGES, --distance "
+                "MM and --distance-sigma MM. Give all or none.",
+            )
+        )
+    return Separation(options.distance, options.distance_sigma)
 
 
 def _add_pivot(parser: argparse.ArgumentParser) -> None:
@@ -349,49 +442,7 @@ def _add_pen(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_pen)
     parser.add_argument("raw", type=Path, metavar="RAW.csv")
     parser.add_argument("out", type=Path, metavar="OUT.csv")
-    _add_pen_options(parser)
-
-
-def _add_pen_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--units", choices=sorted(UNITS), help="of a pen file that does not say"
-    )
-    parser.add_argument(
-        "--led-diameter",
-        type=_finite,
-        metavar="MM",
-        help="of the LED discs, where the pen file does not say (10)",
-    )
-
-
-def _printing(command: Callable[[argparse.Namespace], None]) -> Command:
-    """Give a command an exit status also where its output cannot be written."""
-
-    @wraps(command)
-    def run(options: argparse.Namespace) -> int:
-        try:
-            command(options)
-            if sys.stdout is not None:
-                sys.stdout.flush()
-        except BrokenPipeError:  # its reader has seen enough
-            _drop_output()
-        except OSError as error:  # files have errors of their own: this is our output
-            _drop_output()
-            print(
-                f"lightpen: The result cannot be printed: {error.strerror}. Free some "
-                "space, or print it elsewhere.",
-                file=sys.stderr,
-            )
-            return BAD_INPUT
-        return DONE
-
-    return run
-
-
-def _drop_output() -> None:
-    """Keep what is not printed yet from failing again as the program ends."""
-    if sys.stdout is not None:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    add_pen_options(parser)
 
 
 @dataclass(frozen=True, eq=False)
@@ -401,10 +452,11 @@ class _Calibrated:
     calibration: Calibration
     nominal_tip: FloatArray | None
     limits: SwingLimits
+    origin: Origin | None
     inputs: Callable[[], Inputs]
 
 
-@_printing
+@printing
 def _calibrate(options: argparse.Namespace) -> None:
     if bool(options.images) == (options.centers is not None):
         raise UsageError(
@@ -414,7 +466,7 @@ def _calibrate(options: argparse.Namespace) -> None:
             )
         )
     inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
-    _require_other_file(options.json, *inputs)
+    require_other_file(options.json, *inputs)
     if len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
     elif options.rig is not None:
@@ -424,14 +476,15 @@ def _calibrate(options: argparse.Namespace) -> None:
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        calibration, options.method, calibrated.nominal_tip, verdict
+        *(calibration, options.method, calibrated.nominal_tip, verdict),
+        calibrated.origin,
     )
-    print(_shown(text))
+    print(shown(text))
     if options.json is not None:
         record = calibration_record(
             calibration, calibrated.inputs(), options.method, calibrated.limits
         )
-        write_whole(options.json, json_bytes(record))
+        write_record(options.json, record)
 
 
 def _from_record(options: argparse.Namespace) -> _Calibrated:
@@ -445,6 +498,13 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         "--nominal-tip": options.nominal_tip,
         "--camera-sigma": options.camera_sigma,
         "--scale-sigma": options.scale_sigma,
+        "--temperature": options.temperature,
+        "--temperature-sigma": options.temperature_sigma,
+        "--form-error": options.form_error,
+        "--center-bias": options.center_bias,
+        "--second-cone": options.second_cone,
+        "--distance": options.distance,
+        "--distance-sigma": options.distance_sigma,
     }
     given = [name for name, value in own.items() if value is not None]
     if given:
@@ -458,14 +518,15 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
             )
         )
     record = open_record(folder)
-    _require_other_file(options.json, *record_files(record))
+    require_other_file(options.json, *record_files(record))
     _note_unacknowledged(unacknowledged_images(record))
-    with _progress("Finding LEDs") as report:
+    with progress("Finding LEDs") as report:
         solution = solve_record(record, report)
     return _Calibrated(
         solution.calibration,
         solution.source.pen.nominal_tip,
         recorded_limits(record),
+        solution.source.origin,
         lambda: record_inputs(solution.source),
     )
 
@@ -500,20 +561,14 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
 
 
 def _note(note: Sentence) -> None:
-    print(_shown(f"lightpen: {note}"), file=sys.stderr)
+    print(shown(f"lightpen: {note}"), file=sys.stderr)
 
 
 def _lacking(option: str, images: Sequence[str]) -> UsageError:
     """Return that an option is missing, and why the images are not a record."""
     missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
     if not missing:
-        return UsageError(
-            sentence(
-                "cli.option-missing",
-                "{option} FILE is missing. Only a record needs none.",
-                option=option,
-            )
-        )
+        return lacking(option)
     return UsageError(
         sentence(
             "cli.part-of-record-missing",
@@ -533,30 +588,41 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
             raise _lacking(name, options.images)
     camera = read_camera(options.camera)
     pen = _read_pen(options)
+    separation = _separation(options)
     if options.centers is not None:
         _require_one_each(options.centers, 1, RIG_NEEDED)
-        centers = read_centers(options.centers[0], pen.n_leds)
-        files: tuple[Path, ...] = tuple(options.centers)
-        observations = observe_centers(centers, camera, pen)
+        given = [str(options.centers[0])]
     else:
         if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
             _require_one_each(options.images, 1, RIG_NEEDED)
-        source = find_images(*options.images)
-        files = source.files
-        _require_other_file(options.json, *files)
-        with _progress("Finding LEDs") as report:
-            observations = observe_images(source, camera, pen, report)
+        given = options.images
+    observe = partial(
+        _observe, options.json, camera, pen, is_centers=options.centers is not None
+    )
+    observations, files = observe(given)
+    second = None
+    if separation is not None:
+        others, more_files = observe([options.second_cone])
+        second, files = SecondSwing(others, separation), files + more_files
+    origin = _origin(options.camera, options.pen, *files)
     return _Calibrated(
-        calibrate(camera, pen, observations, _assumptions(options)),
+        calibrate(camera, pen, observations, _assumptions(options), second),
         pen.nominal_tip,
         SwingLimits(),
+        origin,
         lambda: Inputs(
             camera=hashed(options.camera),
             pen=hashed(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
+            origin=origin,
         ),
     )
+
+
+def _origin(*files: Path) -> Origin:
+    """Return what a calibration from files is of."""
+    return Origin.SIMULATED if any(map(is_simulated, files)) else Origin.RECORDED
 
 
 def _read_pen(options: argparse.Namespace) -> Pen:
@@ -595,9 +661,9 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         _require_other_names(options.images, rig.names)
         sources = [find_images(place) for place in options.images]
         files = tuple(file for source in sources for file in source.files)
-        _require_other_file(options.json, *files, *rig_file.camera_files)
+        require_other_file(options.json, *files, *rig_file.camera_files)
         pairing = pair_images([source.names for source in sources], rig.names)
-        with _progress("Finding LEDs") as report:
+        with progress("Finding LEDs") as report:
             observations = observe_rig_images(sources, pairing, rig, pen, report)
     if pairing.by_order:
         _note(
@@ -607,16 +673,19 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
                 "first of each camera are taken as one moment, and so on.",
             )
         )
+    origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
     return _Calibrated(
         calibrate_rig(rig, pen, observations, _assumptions(options)),
         pen.nominal_tip,
         SwingLimits(),
+        origin,
         lambda: Inputs(
             camera=hashed(rig_file.camera_files[0]),
             pen=hashed(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
             rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
+            origin=origin,
         ),
     )
 
@@ -657,7 +726,27 @@ def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-@_printing
+def _observe(
+    record: Path | None,
+    camera: Camera,
+    pen: Pen,
+    given: Sequence[str],
+    *,
+    is_centers: bool,
+) -> tuple[Observations, tuple[Path, ...]]:
+    """Return what images or a file of centres show, and the files of it."""
+    if is_centers:
+        path = Path(given[0])
+        require_other_file(record, path)
+        centers = read_centers(path, pen.n_leds)
+        return observe_centers(centers, camera, pen), (path,)
+    source = find_images(*given)
+    require_other_file(record, *source.files)
+    with progress("Finding LEDs") as report:
+        return observe_images(source, camera, pen, report), source.files
+
+
+@printing
 def _simulate(options: argparse.Namespace) -> None:
     # Imported here as the simulator is not needed to calibrate.
     from lightpen.simulator.sample_pens import SAMPLE_PENS
@@ -678,7 +767,7 @@ def _simulate(options: argparse.Namespace) -> None:
         optics=replace(looks.optics, psf_sigma=options.blur),
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
-    with _progress("Rendering") as report:
+    with progress("Rendering") as report:
         if options.cameras == 1:
             x, y, z = write_scene(scene, options.out, report)
             written = f"{scene.n_images} images, camera.yaml"
@@ -691,22 +780,17 @@ def _simulate(options: argparse.Namespace) -> None:
                 "camera files, rig.json"
             )
     print(
-        _shown(
+        shown(
             f"{written}, leds.csv and the true answer (truth.json) are in "
             f"{options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} mm in the "
             "frame of leds.csv."
         )
     )
-    if options.led_diameter != DISC_DIAMETER:
-        print(
-            "leds.csv does not say the size of the LEDs: calibrate with "
-            f"--led-diameter {options.led_diameter:g}."
-        )
 
 
-@_printing
+@printing
 def _pivot(options: argparse.Namespace) -> None:
-    _require_other_file(options.json, options.poses)
+    require_other_file(options.json, options.poses)
     poses = read_poses(options.poses)
     calibration = calibrate_pivot(
         poses.rotations,
@@ -717,12 +801,12 @@ def _pivot(options: argparse.Namespace) -> None:
     print(pivot_text(calibration))
     if options.json is not None:
         record = pivot_record(calibration, hashed(options.poses), options.least_squares)
-        write_whole(options.json, json_bytes(record))
+        write_record(options.json, record)
 
 
-@_printing
+@printing
 def _pen(options: argparse.Namespace) -> None:
-    if _are_same(options.raw, options.out):
+    if are_same(options.raw, options.out):
         raise UsageError(
             sentence(
                 "cli.pen-over-raw",
@@ -733,43 +817,4 @@ def _pen(options: argparse.Namespace) -> None:
         )
     raw = read_raw_pen(options.raw, options.units, options.led_diameter)
     write_pen(raw, options.out)
-    print(_shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))
-
-
-def _require_other_file(record: Path | None, *inputs: Path | None) -> None:
-    """Refuse to write the record over one of the files that it is made from."""
-    if record is None:
-        return
-    for path in inputs:
-        if path is not None and _are_same(path, record):
-            raise UsageError(
-                sentence(
-                    "cli.json-over-input",
-                    "--json {record} would replace the input file of that name. "
-                    "Give the record another name.",
-                    record=str(record),
-                )
-            )
-
-
-def _are_same(one: Path, other: Path) -> bool:
-    if one.exists() and other.exists():
-        return one.samefile(other)
-    return os.path.realpath(one) == os.path.realpath(other)
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on a terminal, and nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda fraction: None
-        return
-    from tqdm import tqdm
-
-    layout = "{desc} {bar} {percentage:3.0f}%"
-    with tqdm(total=1.0, desc=title, bar_format=layout, ncols=BAR_WIDTH) as bar:
-
-        def report(fraction: float) -> None:
-            bar.update(fraction - bar.n)
-
-        yield report
+    print(shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))

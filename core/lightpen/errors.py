@@ -33,5 +33,9 @@ class CalibrationError(LightpenError):
     """The observations do not determine the calibration."""
 
 
+class AcceptanceError(LightpenError):
+    """The tip must not be put in force, or not as it was asked for."""
+
+
 class Cancelled(Exception):  # noqa: N818 - not an error
     """The user stopped the computation."""

@@ -26,6 +26,7 @@ class Code(StrEnum):
     PEN_LOST = "swing.pen-lost"
     PEN_LIFTED = "swing.pen-lifted"
     TIP_ELSEWHERE = "swing.tip-elsewhere"
+    IMAGES_READ = "swing.images-read"
     PAUSED = "swing.paused"
     SOLVING = "swing.solving"
     TOO_FEW_IMAGES = "verdict.too-few-images"
@@ -43,6 +44,8 @@ class Code(StrEnum):
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NOT_SIMULTANEOUS = "verdict.not-simultaneous"
     OUT_OF_REACH = "swing.out-of-reach"
+    TIP_CHANGED = "verdict.tip-changed"
+    LAST_UNKNOWN = "verdict.last-unknown"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
 
@@ -128,6 +131,16 @@ def tip_elsewhere(distance: float) -> Sentence:
         "It rests {distance:.2f} mm from where it was. Put it back into the cone; "
         "check that the cone is clamped.",
         distance=distance,
+    )
+
+
+def images_read(n_read: int, n_images: int) -> Sentence:
+    """Tell how many images of a recording are read."""
+    return sentence(
+        Code.IMAGES_READ,
+        "All recorded images are read, then the tip is computed.",
+        n_read=n_read,
+        n_images=n_images,
     )
 
 
@@ -227,24 +240,51 @@ def file_contradicted(why: Sentence) -> Sentence:
 
 def not_simultaneous(camera: str, lag: float) -> Sentence:
     """Tell by which part of the time between two images a camera is late."""
-    if lag > 0:
-        return sentence(
-            Code.NOT_SIMULTANEOUS,
-            "Camera {camera} takes its images some {lag:.2f} of the time between two "
-            "images later than the first camera. That moves the tip, and other "
-            "warnings may come of it. Trigger all cameras by one signal, or hold the "
-            "pen still for each image.",
-            camera=camera,
-            lag=lag,
-        )
     return sentence(
         Code.NOT_SIMULTANEOUS,
-        "Camera {camera} takes its images some {lag:.2f} of the time between two "
-        "images earlier than the first camera. That moves the tip, and other warnings "
-        "may come of it. Trigger all cameras by one signal, or hold the pen still for "
-        "each image.",
+        "Camera {camera} is out of step with the first camera by some {lag:.2f} of the "
+        "time between two images. That moves the tip, and other warnings may come of "
+        "it. Trigger all cameras by one signal, or hold the pen still for each image.",
         camera=camera,
-        lag=-lag,
+        lag=abs(lag),
+    )
+
+
+def tip_changed(
+    distance: float, date: str, axis: str, difference: float, uncertainty: float
+) -> Sentence:
+    """Tell that a tip is not where it was, beyond what U explains.
+
+    Parameters
+    ----------
+    distance : float
+        How far it is from there, mm.
+    date : str
+        Of the earlier result.
+    axis : str
+        Of the pen's frame, along which it is least explained.
+    difference, uncertainty : float
+        Along it, with U (k = 2) by both results, mm.
+    """
+    return sentence(
+        Code.TIP_CHANGED,
+        "The tip lies {distance:.4f} mm from that of {date}: along {axis} "
+        "{difference:.4f} mm, where U (k = 2) of both explains {uncertainty:.4f} mm. "
+        "Was it exchanged, bent, or mounted anew?",
+        distance=distance,
+        date=date,
+        axis=axis,
+        difference=difference,
+        uncertainty=uncertainty,
+    )
+
+
+def last_unknown(why: Sentence) -> Sentence:
+    """Tell that a tip cannot be compared with the one in force."""
+    return sentence(
+        Code.LAST_UNKNOWN,
+        "The tip cannot be compared with the one in force. {why}",
+        why=why,
     )
 
 

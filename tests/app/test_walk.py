@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 from lightpen.arrays import FloatArray
 from lightpen.live.sources import Surroundings
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.record.reading import open_record
 from lightpen.record.results import Result
 from lightpen.record.unfinished import find_unfinished
@@ -95,7 +96,8 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert not walker.main_button().isEnabled()
     for name, text in {**NAMES, **FEW}.items():
         walker.click_into(name, text)
-    assert walker.says("Pen LP-04  ·  Cone C-1")
+    walker.until_says("Pen\xa0LP-04  ·  Tip\xa0T-10  ·  Cone\xa0C-1")
+    assert walker.says("SIMULATED")
     walker.click("Continue to the camera")
 
     assert walker.title() == "Camera"
@@ -130,7 +132,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     ).all()
     walker.click("Accept")
 
-    walker.until_says("IN FORCE")
+    walker.until_says("PRACTICE KEPT")
     assert set(walker.steps().values()) == {"done", "now"}
     result = _result_on_disk(walker)
     assert result.grade == "pass"
@@ -177,7 +179,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     walker.tab_to("Accept")
     walker.press(Key.Key_Return)
 
-    walker.until_says("IN FORCE")
+    walker.until_says("PRACTICE KEPT")
     assert _result_on_disk(walker).names.operator == "Ann"
     walker.until(walker.main_button().isEnabled)
     walker.press(Key.Key_PageDown)
@@ -201,17 +203,23 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_tells("Choose the folder of the recorded images.")
     walker.click_into("Folder, record or video", str(folder))
     walker.press(Key.Key_Return)
-    walker.click_into("Intrinsics file", str(folder / "camera.yaml"))
-    walker.press(Key.Key_Return)
+    walker.until_says("RECORDED")
+    assert walker.says(
+        "Open the intrinsics file."
+    )  # those of the simulated pen are not
+    walker.until_says("Beside the images: camera.yaml and leds.csv")
+    walker.click("Use both")
     walker.until_tells("Fits the live images: 2448 x 2048")
     walker.until(walker.main_button().isEnabled)
+    assert not walker.offers("Use both")
     walker.click("Continue to the LEDs")
-    walker.click_into("LED file", str(folder / "leds.csv"))
-    walker.press(Key.Key_Return)
     walker.until_says("10 of 10 LEDs")
     walker.click("Continue to the swing")
 
     n_inputs = walker.n_inputs
+    walker.until_says("READING")
+    walker.until(lambda: bool(re.search(r"\d+ of 60 read", _told(walker))))
+    assert not walker.tells("Lean")
     walker.until_says("Review")
     walker.until(walker.main_button().isEnabled)
     assert walker.n_inputs == n_inputs
@@ -224,8 +232,12 @@ def test_a_recorded_swing_gives_its_tip(
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
     walker.until_says("IN FORCE")
+    assert walker.says("RECORDED")
     result = _result_on_disk(walker)
+    assert result.origin is Origin.RECORDED
     assert _calibrated(lightpen, Path(result.record)) == result.tip_pen.tolist()
+    names = [frame["file"] for frame in result.calibration["frames"]]
+    assert len(names) == 60
 
 
 def test_in_chinese_no_english_word_is_left(
@@ -334,9 +346,11 @@ def _read_out(walker: "Walker") -> ReadOut:
 
 
 def _result_on_disk(walker: "Walker") -> Result:
-    archive = walker.workbench.run.archive
-    assert len(list(archive.folder.glob("*.json"))) == 1
-    result = archive.in_force(NAMES["Pen, serial number"], NAMES["Probe tip"])
+    archive, folder = walker.workbench.run.archive, walker.workbench.folder
+    assert len(list(folder.rglob("results/*.json"))) == 1
+    is_simulated = walker.workbench.preparation.origin is Origin.SIMULATED
+    pen, tip = NAMES["Pen, serial number"], NAMES["Probe tip"]
+    result = archive.in_force(pen, tip, is_simulated=is_simulated)
     assert result is not None
     return result
 

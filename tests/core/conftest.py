@@ -13,7 +13,7 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
-from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.folder_archive import RESULTS, SIMULATED, FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.reading import open_record
 from lightpen.record.results import Result
@@ -133,7 +133,7 @@ class Station:
 
     @property
     def results(self) -> Path:
-        return self.archive.folder
+        return self.folder / SIMULATED / RESULTS
 
     @property
     def archive(self) -> FolderArchive:
@@ -159,7 +159,7 @@ class Station:
 
     def in_force(self) -> Result | None:
         names = self.preparation.names
-        return self.archive.in_force(names.pen, names.tip)
+        return self.archive.in_force(names.pen, names.tip, is_simulated=True)
 
     def new_camera(self) -> SimulatedCamera:
         """Return another camera before the same pen, not open yet."""
@@ -206,6 +206,11 @@ class Station:
         """Have images taken until so many more are kept."""
         wanted = self.state.n_kept + n_images
         self.see_until(lambda: self.state.n_kept >= wanted)
+
+    def accept(self, reason: str = "It is seen to.") -> None:
+        """Put the tip in force, and wait until it is."""
+        self.runner.accept(reason)
+        self.wait_until(lambda: self.status.result is not None)
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
         """Wait until something is so, and the witness has heard of it."""

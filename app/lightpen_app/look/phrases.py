@@ -12,6 +12,7 @@ from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade
 from lightpen.messages import MOST_SIDES, SIDES, Code
 from lightpen.model.coverage import N_DIRECTIONS, TILT_RINGS
+from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture
 from lightpen.sentences import COMMA, Sentence
 from lightpen.swing.preparation import Lack
@@ -61,6 +62,7 @@ _SHORTS: dict[Code, str] = {
     Code.PEN_LOST: QT_TRANSLATE_NOOP("phrases", "Pen not seen"),
     Code.PEN_LIFTED: QT_TRANSLATE_NOOP("phrases", "Paused"),
     Code.TIP_ELSEWHERE: QT_TRANSLATE_NOOP("phrases", "Tip not in place"),
+    Code.IMAGES_READ: QT_TRANSLATE_NOOP("phrases", "Reading"),
     Code.PAUSED: QT_TRANSLATE_NOOP("phrases", "Paused"),
     Code.SOLVING: QT_TRANSLATE_NOOP("phrases", "Captured"),
     Code.TOO_FEW_IMAGES: QT_TRANSLATE_NOOP("phrases", "More images"),
@@ -78,6 +80,8 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
     Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
+    Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
+    Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Nothing to compare with"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),
 }
@@ -89,6 +93,10 @@ _AT_THE_SCREEN: dict[Code, str] = {
 }
 _SHARES: dict[ShareName, str] = {
     ShareName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
+    ShareName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centers"),
+    ShareName.FORM: QT_TRANSLATE_NOOP("phrases", "ball, cone"),
+    ShareName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "warmth"),
+    ShareName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),
     ShareName.SEAT: QT_TRANSLATE_NOOP("phrases", "seat"),
     ShareName.DRIFT: QT_TRANSLATE_NOOP("phrases", "drift"),
     ShareName.LEDS: QT_TRANSLATE_NOOP("phrases", "LEDs"),
@@ -107,6 +115,7 @@ _LACKS: dict[Lack, str] = {
     Lack.SOURCE_PLACE: QT_TRANSLATE_NOOP(
         "phrases", "Choose the folder of the recorded images."
     ),
+    Lack.DEVICE: QT_TRANSLATE_NOOP("phrases", "Search for the camera and choose it."),
     Lack.IMAGES: QT_TRANSLATE_NOOP("phrases", "No image has come from the camera yet."),
     Lack.CAMERA_FILE: QT_TRANSLATE_NOOP("phrases", "Open the intrinsics file."),
     Lack.IMAGE_SIZE: QT_TRANSLATE_NOOP(
@@ -132,6 +141,12 @@ _PAUSES: dict[Pause, str] = {
     Pause.LOST: QT_TRANSLATE_NOOP("phrases", "PEN LOST"),
     Pause.LIFTED: QT_TRANSLATE_NOOP("phrases", "LIFTED"),
     Pause.ELSEWHERE: QT_TRANSLATE_NOOP("phrases", "TIP MOVED"),
+}
+_ORIGINS: dict[Origin | None, str] = {
+    Origin.LIVE: QT_TRANSLATE_NOOP("phrases", "LIVE CAMERA"),
+    Origin.RECORDED: QT_TRANSLATE_NOOP("phrases", "RECORDED"),
+    Origin.SIMULATED: QT_TRANSLATE_NOOP("phrases", "SIMULATED"),
+    None: QT_TRANSLATE_NOOP("phrases", "ORIGIN NOT STATED"),
 }
 _GRADES: dict[Grade, str] = {
     Grade.PASS: QT_TRANSLATE_NOOP("phrases", "PASS"),
@@ -244,6 +259,25 @@ def phase_text(phase: Phase, pause: Pause = Pause.NONE) -> str:
 def grade_text(grade: Grade) -> str:
     """Return the word of a verdict."""
     return _translated(_GRADES[grade])
+
+
+def origin_text(origin: Origin | None) -> str:
+    """Return the word of what images are of; None is of an earlier version."""
+    return _translated(_ORIGINS[origin])
+
+
+def accepted_phrase(origin: Origin | None) -> Phrase:
+    """Return what has become of a tip that was accepted."""
+    if origin is not Origin.SIMULATED:
+        return Phrase(_translated(QT_TRANSLATE_NOOP("phrases", "IN FORCE")))
+    return Phrase(
+        _translated(QT_TRANSLATE_NOOP("phrases", "PRACTICE KEPT")),
+        _translated(
+            QT_TRANSLATE_NOOP(
+                "phrases", "A simulated tip is in force for no pen; it is kept apart."
+            )
+        ),
+    )
 
 
 def _by_own_sides(message: Sentence, heading: float) -> Sentence:

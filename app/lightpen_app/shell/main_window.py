@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QAbstractButton,
     QApplication,
     QCheckBox,
+    QFileDialog,
     QGridLayout,
     QMainWindow,
     QMessageBox,
@@ -39,7 +40,8 @@ from lightpen_app.steps.page import Page
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
 from lightpen_app.widgets.rearranged import Rearranged
-from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.settings import Preferences, Settings, data_folder
+from lightpen_app.work.workbench import Subject
 
 LEAST_SIZE = QSize(116 * GRID, 62 * GRID)  # for the wizard; fits 1920 x 1080 at 200 %
 FIRST_SIZE = QSize(160 * GRID, 100 * GRID)
@@ -120,11 +122,13 @@ class MainWindow(Rearranged, QMainWindow):
         self._action_bar.back_pressed.connect(self.go_back)
         self._options.value_changed.connect(self._on_options_changed)
         self._options.mute_action.toggled.connect(self._on_mute_toggled)
+        self._options.data_folder_chosen.connect(self._on_data_folder_asked)
         self._options.about_chosen.connect(self._on_about_chosen)
         self._operator_view.closed.connect(self._on_operator_view_closed)
         self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
         self._notice.value_changed.connect(self._operator_view.set_notice)
+        self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
 
@@ -207,6 +211,10 @@ class MainWindow(Rearranged, QMainWindow):
         self._asks = False
         self.close()
 
+    def set_subject(self, subject: Subject) -> None:
+        """Show on every page what is calibrated, and what its images are of."""
+        self._sidebar.set_subject(subject)
+
     def steps(self) -> tuple[Step, ...]:
         """Return the list of steps as it is shown."""
         return self._sidebar.steps()
@@ -285,8 +293,6 @@ class MainWindow(Rearranged, QMainWindow):
         page.step_requested.connect(self._on_step_requested)
         page.status_changed.connect(self._set_status)
         page.notice_raised.connect(self._on_notice_raised)
-        page.subject_changed.connect(self._sidebar.set_subject)
-        page.subject_changed.connect(self._operator_view.set_subject)
         page.operator_value_changed.connect(self._operator_view.set_value)
 
     def _make_actions(self) -> None:
@@ -355,7 +361,12 @@ class MainWindow(Rearranged, QMainWindow):
         """Show what the pages say of themselves now."""
         page = self.page()
         statuses = [
-            Status(each.title(), each.is_complete(), each.why_closed())
+            Status(
+                each.title(),
+                each.is_complete(),
+                each.why_closed(),
+                each.is_doubtful(),
+            )
             for each in self._pages
         ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
@@ -464,6 +475,23 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_mute_toggled(self, muted: bool) -> None:
         words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
         self._set_status(words)
+
+    def _on_data_folder_asked(self) -> None:
+        dialog = QFileDialog(self, self.tr("Data folder"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(str(data_folder(self._options.value())))
+        dialog.fileSelected.connect(self._on_data_folder_chosen)
+        dialog.open()
+
+    def _on_data_folder_chosen(self, folder: str) -> None:
+        self._options.set_data_folder(folder)
+        words = self.tr(
+            "Swings and results are kept in {0} from the next start of the program "
+            "on. Those of now stay where they are."
+        )
+        self.show_notice(words.format(folder), Tone.ACTIVE)
 
     def _on_about_chosen(self) -> None:
         About(versions(), self).exec()

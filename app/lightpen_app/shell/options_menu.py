@@ -31,11 +31,14 @@ class OptionsMenu(Translated, QMenu):
     -------
     value_changed(Preferences)
         The user chose otherwise.
+    data_folder_chosen()
+        The user wants to keep swings and results elsewhere.
     about_chosen()
         The user wants to know what the program is.
     """
 
     value_changed = Signal(object)
+    data_folder_chosen = Signal()
     about_chosen = Signal()
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
@@ -59,10 +62,12 @@ class OptionsMenu(Translated, QMenu):
         self.mute_action.setShortcut(Qt.Key.Key_B)
         self.addAction(self.mute_action)
         self.addSeparator()
+        self._data_folder = self.addAction("")
         self._about = self.addAction("")
 
         # Connections
         self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
+        self._data_folder.triggered.connect(self.data_folder_chosen)
         self._about.triggered.connect(self.about_chosen)
 
         self._retranslate()
@@ -70,6 +75,10 @@ class OptionsMenu(Translated, QMenu):
     def value(self) -> Preferences:
         """Return the preferences in use."""
         return self._value
+
+    def set_data_folder(self, folder: str) -> None:
+        """Keep swings and results elsewhere, from the next start on."""
+        self._choose(data_folder=folder)
 
     def _choice_menu(
         self, preference: str, choices: Sequence[object], chosen: object
@@ -110,6 +119,7 @@ class OptionsMenu(Translated, QMenu):
         self._appearances.setTitle(self.tr("Appearance"))
         self._distances.setTitle(self.tr("Viewing distance"))
         self.mute_action.setText(self.tr("Mute the sounds"))
+        self._data_folder.setText(self.tr("Data folder..."))
         self._about.setText(self.tr("About Lightpen"))
         for action, value in self._choices:
             action.setText(self._choice_name(value))

@@ -5,14 +5,21 @@ from collections.abc import Sequence
 from PySide6.QtCore import QPoint, Signal
 from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
+from lightpen.model.origin import Origin
+from lightpen.record.names import Names
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.shell.step_list import StepList
 from lightpen_app.shell.step_states import Step
+from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.rearranged import Room
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.workbench import Subject
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
 
 
@@ -25,12 +32,15 @@ class Sidebar(Translated, QFrame):
         Index of the step, which may be closed.
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
+    subject_told(str)
+        `subject` is different.
     """
 
     step_chosen = Signal(int)
     operator_view_chosen = Signal()
     help_chosen = Signal()
     options_chosen = Signal()
+    subject_told = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -40,6 +50,7 @@ class Sidebar(Translated, QFrame):
         # Widgets
         self._name = text_label(TextSize.LEAD)
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
+        self._origin = SignLabel()
         self._steps = StepList()
         self._operator_view = PushButton()
         self._help = PushButton()
@@ -51,6 +62,7 @@ class Sidebar(Translated, QFrame):
         head.setSpacing(GRID // 2)
         head.addWidget(self._name)
         head.addWidget(self._subject)
+        head.addWidget(self._origin)
         self._foot = foot = QVBoxLayout()
         foot.setSpacing(0)
         for button in buttons:
@@ -75,7 +87,7 @@ class Sidebar(Translated, QFrame):
         self._help.clicked.connect(self.help_chosen)
         self._options.clicked.connect(self.options_chosen)
 
-        self.set_subject("")
+        self._value = Subject(Names(), Origin.LIVE)
         self.set_room(Room())
 
     def steps(self) -> tuple[Step, ...]:
@@ -87,13 +99,27 @@ class Sidebar(Translated, QFrame):
         self._steps.set_steps(steps)
 
     def subject(self) -> str:
-        """Return what is being calibrated."""
+        """Return what is being calibrated, in words."""
         return self._subject.text()
 
-    def set_subject(self, text: str) -> None:
-        """Say what is being calibrated, such as pen and cone."""
+    def set_subject(self, subject: Subject) -> None:
+        """Say what is being calibrated, and what its images are of."""
+        self._value = subject
+        self._show_subject()
+
+    def _show_subject(self) -> None:
+        names = self._value.names
+        told = (
+            (self.tr("Pen {0}"), names.pen),
+            (self.tr("Tip {0}"), names.tip),
+            (self.tr("Cone {0}"), names.cone),
+        )
+        parts = [words.format(shortened(name)) for words, name in told if name]
+        text = PARTED.join(part.replace(" ", NO_BREAK) for part in parts)
         self._subject.setText(text)
         self._subject.setVisible(bool(text))
+        self.subject_told.emit(text)
+        self._origin.set_value(origin_remark(self._value.origin))
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""
@@ -116,6 +142,7 @@ class Sidebar(Translated, QFrame):
         return self._options.mapToGlobal(QPoint(0, 0))
 
     def _retranslate(self) -> None:
+        self._show_subject()
         self._name.setText(self.tr("Pen tip calibration"))
         for button, text, key in (
             (self._operator_view, self.tr("Operator view"), "F11"),

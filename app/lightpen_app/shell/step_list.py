@@ -18,6 +18,7 @@ TEXT_LEFT, NARROW_TEXT_LEFT = 6 * GRID, 9 * GRID // 2
 WRAPPED = int(Qt.TextFlag.TextWordWrap)
 MARKS = {
     StepState.DONE: (Sign.CHECK, Tone.GOOD),
+    StepState.DOUBTFUL: (Sign.WARNING, Tone.WARN),
     StepState.NOW: (Sign.PLAY, Tone.ACTIVE),
     StepState.TO_DO: (Sign.RING, Tone.QUIET),
     StepState.CLOSED: (Sign.LOCK, Tone.QUIET),
@@ -89,7 +90,7 @@ class StepButton(Translated, QAbstractButton):
         mark = QRectF(left, 1.5 * GRID, SIGN_SIZE, SIGN_SIZE)
         draw_sign(painter, mark, sign, colors.tone(tone))
         now = step.state is StepState.NOW
-        bright = step.state in (StepState.NOW, StepState.DONE)
+        bright = step.state not in (StepState.TO_DO, StepState.CLOSED)
         painter.setPen(QColor(colors.text if bright else colors.muted))
         painter.setFont(font(TextSize.BODY, bold=now))
         name = QRectF(
@@ -123,6 +124,7 @@ class StepButton(Translated, QAbstractButton):
     def _retranslate(self) -> None:
         words = {
             StepState.DONE: self.tr("done"),
+            StepState.DOUBTFUL: self.tr("done, with doubts"),
             StepState.NOW: self.tr("now"),
             StepState.TO_DO: self.tr("to do"),
             StepState.CLOSED: self.tr("closed"),

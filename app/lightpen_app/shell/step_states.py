@@ -9,6 +9,7 @@ class StepState(Enum):
     """How far a step is."""
 
     DONE = auto()
+    DOUBTFUL = auto()
     NOW = auto()
     TO_DO = auto()
     CLOSED = auto()
@@ -24,11 +25,14 @@ class Status:
         All that the step asks for is there.
     why_closed : str
         Why the step cannot be entered; empty when it can.
+    doubtful : bool
+        Whether what is complete was taken with doubts.
     """
 
     title: str
     complete: bool
     why_closed: str
+    doubtful: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,5 +66,6 @@ def _step(status: Status, *, is_now: bool) -> Step:
         return Step(status.title, StepState.NOW)
     if status.why_closed:
         return Step(status.title, StepState.CLOSED, status.why_closed)
-    state = StepState.DONE if status.complete else StepState.TO_DO
+    done = StepState.DOUBTFUL if status.doubtful else StepState.DONE
+    state = done if status.complete else StepState.TO_DO
     return Step(status.title, state)

@@ -58,8 +58,6 @@ class Page(Translated, QWidget):
     notice_raised(str)
         A sentence that must be read, such as the text of an error; an empty one takes
         it away, and so does another page.
-    subject_changed(str)
-        What is being calibrated, such as pen and cone.
     operator_value_changed(OperatorValue)
         What the operator view shows.
     """
@@ -71,7 +69,6 @@ class Page(Translated, QWidget):
     step_requested = Signal(str)
     status_changed = Signal(str)
     notice_raised = Signal(str)
-    subject_changed = Signal(str)
     operator_value_changed = Signal(object)
 
     def title(self) -> str:
@@ -85,6 +82,10 @@ class Page(Translated, QWidget):
     def is_complete(self) -> bool:
         """Return whether all that the step asks for is there."""
         raise NotImplementedError
+
+    def is_doubtful(self) -> bool:
+        """Return whether what is complete was taken with doubts."""
+        return False
 
     def why_closed(self) -> str:
         """Return why the step cannot be entered yet, or nothing."""

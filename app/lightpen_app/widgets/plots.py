@@ -146,6 +146,10 @@ class Plot(QWidget):
         FileError
             The file cannot be written.
         """
+        write_whole(path, self.png())
+
+    def png(self) -> bytes:
+        """Return the plot as a picture, at twice the size on the screen."""
         image = QImage(self.size() * PNG_SCALE, QImage.Format.Format_RGB32)
         image.setDevicePixelRatio(PNG_SCALE)
         painter = QPainter(image)
@@ -156,7 +160,7 @@ class Plot(QWidget):
         buffer.open(QBuffer.OpenModeFlag.WriteOnly)
         # The stub of Qt wants bytes for the format, Qt itself a text.
         image.save(buffer, "PNG")  # type: ignore[call-overload]
-        write_whole(path, bytes(data.data()))
+        return bytes(data.data())
 
     def save_csv(self, path: Path) -> None:
         """Write the numbers behind the plot, one column each.

@@ -1,5 +1,6 @@
 """The live images of a camera as signals of Qt."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Thread
 from time import monotonic
@@ -99,9 +100,16 @@ class LiveView(QObject):
         self._without_images = self._skipping = ""  # as was told of them
 
     def open(
-        self, camera: ImageCamera, settings: CameraSettings, clock: Clock | None = None
+        self,
+        camera: ImageCamera,
+        settings: CameraSettings,
+        clock: Clock | None = None,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
-        """Show another camera; the one before is closed."""
+        """Show another camera; the one before is closed.
+
+        A camera whose serial number is among the ``known`` gets the settings there.
+        """
         self.close()
         self._operator = (
             camera.operator if isinstance(camera, SimulatedCamera) else None
@@ -109,7 +117,9 @@ class LiveView(QObject):
         self._teller = teller = _Teller(self)
         teller.image_shown.connect(self.image_shown)
         teller.told.connect(self._on_told)
-        self._live = live = Live(camera, settings, teller, self._run.runner, clock)
+        self._live = live = Live(
+            *(camera, settings, teller, self._run.runner, clock, known)
+        )
         live.set_aim(self._aim)
         live.set_watched(self._is_watched)
         live.start()
@@ -161,6 +171,11 @@ class LiveView(QObject):
         return self._connection
 
     @property
+    def serial(self) -> str:
+        """Serial number of the camera; empty where none is open."""
+        return "" if self._live is None else self._live.serial
+
+    @property
     def caps(self) -> Caps | None:
         """What the camera can do; None until it was open."""
         return None if self._live is None else self._live.caps
@@ -204,6 +219,11 @@ class LiveView(QObject):
         """
         if self._operator is not None and self._operator.doing is Doing.ABSENT:
             self._operator.seat()
+
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask the camera for other settings, for which it stops for a moment."""
+        if self._live is not None:
+            self._live.configure(settings)
 
     def set_following(self, follows: bool) -> None:
         """Let the simulated operator do what the swing asks for, or leave it."""

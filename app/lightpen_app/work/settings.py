@@ -6,7 +6,7 @@ window.
 """
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeVar
@@ -15,6 +15,7 @@ import platformdirs
 from PySide6.QtCore import QByteArray, QLocale, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
+from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.model.limits import SwingLimits
@@ -34,12 +35,15 @@ class Preferences:
     ----------
     distance_m : float
         From the operator's eyes to the screen, m.
+    data_folder : str
+        For swings and results, from the next start on; empty for the usual one.
     """
 
     language: Language = Language.ENGLISH
     appearance: Appearance = Appearance.SYSTEM
     muted: bool = False
     distance_m: float = 3.0
+    data_folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,8 @@ class Station:
         Of a pen file that does not say.
     mask : str
         Stray light to leave out, "x y radius" in px, circles parted by ";".
-    exposure_us, gain_db : float
-        Of the camera; not a number when they were never set.
+    source_producer : str
+        File of a GenTL producer, where one was chosen.
     max_uncertainty : float
         U (k = 2) of the tip that ends a swing, mm.
     """
@@ -76,18 +80,41 @@ class Station:
     nominal_tip: str = ""
     source: str = "simulated"
     source_place: str = ""
+    source_producer: str = ""
     camera_file: str = ""
     pen_file: str = ""
     pen_units: str = ""
     mask: str = ""
-    exposure_us: float = math.nan
-    gain_db: float = math.nan
     max_uncertainty: float = SwingLimits.max_uncertainty
     min_images: int = SwingLimits.min_images
     max_images: int = SwingLimits.max_images
 
 
-Group = TypeVar("Group", Preferences, Station)
+@dataclass(frozen=True)
+class KeptCamera:
+    """How a camera was set up last.
+
+    Attributes
+    ----------
+    exposure_us, gain_db, frame_rate : float
+        Not a number when they were never set; likewise the texts are empty and the
+        size of packets is 0.
+    region : str
+        "x y width height" in px.
+    trigger : str
+        See `lightpen.cameras.protocol.TriggerMode`.
+    """
+
+    exposure_us: float = math.nan
+    gain_db: float = math.nan
+    frame_rate: float = math.nan
+    pixel_format: str = ""
+    region: str = ""
+    trigger: str = ""
+    packet_size: int = 0
+
+
+Group = TypeVar("Group", Preferences, Station, KeptCamera)
 
 
 class Settings(QObject):
@@ -153,6 +180,18 @@ class Settings(QObject):
             raise ValueError("`name` of a station must not be empty.")
         self._save("stations", {name: _entries(station)})
 
+    def cameras(self) -> dict[str, CameraSettings]:
+        """Return how cameras were set up last, by their serial numbers."""
+        kept = self._content.get("cameras", {})
+        return {
+            serial: _camera_settings(_read(entries, KeptCamera()))
+            for serial, entries in kept.items()
+        }
+
+    def set_camera(self, serial: str, settings: CameraSettings) -> None:
+        """Remember how a camera is set up."""
+        self._save("cameras", {serial: _entries(_kept_camera(settings))})
+
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""
         saved = self._content.get("last", {}).get("station")
@@ -161,6 +200,15 @@ class Settings(QObject):
     def set_last_station(self, name: str) -> None:
         """Remember which station is used."""
         self._save("last", {"station": name})
+
+    def export_folder(self) -> str:
+        """Return the folder that results were saved in last; empty at first."""
+        saved = self._content.get("last", {}).get("export folder")
+        return saved if isinstance(saved, str) else ""
+
+    def set_export_folder(self, folder: str) -> None:
+        """Remember where results are saved."""
+        self._save("last", {"export folder": folder})
 
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""
@@ -239,12 +287,52 @@ def settings_file() -> Path:
     return platformdirs.user_config_path("lightpen", appauthor=False) / "lightpen.json"
 
 
-def data_folder() -> Path:
-    """Return where records and crash reports of this user belong on this system."""
+def data_folder(preferences: Preferences) -> Path:
+    """Return where records and crash reports are kept, as chosen or as is usual."""
+    if preferences.data_folder:
+        return Path(preferences.data_folder)
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def _entries(value: Preferences | Station) -> dict[str, Any]:
+def _kept_camera(settings: CameraSettings) -> KeptCamera:
+    nan = math.nan
+    region = settings.region
+    return KeptCamera(
+        exposure_us=nan if settings.exposure_us is None else settings.exposure_us,
+        gain_db=nan if settings.gain_db is None else settings.gain_db,
+        frame_rate=nan if settings.frame_rate is None else settings.frame_rate,
+        pixel_format=settings.pixel_format or "",
+        region="" if region is None else " ".join(map(str, astuple(region))),
+        trigger="" if settings.trigger is None else str(settings.trigger),
+        packet_size=settings.packet_size or 0,
+    )
+
+
+def _camera_settings(kept: KeptCamera) -> CameraSettings:
+    """Return settings; what was not kept, or makes no sense, is left as it is."""
+    return CameraSettings(
+        exposure_us=_given(kept.exposure_us),
+        gain_db=_given(kept.gain_db),
+        frame_rate=_given(kept.frame_rate),
+        pixel_format=kept.pixel_format or None,
+        region=_region(kept.region),
+        trigger=next((mode for mode in TriggerMode if mode == kept.trigger), None),
+        packet_size=kept.packet_size or None,
+    )
+
+
+def _given(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _region(text: str) -> Region | None:
+    words = text.split()
+    if len(words) != 4 or not all(word.isdecimal() for word in words):
+        return None
+    return Region(*map(int, words))
+
+
+def _entries(value: Preferences | Station | KeptCamera) -> dict[str, Any]:
     """Return the fields of a value as they are kept; no number is none."""
     entries = {each.name: getattr(value, each.name) for each in fields(value)}
     return {

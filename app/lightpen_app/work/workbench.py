@@ -1,30 +1,63 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
-import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
 import numpy as np
-from PySide6.QtCore import QObject, QThreadPool, Signal
+from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.source import FoundDevice, Needs
+from lightpen.cameras.sources import source_named
 from lightpen.formats.opened_files import OpenedFiles, open_files
-from lightpen.live.sources import Surroundings, camera_of, sample_files
+from lightpen.live.sources import (
+    Surroundings,
+    camera_of,
+    files_of_before,
+    sample_files,
+)
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
+from lightpen.record.presence import Presence
+from lightpen.record.recordings import FilesBeside
 from lightpen.sentences import Sentence
-from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen.swing.preparation import (
+    CameraInUse,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
 
-SAMPLES = "simulated"  # folder of the files that go with the simulated camera
+LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
+COUNTING_MS = 5000  # from one look for other windows to the next
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is calibrated, for all that is shown besides the steps.
+
+    Attributes
+    ----------
+    names : Names
+        Of the swing there is; else those that are chosen.
+    origin : Origin or None
+        What its images are of; None where a swing of an earlier version does not say.
+    """
+
+    names: Names
+    origin: Origin | None
 
 
 class Workbench(QObject):
@@ -39,15 +72,26 @@ class Workbench(QObject):
     -------
     changed()
         `preparation` is different.
+    subject_changed(Subject)
+        `subject` is different.
+    others_counted(int)
+        So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
     relieved(str)
         A sentence of `troubled` whose cause is gone.
+    cameras_found(tuple of FoundDevice)
+    search_failed(str)
+        The sentence why no cameras can be looked for.
     """
 
     changed = Signal()
+    subject_changed = Signal(object)
+    others_counted = Signal(int)
     troubled = Signal(str)
     relieved = Signal(str)
+    cameras_found = Signal(object)
+    search_failed = Signal(str)
 
     def __init__(
         self,
@@ -61,12 +105,18 @@ class Workbench(QObject):
         self._folder = folder
         self._around = around or Surroundings()
         self._preparation = Preparation()
-        self._camera_settings = CameraSettings()
         self._is_started = False
         self._wants_samples = False
         self._reading: Job | None = None
+        self._search: Job | None = None
         self._unread = Station()
         self._file_troubles: list[str] = []
+        self._presence = Presence(folder)
+        self._n_others = 0
+        self._counter: Job | None = None
+        self._counting = QTimer(self)
+        self._counting.setInterval(COUNTING_MS)
+        self._subject_told: Subject | None = None
         self.run = SwingRun(folder, self._around.now, self)
         self.live = LiveView(self.run, self)
 
@@ -78,6 +128,9 @@ class Workbench(QObject):
         self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
         self.run.relieved.connect(self.relieved)
+        self._counting.timeout.connect(self._count_others)
+        self.run.changed.connect(self._tell_subject)
+        self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
         settings.relieved.connect(self._on_settings_relieved)
 
@@ -85,6 +138,19 @@ class Workbench(QObject):
     def preparation(self) -> Preparation:
         """What was chosen so far."""
         return self._preparation
+
+    @property
+    def folder(self) -> Path:
+        """For records, results and sample files."""
+        return self._folder
+
+    @property
+    def subject(self) -> Subject:
+        """What is calibrated: by the swing there is, else by what is chosen."""
+        status, chosen = self.run.status, self._preparation
+        if status.state is not None:
+            return Subject(status.names, status.origin)
+        return Subject(chosen.names, chosen.origin)
 
     @property
     def around(self) -> Surroundings:
@@ -102,6 +168,8 @@ class Workbench(QObject):
             self._on_settings_troubled(self._settings.trouble)
         folder = self._folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
+        self._count_others()
+        self._counting.start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
         if self._reading is None:
@@ -131,14 +199,9 @@ class Workbench(QObject):
             mask=_parse_circles(station.mask),
             limits=_limits(station),
         )
-        self._camera_settings = CameraSettings(
-            exposure_us=_given(station.exposure_us), gain_db=_given(station.gain_db)
-        )
         self._open_files(station)
         self._remember_station()
         self._follow(before)
-        if self._preparation.source == before.source:
-            self._set_camera()
 
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
@@ -150,19 +213,58 @@ class Workbench(QObject):
         self._remember()
         self._follow(before)
 
+    def export_folder(self) -> str:
+        """Return the folder that results were saved in last; empty at first."""
+        return self._settings.export_folder()
+
+    def set_export_folder(self, folder: str) -> None:
+        """Remember where results are saved."""
+        self._settings.set_export_folder(folder)
+
+    def use_files(self, files: FilesBeside) -> None:
+        """Choose the files that stand beside recorded images, once they are read."""
+        self._relieve_of_files()
+        self._start(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
+
     def open_camera(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
 
         A swing that is captured goes on with it.
         """
         self._is_started = True
-        if self._preparation.source.kind is SourceKind.RECORDED and not (
-            self._preparation.source.place
-        ):
+        source = self._preparation.source
+        if source.lacks_place:
             self.live.close()
             return
-        camera = camera_of(self._preparation.source, self._around)
-        self.live.open(camera, self._camera_settings, self._around.clock)
+        camera, clock = camera_of(source, self._around), self._around.clock
+        self.live.open(camera, CameraSettings(), clock, self._settings.cameras())
+
+    def search_cameras(self, kind: str, producer: str) -> None:
+        """Look for the cameras of a source; `cameras_found` or `search_failed` tells.
+
+        A camera that is open is closed first: some libraries end the stream of one
+        while they look for others. Of a search before nothing is told any more.
+        """
+        source = source_named(kind)
+        if source is None:
+            return
+        if self._search is not None:
+            self._search.cancel()
+        was_open = self.live.is_open
+        self.live.close()
+        find, live = source.find, self.live
+
+        def search(_: Report) -> tuple[FoundDevice, ...]:
+            live.await_closed()
+            return find(producer)
+
+        self._search = job = Job(search, self)
+
+        # Connections
+        job.succeeded.connect(self._on_cameras_found)
+        job.failed.connect(self._on_search_failed)
+        job.ended.connect(partial(self._on_search_ended, job, opens=was_open))
+        job.start()
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
@@ -170,8 +272,8 @@ class Workbench(QObject):
         self._write_samples()
 
     def _write_samples(self) -> None:
-        around, folder = self._around, self._folder / SAMPLES
-        self._start(lambda _: sample_files(around, folder), self._on_samples_written)
+        around, folder = self._around, self._folder / SIMULATED
+        self._start(lambda _: sample_files(around, folder), self._on_chosen_read)
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel what is under way, and wait until all has ended.
@@ -183,11 +285,15 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
+        self._counting.stop()
         self.run.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
-        has_closed = self.live.await_closed(max(0.0, deadline - monotonic()))
+        # A dead camera may take longer, and has nothing to tell any more.
+        of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
+        has_closed = self.live.await_closed(of_camera)
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
+        self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 
@@ -199,8 +305,10 @@ class Workbench(QObject):
         units = station.pen_units or None
         if camera_path is not None or pen_path is not None:
             self._unread = station
+            samples = self._folder / SIMULATED
             self._start(
-                lambda _: open_files(camera_path, pen_path, units), self._on_files_read
+                lambda _: files_of_before(samples, camera_path, pen_path, units),
+                self._on_files_read,
             )
 
     def _start(
@@ -252,16 +360,20 @@ class Workbench(QObject):
         """Use the simulated camera's own files at the start if there are no others."""
         now, wants_samples = self._preparation, self._wants_samples
         self._wants_samples = False
-        simulated = now.source.kind is SourceKind.SIMULATED
+        simulated = now.source.kind == SourceKind.SIMULATED
         has_none = now.camera_file is None and now.pen_file is None
         if wants_samples and simulated and has_none:
             self._write_samples()
 
-    def _on_samples_written(self, samples: OpenedFiles) -> None:
+    def _on_chosen_read(self, opened: OpenedFiles) -> None:
         self._reading = None
+        for trouble in opened.troubles:
+            self._tell_of_file(worded(trouble))
         before = self._preparation
         self._preparation = replace(
-            before, camera_file=samples.camera_file, pen_file=samples.pen_file
+            before,
+            camera_file=opened.camera_file or before.camera_file,
+            pen_file=opened.pen_file or before.pen_file,
         )
         self._remember()
         self._follow(before)
@@ -270,22 +382,48 @@ class Workbench(QObject):
         """Let the camera and its images follow the choices."""
         now = self._preparation
         if now.source != before.source:
-            self._preparation = now = replace(now, image_size=None)
+            self._preparation = now = replace(now, image_size=None, camera_in_use=None)
         self.run.runner.choose(now)
         if now.source != before.source and self._is_started:
             self.open_camera()
         self.live.set_aim(now.aim)
         self.changed.emit()
 
-    def _set_camera(self) -> None:
-        """Let a camera that stays open have the exposure and gain of the station."""
-        caps, wanted = self.live.caps, self._camera_settings
-        if caps is None:
+    def _count_others(self) -> None:
+        """See whether other windows use the same data folder."""
+        if self._counter is not None:  # a disk that does not answer is asked once
             return
-        if caps.exposure_us is not None and wanted.exposure_us is not None:
-            self.live.set_exposure(wanted.exposure_us)
-        if caps.gain_db is not None and wanted.gain_db is not None:
-            self.live.set_gain(wanted.gain_db)
+        presence = self._presence
+        self._counter = job = Job(lambda _: presence.count_others(), self)
+
+        # Connections
+        job.succeeded.connect(self._on_others_counted)
+        job.start()
+
+    def _on_others_counted(self, n_others: int) -> None:
+        self._counter = None
+        if n_others != self._n_others:
+            self._n_others = n_others
+            self.others_counted.emit(n_others)
+
+    def _tell_subject(self) -> None:
+        subject = self.subject
+        if subject != self._subject_told:
+            self._subject_told = subject
+            self.subject_changed.emit(subject)
+
+    def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
+        self.cameras_found.emit(found)
+
+    def _on_search_failed(self, why: str) -> None:
+        self.search_failed.emit(why)
+
+    def _on_search_ended(self, job: Job, *, opens: bool) -> None:
+        if job is not self._search:
+            return
+        self._search = None
+        if opens and not self.live.is_open:
+            self.open_camera()
 
     def _remember_station(self) -> None:
         station = self._preparation.names.station
@@ -299,11 +437,6 @@ class Workbench(QObject):
             return
         camera_file, pen_file = now.camera_file, now.pen_file
         unread = self._unread  # files that are being read stay remembered
-        nan = math.nan
-        exposure_us, gain_db = (
-            self._camera_settings.exposure_us,
-            self._camera_settings.gain_db,
-        )
         station = Station(
             operator=names.operator,
             pen=names.pen,
@@ -313,14 +446,13 @@ class Workbench(QObject):
             nominal_tip=_point_text(now.nominal_tip),
             source=now.source.kind,
             source_place=now.source.place,
+            source_producer=now.source.producer,
             camera_file=(
                 unread.camera_file if camera_file is None else str(camera_file.path)
             ),
             pen_file=unread.pen_file if pen_file is None else str(pen_file.path),
             pen_units=(unread.pen_units if pen_file is None else pen_file.units or ""),
             mask=_circles_text(now.mask),
-            exposure_us=nan if exposure_us is None else exposure_us,
-            gain_db=nan if gain_db is None else gain_db,
             max_uncertainty=now.limits.max_uncertainty,
             min_images=now.limits.min_images,
             max_images=now.limits.max_images,
@@ -341,13 +473,12 @@ class Workbench(QObject):
             self.changed.emit()
 
     def _on_settings_applied(self, settings: CameraSettings) -> None:
-        before = self._camera_settings  # stays for what a recording has not
-        exposure_us, gain_db = settings.exposure_us, settings.gain_db
-        self._camera_settings = CameraSettings(
-            exposure_us=before.exposure_us if exposure_us is None else exposure_us,
-            gain_db=before.gain_db if gain_db is None else gain_db,
-        )
-        self._remember()
+        serial = self.live.serial
+        used = CameraInUse(serial, settings)
+        self._preparation = replace(self._preparation, camera_in_use=used)
+        self.run.runner.choose(self._preparation)
+        if self._preparation.source.source.needs is not Needs.FILES:
+            self._settings.set_camera(serial, settings)
 
 
 def _limits(station: Station) -> SwingLimits:
@@ -361,14 +492,9 @@ def _limits(station: Station) -> SwingLimits:
 
 
 def _source(station: Station) -> SourceChoice:
-    try:
-        return SourceChoice(SourceKind(station.source), station.source_place)
-    except ValueError:  # of a later version
+    if source_named(station.source) is None:  # of a later version
         return SourceChoice()
-
-
-def _given(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    return SourceChoice(station.source, station.source_place, station.source_producer)
 
 
 def _point_text(point: FloatArray | None) -> str:

@@ -22,6 +22,7 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
+from lightpen.cameras.source import Needs, Source, SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
@@ -230,16 +231,9 @@ class ReplayCamera:
             image=sealed(image),
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
-            device_ts_ns=self._recorded_ns(seq),
             pixel_format=self.caps.pixel_formats[0],
-            bits=8 * image.itemsize,
+            bits=_bits(image),
         )
-
-    def _recorded_ns(self, seq: int) -> int:
-        """Return a time by which an image is known again when the recording is."""
-        names = () if self._source is None else self._source.names
-        number = seq % len(names) if names else seq
-        return round(number * 1e9 / USUAL_FRAME_RATE)
 
     def _name(self, seq: int) -> str:
         """Return the file of an image; after the last one comes the first."""
@@ -253,6 +247,13 @@ class ReplayCamera:
         files = self._source.files
         is_there = not files or any(os.access(file, os.R_OK) for file in files)
         return not is_there or self._n_unread >= len(self._source.names)
+
+
+def _bits(image: Image) -> int:
+    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
+    if image.itemsize == 1:
+        return 8
+    return 12 if int(image.max(initial=0)) < 2**12 else 16
 
 
 def _first_image(source: ImageSource, where: str) -> Image:
@@ -303,3 +304,12 @@ def _already_taken(what: Sentence) -> ConfigError:
             what=what,
         )
     )
+
+
+def _camera(place: SourcePlace, clock: Clock) -> ReplayCamera:
+    return ReplayCamera(place.name, loops=True, clock=clock)
+
+
+RECORDED = Source(
+    "recorded", sentence("source.recorded", "Recorded images"), Needs.FILES, _camera
+)

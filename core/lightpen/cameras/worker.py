@@ -4,8 +4,8 @@ Every call of the camera is made in this thread. Frames leave it two ways: throu
 for the newest one, for showing, and through a queue that loses nothing, for measuring.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import Enum, auto
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
+from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.protocol import (
     CameraFailure,
     CameraSettings,
@@ -39,9 +40,10 @@ LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
 LONGEST_READ = 2.0  # s, after which requests are served at the latest
 BUSY_PAUSE = 0.5  # s
 PROBING = 2.0  # s, after which a camera of which nobody wants images is looked after
-# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
-LONGEST_BUSY = 4.0  # s
-BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
+# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat;
+# that it is not free yet may take 5 s to find out.
+LONGEST_BUSY = 8.0  # s
+BACK_OFF = (0.5, 1.0, 2.0)  # s between attempts to reconnect; the last repeats
 LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # Of the images since measuring began, skipped by a computer that is too slow; fewer
 # are skipped when something else holds it up once.
@@ -122,6 +124,8 @@ class CameraWorker:
         Not open yet. Nobody else may call it any more.
     settings : CameraSettings
         To be applied, again at each reconnection.
+    known : mapping of str to CameraSettings
+        By serial numbers; a camera that is among them gets these instead.
     on_event : callable
         Called in the thread of the worker with what happens; must return at once and
         not call `stop`.
@@ -139,9 +143,11 @@ class CameraWorker:
         *,
         clock: Clock | None = None,
         n_queued: int = N_QUEUED,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
         self._camera = camera
         self._settings = settings
+        self._known = dict(known or {})
         self._applied = settings
         self._caps: Caps | None = None
         self._on_event = on_event
@@ -152,7 +158,8 @@ class CameraWorker:
         self._stopping = Event()
         self._wake = Event()
         self._rest: float | None = 0.0
-        self._is_rested = False
+        self._is_rested = self._is_stopped = False
+        self._delivered_ns = 0
         self._n_missed_read = self._n_missed_resting = 0
         self._measures = Event()
         self._thread = Thread(target=self._run, name="camera", daemon=True)
@@ -162,6 +169,7 @@ class CameraWorker:
         self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
         self._heard_ns = 0
+        self._link = LinkWatch()
 
     @property
     def serial(self) -> str:
@@ -257,6 +265,11 @@ class CameraWorker:
         self._requests.put(lambda: self._set_gain(gain_db))
         self._wake.set()
 
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask for other settings, for which images stop coming for a moment."""
+        self._requests.put(lambda: self._configure(settings))
+        self._wake.set()
+
     def _run(self) -> None:
         try:
             self._open_first()
@@ -285,7 +298,12 @@ class CameraWorker:
     def _is_wanted(self) -> bool:
         """Return whether an image is wanted, after the rest before it."""
         rest = self._rest
-        if rest == 0.0:
+        if rest is not None and self._is_stopped:
+            self._is_stopped = False
+            self._camera.start()
+            self._hear()
+        # What waits in the buffers of a link would be ever older.
+        if rest == 0.0 or (rest is not None and self._camera.caps.has_link):
             return True
         self._wake.clear()
         if rest != self._rest or self._stopping.is_set():  # just before
@@ -296,10 +314,9 @@ class CameraWorker:
         else:
             if not self._camera.caps.waits:  # a recording would begin anew
                 self._camera.stop()
+                self._is_stopped = True
             self._wake.wait(PROBING)
             self._camera.probe()
-            if self._rest is not None:
-                self._camera.start()
         self._hear()
         return rest is not None
 
@@ -311,29 +328,28 @@ class CameraWorker:
             return
         except FrameIncomplete as error:
             self._hear()
+            self._count()
             self._on_event(Troubled(error))
         else:
             self._hear()
             self._change(Connection.STREAMING)
-            self._deliver(frame)
+            if self._is_due():
+                self._deliver(frame)
+            self._count()
+
+    def _is_due(self) -> bool:
+        """Return whether the rest since the last image that was delivered is over."""
+        rest, now_ns = self._rest, self._clock.now_ns()
+        if rest is None or now_ns - self._delivered_ns < rest * 1e9:
+            return False
+        self._delivered_ns = now_ns
+        return True
 
     def _deliver(self, frame: Frame) -> None:
         if self._mailbox.put(frame):
             self._on_event(FrameReady())
         if self._measures.is_set():
             self._enqueue(frame)
-        self._count()
-
-    def _count(self) -> None:
-        """Take what became of the images, but of those that nobody wanted."""
-        stats = self._camera.stats()
-        if self._is_rested:
-            self._is_rested = False
-            self._n_missed_resting = stats.missed - self._n_missed_read
-        self._n_missed_read = stats.missed - self._n_missed_resting
-        self._stats = replace(
-            stats, skipped=self._n_skipped, missed=self._n_missed_read
-        )
 
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
@@ -384,6 +400,24 @@ class CameraWorker:
     def _hear(self) -> None:
         self._heard_ns = self._clock.now_ns()
 
+    def _count(self) -> None:
+        """Take what became of the images, but of those that nobody wanted."""
+        stats = self._camera.stats()
+        if self._is_rested:
+            self._is_rested = False
+            self._n_missed_resting = stats.missed - self._n_missed_read
+            self._link = replace(self._link, since=None)
+        self._n_missed_read = stats.missed - self._n_missed_resting
+        self._stats = replace(
+            stats, skipped=self._n_skipped, missed=self._n_missed_read
+        )
+        if self._camera.caps.has_link:
+            self._link, trouble = self._link.after(
+                self._stats, self._heard_ns * 1e-9, self._applied
+            )
+            if trouble is not None:
+                self._on_event(Troubled(trouble))
+
     def _open_first(self) -> None:
         """Open the camera, waiting a little for another program to let go of it."""
         self._change(Connection.OPENING)
@@ -416,10 +450,26 @@ class CameraWorker:
 
     def _connect(self) -> None:
         self._camera.open()
+        known = self._known.pop(self._camera.serial, None)
+        if known is None:
+            self._start(self._settings)
+            return
+        self._settings = known
+        try:
+            self._start(known)
+        except ConfigError as error:  # it is not what it was when they were kept
+            self._on_event(Troubled(error))
+            self._settings = CameraSettings()
+            self._start(self._settings)
+
+    def _start(self, settings: CameraSettings) -> None:
+        """Set up the open camera and let its images come."""
+        self._applied = self._camera.configure(settings)
         self._caps = self._camera.caps
-        self._applied = self._camera.configure(self._settings)
         self._camera.start()
+        self._is_stopped = False
         self._hear()
+        self._link = LinkWatch()
         self._on_event(SettingsApplied(self._applied))
         self._change(Connection.STREAMING)
 
@@ -434,12 +484,25 @@ class CameraWorker:
             except ConfigError as error:
                 self._on_event(Troubled(error))
 
+    def _configure(self, settings: CameraSettings) -> None:
+        before = self._settings
+        self._camera.stop()
+        try:
+            self._start(settings)
+        except ConfigError:
+            self._start(before)
+            raise
+        self._settings = merged(before, self._applied)
+
     def _set_exposure(self, exposure_us: float) -> None:
+        # Where the camera is lost over it, it is set when it comes back.
+        self._settings = replace(self._settings, exposure_us=exposure_us)
         applied = self._camera.set_exposure(exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         self._apply(replace(self._applied, exposure_us=applied))
 
     def _set_gain(self, gain_db: float) -> None:
+        self._settings = replace(self._settings, gain_db=gain_db)
         applied = self._camera.set_gain(gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         self._apply(replace(self._applied, gain_db=applied))
@@ -452,6 +515,12 @@ class CameraWorker:
         if connection is not self._connection:
             self._connection = connection
             self._on_event(ConnectionChanged(connection))
+
+
+def merged(before: CameraSettings, now: CameraSettings) -> CameraSettings:
+    """Return settings, and of what they leave open those before."""
+    given = {f.name: getattr(now, f.name) for f in fields(now)}
+    return replace(before, **{n: v for n, v in given.items() if v is not None})
 
 
 def is_too_slow(n_missed: int, n_offered: int) -> bool:

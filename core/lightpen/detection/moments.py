@@ -106,6 +106,7 @@ def _rearranged(seen: Observations, images: IntArray) -> Observations:
         names=tuple("" if i == NONE else seen.names[i] for i in images),
         pixels=moved(seen.pixels),
         seen_pixels=moved(seen.seen_pixels),
+        areas=moved(seen.areas),
         rotations=moved(seen.rotations),
         translations=moved(seen.translations),
         edge_widths=moved(seen.edge_widths),

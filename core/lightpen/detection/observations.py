@@ -50,6 +50,9 @@ class Observations:
         Ellipse centres of the LEDs that are fit for use, px; NaN elsewhere.
     seen_pixels : (N, L, 2) array
         Centres of all labelled LEDs, also of merged and cut ones, px; NaN elsewhere.
+    areas : (N, L) array
+        Areas of the LEDs that are fit for use and not saturated, px^2; NaN elsewhere,
+        or where only centres are given.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Rough cam_from_pen, mm; NaN where there is none.
     edge_widths : (N,) array
@@ -66,6 +69,7 @@ class Observations:
     names: tuple[str, ...]
     pixels: FloatArray
     seen_pixels: FloatArray
+    areas: FloatArray
     rotations: FloatArray
     translations: FloatArray
     edge_widths: FloatArray
@@ -241,6 +245,7 @@ def _observations(names: tuple[str, ...], sightings: list[Sighting]) -> Observat
         names=names,
         pixels=np.array([sighting.pixels for sighting in sightings]),
         seen_pixels=np.array([sighting.seen_pixels for sighting in sightings]),
+        areas=np.array([sighting.areas for sighting in sightings]),
         rotations=np.array([sighting.rotation for sighting in sightings]),
         translations=np.array([sighting.translation for sighting in sightings]),
         edge_widths=np.array([sighting.edge_width for sighting in sightings]),

@@ -52,6 +52,16 @@ _WORDS = {
 }
 
 
+def counted(n_images: int, reason: Reason) -> Sentence:
+    """Return how many images do not take part for a reason."""
+    return sentence(
+        "calibrate.images-of-a-reason",
+        "{n_images} {reason}",
+        n_images=n_images,
+        reason=reason.words,
+    )
+
+
 def mishap_detail(error: Exception) -> Sentence:
     """Return what there is to say of an image that ended in one of `MISHAPS`."""
     return sentence(

@@ -20,7 +20,7 @@ from lightpen.detection.labelling.labels import (
 )
 from lightpen.detection.pose import MIN_POSE_LEDS, fit_poses
 from lightpen.detection.reasons import MISHAPS, Reason
-from lightpen.detection.spots import Spots, detect_spots
+from lightpen.detection.spots import Flaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
@@ -86,6 +86,21 @@ class Sighting:
         return self.spots is not None and self.spots.are_blurred
 
     @property
+    def areas(self) -> FloatArray:
+        """Areas of the LEDs fit for use, (L,), px^2; NaN elsewhere.
+
+        So it is of saturated ones, which look larger than they are.
+        """
+        areas = np.full(len(self.pixels), np.nan)
+        if self.spots is None or self.labels is None:
+            return areas
+        spot = self.labels.spot
+        known = np.isfinite(self.pixels[:, 0])
+        known[known] = (self.spots.flaws[spot[known]] & Flaw.SATURATED) == 0
+        areas[known] = self.spots.areas[spot[known]]
+        return areas
+
+    @property
     def edge_width(self) -> float:
         """Mean width of the rims of the labelled LEDs, px; NaN without any."""
         if self.spots is None or self.labels is None:
@@ -101,6 +116,7 @@ def look(
     pen: Pen,
     mask: FloatArray | None = None,
     before: Sighting | None = None,
+    full_scale: int | None = None,
 ) -> Sighting:
     """Find the pen in an image, and its pose by maximum likelihood.
 
@@ -114,11 +130,13 @@ def look(
         Of the image before, which tells where to look first. Where the LEDs are there,
         that settles it, also for an image that would be refused on its own; where they
         are not, the image is looked at on its own.
+    full_scale : int, optional
+        Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
     """
     if not camera.fits(image):
         return unseen(pen, Reason.WRONG_SIZE)
     try:
-        spots = detect_spots(image, mask)
+        spots = detect_spots(image, mask, full_scale=full_scale)
         labels = _label(spots, camera, pen, before)
         return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
     except MISHAPS:

@@ -14,16 +14,16 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle, fit_bundle
-from lightpen.estimation.contradictions import Contradiction, find_contradictions
-from lightpen.estimation.joint import JointFit
+from lightpen.estimation.contradictions import (
+    Contradiction,
+    find_contradictions,
+    find_pen_contradictions,
+)
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
-from lightpen.estimation.priors import Prior, Priors, priors_of
+from lightpen.estimation.priors import Prior, Priors
 from lightpen.estimation.unknowns import inverse, lean_forms
-from lightpen.estimation.variance_components import COUNTED, FITTED, find_component
-from lightpen.model.assumptions import Assumptions
-from lightpen.model.pen import Pen
-from lightpen.model.rig import Rig
+from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
 MAX_DENIED = 8  # files, or numbers of a rig's file, that are let go
@@ -60,39 +60,36 @@ class Adjustment:
 
 
 def adjust(
-    rig: Rig,
-    pen: Pen,
+    state: BundleState,
     pixels: FloatArray,
-    start: JointFit,
-    assumptions: Assumptions,
+    priors: Priors,
     places: FloatArray | None = None,
 ) -> Adjustment:
     """Adjust all that the files may have wrong; let go what the images contradict.
 
     Parameters
     ----------
+    state : BundleState
+        With the files held as they are.
     pixels : (N, C, L, 2) array
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
-    start : JointFit
-        With the files held as they are.
     places : (6 (C - 1),) array, optional
-        By which the cameras of ``start`` stood off the file of the rig, in the order
-        of `Rig.covariance`.
+        By which the cameras stood off the file of the rig where the state was found,
+        in the order of `Rig.covariance`.
 
     Raises
     ------
     CalibrationError
         The iteration does not settle.
     """
-    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
-    priors = priors_of(rig, pen, assumptions)
-    lean = lean_forms(start.rotations)
+    rig = state.rig
+    lean = lean_forms(state.rotations)
     fit = partial(fit_bundle, pixels, state, lean=lean, places=places)
 
     def all_allowed(
         factor: float,
     ) -> tuple[Bundle, tuple[Contradiction, ...], Priors, Correlation]:
-        bundle = fit(priors, inflation=factor, least_gain=COUNTED)
+        bundle = fit(priors, inflation=factor)
         found: tuple[Contradiction, ...] = ()
         freed = priors
         for _ in range(1 if rig.n_cameras == 1 else MAX_DENIED):
@@ -100,8 +97,11 @@ def adjust(
             if not denied:
                 break
             found += denied
-            bundle = fit(freed, inflation=factor, least_gain=COUNTED)
-        return bundle, found, freed, measure_correlation(bundle, pixels)
+            bundle = fit(freed, inflation=factor)
+        of_pen, freed = find_pen_contradictions(state.pen, bundle, freed)
+        if of_pen:
+            bundle = fit(freed, inflation=factor)
+        return bundle, found + of_pen, freed, measure_correlation(bundle, pixels)
 
     factor = 1.0
     allowed, contradictions, freed, correlation = all_allowed(factor)
@@ -111,15 +111,9 @@ def adjust(
         allowed, contradictions, freed, correlation = all_allowed(factor)
     held = _held_to_files(allowed, freed)
     bundle = allowed
-    if held is not freed or _is_doubtful(allowed):
+    if held is not freed:
         bundle = fit(held, inflation=factor)
     return Adjustment(bundle, allowed, freed, contradictions, correlation)
-
-
-def _is_doubtful(bundle: Bundle) -> bool:
-    """Return whether something is counted that is not likely enough to be fitted."""
-    found = bundle.components
-    return any(0 < each.gain < FITTED for each in (*found.seat, found.drift))
 
 
 def _held_to_files(bundle: Bundle, priors: Priors) -> Priors:

@@ -43,7 +43,7 @@ from lightpen.estimation.unknowns import (
     Unknowns,
     inverse,
 )
-from lightpen.estimation.variance_components import FITTED, find_jitter
+from lightpen.estimation.variance_components import Jitter, find_jitter
 from lightpen.sentences import sentence
 
 CONVERGED = 1e-5  # mm
@@ -71,12 +71,17 @@ class Bundle:
     information : (p, p) array
         Of the images, rotations eliminated.
     prior_information : (p, p) array
+    measured_information : (p, p) array
+        Of what was measured beside the centres: areas, the distance of two cones.
     jitter_information : (p, p) array
         How much of ``information`` the jitter of the seat makes uncertain.
+    doubted_jitter : (p, p) array
+        Covariance of the right side by what jitter is to be expected where it is not
+        significant.
     weight_sigma : float
         By which LEDs were weighed, px: ``sigma``, and more where it hangs together.
     covariance : (p, p) array
-        Inverse of both informations together, images taken as independent.
+        Inverse of the three together, images taken as independent.
     """
 
     unknowns: Unknowns
@@ -88,7 +93,9 @@ class Bundle:
     sigma: float
     information: FloatArray
     prior_information: FloatArray
+    measured_information: FloatArray
     jitter_information: FloatArray
+    doubted_jitter: FloatArray
     weight_sigma: float
     covariance: FloatArray
 
@@ -104,10 +111,14 @@ class Bundle:
         return np.asarray(moves.reshape(-1, 3))
 
     def part(self, *kinds: slice) -> FloatArray:
-        """Return what the priors of some unknowns leave in tip and cone, (6, 6)."""
+        """Return what stands in tip and cone for some unknowns, (6, 6).
+
+        By errors of their priors, and of what was measured of them.
+        """
+        known = self.prior_information + self.measured_information
         own = np.zeros_like(self.covariance)
         for at in kinds:
-            own[at, at] = self.prior_information[at, at]
+            own[at, at] = known[at, at]
         return self.carried(own)
 
     def carried(self, information: FloatArray) -> FloatArray:
@@ -131,7 +142,6 @@ def fit_bundle(
     priors: Priors,
     lean: FloatArray,
     inflation: float = 1.0,
-    least_gain: float = FITTED,
     places: FloatArray | None = None,
 ) -> Bundle:
     """Fit tip, cone and all that the files may have wrong to the LED centres.
@@ -147,8 +157,6 @@ def fit_bundle(
     inflation : float
         How many times the variance of the noise counts beside the priors, as it does
         not average out.
-    least_gain : float
-        From which on an error of the seat or a drift is taken for one.
     places : (6 (C - 1),) array, optional
         Off the file of the rig, from where the cameras' places begin; 0 unless given.
 
@@ -162,7 +170,7 @@ def fit_bundle(
     state, taken_up = start, np.zeros(unknowns.number)
     if places is not None:
         taken_up[at.extrinsics] = places
-        state = unknowns.moved(start, start, taken_up, np.zeros((len(pixels), N_TURN)))
+        state = unknowns.moved(start, taken_up, np.zeros((len(pixels), N_TURN)))
     views = views_at(state, pixels)
     residuals = _stacked(views)
     used = gate(_together(residuals)).reshape(residuals.shape[:-1])
@@ -170,20 +178,21 @@ def fit_bundle(
     components = NO_COMPONENTS
     for n_pass in range(MAX_PASSES):
         weight_sigma = max(sigma * float(np.sqrt(inflation)), FINEST)
-        eliminated = eliminate(views, used, weight_sigma, components.jitter)
+        eliminated = eliminate(views, used, weight_sigma, components.jitter.covariance)
         information, gradient = unknowns.system(eliminated)
-        right = gradient + information @ taken_up
+        measured, measured_right = unknowns.measured(state, taken_up)
+        right = gradient + information @ taken_up + measured_right
         finding = 0 < n_pass <= FINDING_PASSES
         if finding:
-            components = unknowns.found(information, right, components, least_gain)
+            components = unknowns.found(information + measured, right, components)
         prior = unknowns.prior_information(components)
-        covariance = inverse(information + prior)
+        covariance = inverse(information + prior + measured)
         values = covariance @ right
         step, shifts = unknowns.step(values - taken_up)
         unknown = _follow(eliminated, step, shifts)
         residuals = _left_over(views, step, shifts, unknown)
         n_fitted = float(np.sum(covariance * information)) + _n_eliminated(
-            eliminated, components.jitter, used
+            eliminated, components.jitter.covariance, used
         )
         squares = np.where(used[..., None], residuals, 0.0) ** 2
         n_free = max(2 * int(used.sum()) - n_fitted, 1.0)
@@ -191,7 +200,7 @@ def fit_bundle(
         if finding:
             alone = (
                 eliminated
-                if components.jitter is None
+                if components.jitter.covariance is None
                 else eliminate(views, used, weight_sigma)
             )
             jitter = _jitter(unknowns, alone, used, step, shifts, covariance)
@@ -199,18 +208,24 @@ def fit_bundle(
         if n_pass in (1, FINDING_PASSES):
             used = gate(_together(residuals)).reshape(used.shape)
         moved = np.abs((values - taken_up)[:6]).max()
-        state = unknowns.moved(start, state, values, unknown[:, :N_TURN])
+        state = unknowns.moved(state, values, unknown[:, :N_TURN])
         taken_up = values.copy()
         for kind in (at.tip, at.cone, *at.seat, at.drift):  # the state has no place for
             taken_up[kind] = 0.0
         views = views_at(state, pixels)
         if n_pass > FINDING_PASSES and moved < CONVERGED:
-            jitter_information = np.zeros_like(information)
-            if components.jitter is not None:
+            jitter = components.jitter
+            doubted = jitter_information = np.zeros_like(information)
+            if jitter.covariance is None:
+                seat = unknowns.sensitivity(eliminated.cone_rows)
+                rows = jitter.expected * seat.reshape(-1, seat.shape[-1])
+                doubted = rows.T @ rows
+            else:
                 seat = unknowns.sensitivity(eliminated.turn_by_step[:, N_TURN:])
-                known = np.linalg.inv(components.jitter)
                 jitter_information = np.einsum(
-                    "nip,ij,njq->pq", seat, known, seat, optimize=True
+                    "nip,ij,njq->pq",
+                    *(seat, np.linalg.inv(jitter.covariance), seat),
+                    optimize=True,
                 )
             return Bundle(
                 unknowns=unknowns,
@@ -222,7 +237,9 @@ def fit_bundle(
                 sigma=sigma,
                 information=information,
                 prior_information=prior,
+                measured_information=measured,
                 jitter_information=jitter_information,
+                doubted_jitter=doubted,
                 weight_sigma=weight_sigma,
                 covariance=covariance,
             )
@@ -301,8 +318,8 @@ def _jitter(
     step: FloatArray,
     shifts: FloatArray,
     covariance: FloatArray,
-) -> FloatArray | None:
-    """Return the covariance of the seat from image to image, if there is any.
+) -> Jitter:
+    """Return what is likely of the seat from image to image.
 
     ``each`` is eliminated without any jitter.
     """
@@ -312,9 +329,6 @@ def _jitter(
     right = each.cone_right - each.cone_rows @ step
     right = right[seen] - np.einsum("nij,nj->ni", own, shifts[seen])
     noise = np.linalg.inv(own)
-    excess = np.einsum("ni,nij,nj->", right, noise, right)
-    if excess < N_CONE * len(own) + Z_99 * np.sqrt(2 * N_CONE * len(own)):
-        return None
     spread = unknowns.sensitivity(each.cone_rows)[seen]
     leverage = noise @ spread @ covariance @ np.swapaxes(spread, 1, 2) @ noise
     return find_jitter(own, right, leverage)

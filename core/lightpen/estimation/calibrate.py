@@ -1,7 +1,7 @@
 """The calibration of a probe tip: from observations to the tip and what it is worth."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -15,12 +15,21 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.contradictions import Contradiction
+from lightpen.estimation.disc_diameter import read_diameter
+from lightpen.estimation.instrument import Instrument, adjusted_instrument
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact, joint_at
 from lightpen.estimation.led_quality import LedQuality, measure_leds
+from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.placing import place_cameras
-from lightpen.estimation.priors import Priors
+from lightpen.estimation.priors import Priors, priors_of, thermal_growth
 from lightpen.estimation.rig_poses import RigPoses, join_poses
 from lightpen.estimation.rig_readings import require_usual_rig
+from lightpen.estimation.second_cone import (
+    SecondCone,
+    SecondSwing,
+    second_cone,
+    second_images,
+)
 from lightpen.estimation.single_images import (
     PosedImages,
     pose_images,
@@ -37,7 +46,7 @@ from lightpen.estimation.uncertainty import Budget, Halves, combine, compare_hal
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import Coverage, measure_coverage
-from lightpen.model.pen import Pen
+from lightpen.model.pen import Pen, grown
 from lightpen.model.rig import Rig, of_camera, rig_of
 
 
@@ -95,12 +104,16 @@ class Calibration:
         The bundle adjustment: everything that the files may have wrong.
     priors : Priors
         What it took from the files, as stated or assumed.
+    growth : float
+        By which the pen is larger than its file has it, as it is warmer; relative.
     contradictions : tuple of Contradiction
         What the images say against the files.
     two_stage : TwoStageFit
         The paper's method on the same images, of the first camera.
     two_stage_covariance : (6, 6) array
         Of its (tip, cone) by the covariances of the poses, mm^2.
+    instrument : Instrument
+        What is left to measure with, of the first camera.
     lags : tuple of Lag or None
         Of each camera of a rig but the first.
     """
@@ -113,14 +126,17 @@ class Calibration:
     joint: JointFit
     bundle: Bundle
     priors: Priors
+    growth: float
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit
     two_stage_covariance: FloatArray
     budget: Budget
+    instrument: Instrument
     halves: Halves
     leds: LedQuality
     coverage: Coverage
     lags: tuple[Lag | None, ...] = ()
+    second: SecondCone | None = None
 
     @property
     def observations(self) -> Observations:
@@ -147,6 +163,7 @@ def calibrate(
     pen: Pen,
     observations: Observations,
     assumptions: Assumptions = USUAL,
+    second: SecondSwing | None = None,
 ) -> Calibration:
     """Calibrate the tip of a pen from the LED centres of a swing.
 
@@ -158,13 +175,15 @@ def calibrate(
     ----------
     assumptions : Assumptions
         What stands in for the uncertainties that the files do not state.
+    second : SecondSwing or None
+        With the same pen before the same camera, which has not moved in between.
 
     Raises
     ------
     CalibrationError
         The images do not determine the tip; the text says what is missing.
     """
-    return calibrate_rig(rig_of(camera), pen, (observations,), assumptions)
+    return calibrate_rig(rig_of(camera), pen, (observations,), assumptions, second)
 
 
 def calibrate_rig(
@@ -172,6 +191,7 @@ def calibrate_rig(
     pen: Pen,
     observations: Sequence[Observations],
     assumptions: Assumptions = USUAL,
+    second: SecondSwing | None = None,
 ) -> Calibration:
     """Calibrate the tip of a pen that several cameras see at once; see `calibrate`.
 
@@ -182,7 +202,11 @@ def calibrate_rig(
     ----------
     observations : sequence of Observations
         Of each camera, all of the same N moments.
+    second : SecondSwing or None
+        Of a rig of one camera.
     """
+    growth = thermal_growth(pen, assumptions)
+    pen = grown(pen, growth)
     parts = [
         _of_camera(rig, c, partial(pose_images, camera, pen, seen))
         for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
@@ -216,14 +240,30 @@ def calibrate_rig(
         parts[0].pivot.pivot_cam,
     )
     require_fit(start.sigma)
-    adjusted = adjust(rig, pen, pixels, start, assumptions, places)
+    state = BundleState(rig, pen, start.tip_pen, start.cone_cam, start.rotations)
+    areas, edge_widths = (
+        np.stack([getattr(seen, of) for seen in observations], axis=1)
+        for of in ("areas", "edge_widths")
+    )
+    reading = read_diameter(
+        replace(state, rig=there),
+        np.where(kept[..., None], areas, np.nan)[chosen],
+        edge_widths[chosen],
+    )
+    priors = replace(priors_of(rig, pen, assumptions), reading=reading)
+    seen = pixels
+    if second is not None:
+        others = second_images(rig.cameras[0], pen, second.observations)
+        state, seen = others.joined(state, pixels)
+        priors = replace(priors, separation=second.separation)
+    adjusted = adjust(state, seen, priors, places)
     bundle, fitted = adjusted.bundle, adjusted.bundle.state
     joint = joint_at(
         ContactModel(fitted.rig, fitted.pen, pixels),
-        fitted.rotations,
+        fitted.rotations[: len(chosen)],
         fitted.tip_pen,
         fitted.cone_rig,
-        bundle.used.reshape(len(chosen), -1),
+        bundle.used[: len(chosen)].reshape(len(chosen), -1),
     )
     poses = parts[0].poses.of(np.searchsorted(parts[0].posed, of_first))
     paper_poses = fit_paper_poses(
@@ -257,6 +297,7 @@ def calibrate_rig(
         for c, part in enumerate(parts)
     )
     moments = _moments(cameras)
+    budget = combine(adjusted, joint)
     return Calibration(
         cameras=cameras,
         reasons=moments,
@@ -266,16 +307,19 @@ def calibrate_rig(
         joint=joint,
         bundle=bundle,
         priors=adjusted.priors,
+        growth=growth,
         contradictions=adjusted.contradictions,
         two_stage=two_stage,
         two_stage_covariance=propagated_covariance(
             paper_poses.rotations, paper_poses.covariances, two_stage.tip_pen
         ),
-        budget=combine(adjusted, joint),
+        budget=budget,
+        instrument=adjusted_instrument(adjusted, budget),
         halves=compare_halves(joint),
         leds=measure_leds(fitted.rig, pen, pixels, joint),
         coverage=measure_coverage(joint.rotations),
         lags=lags,
+        second=(None if second is None else second_cone(adjusted, budget, len(chosen))),
     )
 
 

@@ -14,10 +14,12 @@ from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.priors import Prior, Priors
 from lightpen.estimation.unknowns import inverse
 from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.sentences import Sentence, sentence
 
 LIMIT = 3.0  # standard deviations
+VAGUE = 0.2  # of the diameter, U (k = 2): centres alone may want it to be negative
 RELEASED = 10.0  # times the deviation: what a contradicted prior still says
 
 FOCAL_LENGTH = sentence("file.focal-length", "focal length")
@@ -26,6 +28,8 @@ PRINCIPAL_POINT = (
     sentence("file.cx", "principal point cx"),
     sentence("file.cy", "principal point cy"),
 )
+DIAMETER = sentence("file.diameter", "diameter of the discs")
+SCALE = sentence("file.scale", "scale of the LEDs")
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
@@ -47,6 +51,8 @@ class Contradiction:
         Of a rig, which the file is about; empty of a camera alone.
     of_rig : bool
         Whether it is the rig's file that says so, and not the camera's.
+    of_pen : bool
+        Whether it is the LED file.
     """
 
     what: Sentence
@@ -58,6 +64,7 @@ class Contradiction:
     deviations: float
     camera: str = ""
     of_rig: bool = False
+    of_pen: bool = False
 
     @property
     def sentence(self) -> Sentence:
@@ -70,6 +77,15 @@ class Contradiction:
             "stated_u": self.stated_uncertainty,
             "unit": f" {self.unit}" if self.unit else "",
         }
+        if self.of_pen:
+            return sentence(
+                "warning.pen-file-contradicted",
+                "The images contradict the LED file: they want the {what} to be "
+                "{wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says {stated:.6g} "
+                "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this pen, or "
+                "measure the pen again.",
+                **said,
+            )
         if not self.camera:
             return sentence(
                 "warning.camera-file-contradicted",
@@ -140,6 +156,39 @@ def find_contradictions(
         files.append((denied, replace(priors, extrinsics=extrinsics)))
     found, freed = max(files, key=_most)
     return tuple(found), freed
+
+
+def find_pen_contradictions(
+    pen: Pen, bundle: Bundle, priors: Priors
+) -> tuple[tuple[Contradiction, ...], Priors]:
+    """Find what the images say against the discs and the scale of the LED file.
+
+    Parameters
+    ----------
+    pen : Pen
+        As its file has it.
+
+    Returns
+    -------
+    contradictions : tuple of Contradiction
+        By the fit as it is.
+    priors : Priors
+        Without what was contradicted.
+    """
+    at, one = bundle.columns, np.ones(1)
+    discs, diameter = _denied(
+        [_Entry(DIAMETER, "mm", pen.diameter, one, one)],
+        *(bundle, at.diameter, priors.diameter),
+    )
+    if any(each.wanted_uncertainty > VAGUE * pen.diameter for each in discs):
+        discs, diameter = [], priors.diameter
+    size, scale = _denied(
+        [_Entry(SCALE, "", 1.0, one, one)], bundle, at.scale, priors.scale
+    )
+    if any(each.wanted_uncertainty > VAGUE for each in size):
+        size, scale = [], priors.scale
+    found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
+    return found, replace(priors, diameter=diameter, scale=scale)
 
 
 def _most(denied: tuple[list[Contradiction], object]) -> float:

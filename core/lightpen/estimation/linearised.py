@@ -11,7 +11,7 @@ tip, the pen's scale and whatever else moves LEDs together needs no column of it
 it is a combination of theirs.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,6 +37,10 @@ class BundleState:
         mm.
     rotations : (N, 3, 3) array
         Of rig_from_pen.
+    at_second : (N,) array of bool or None
+        Images in which the tip rests in a second cone; None without one.
+    between_rig : (3,) array
+        From the first cone to the second, mm.
     """
 
     rig: Rig
@@ -44,6 +48,30 @@ class BundleState:
     tip_pen: FloatArray
     cone_rig: FloatArray
     rotations: FloatArray
+    at_second: BoolArray | None = None
+    between_rig: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def cones_rig(self) -> FloatArray:
+        """Cone in which the tip of each image rests, (N, 3), mm."""
+        cones = np.tile(self.cone_rig, (len(self.rotations), 1))
+        if self.at_second is not None:
+            cones[self.at_second] += self.between_rig
+        return cones
+
+    def leds_in(self, c: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return where LEDs are in the frame of a camera, mm, and their normals.
+
+        Returns
+        -------
+        levers, points, normals : (N, L, 3) array
+            From the tip, from the camera.
+        """
+        R_c, t_c = self.rig.rotations[c], self.rig.translations[c]
+        transposed = np.swapaxes(R_c @ self.rotations, 1, 2)
+        levers = (self.pen.leds - self.tip_pen) @ transposed
+        cones = self.cones_rig @ R_c.T + t_c
+        return levers, levers + cones[:, None], self.pen.normals @ transposed
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +108,9 @@ def views_at(state: BundleState, pixels: FloatArray) -> tuple[CameraView, ...]:
 def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
     rig, pen = state.rig, state.pen
     camera, R_c, t_c = rig.cameras[c], rig.rotations[c], rig.translations[c]
-    R = R_c @ state.rotations
-    lever = (pen.leds - state.tip_pen) @ np.swapaxes(R, 1, 2)
-    points = lever + (R_c @ state.cone_rig + t_c)
-    normals = pen.normals @ np.swapaxes(R, 1, 2)
+    levers, points, normals = state.leds_in(c)
     residuals, J = disc_residuals(
-        camera, lever, points, normals, pen.diameter / 2, pixels
+        camera, levers, points, normals, pen.diameter / 2, pixels
     )
     by_point = J[..., 3:]
     normalised = points[..., :2] / points[..., 2:]
@@ -99,7 +124,7 @@ def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
         residuals=residuals,
         turn=J[..., :3] @ R_c,
         cone=by_point @ R_c,
-        led=by_point @ R[:, None],
+        led=by_point @ (R_c @ state.rotations)[:, None],
         own=own,
         diameter=2 / pen.diameter * offset,
     )

@@ -107,7 +107,7 @@ def _rows_of(bundle: Bundle, pixels: FloatArray) -> _Rows:
         rows = np.stack(parts, axis=1) / bundle.weight_sigma
         return rows.reshape(n_images, -1, rows.shape[-1])
 
-    jitter = bundle.components.jitter
+    jitter = bundle.components.jitter.covariance
     T, J = flat(turns), flat(common)
     if jitter is not None:
         T = np.concatenate([T, flat(cones)], axis=2)

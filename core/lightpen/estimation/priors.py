@@ -5,14 +5,18 @@ zero: a documented assumption takes its place and is told wherever the result is
 """
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.disc_diameter import DiameterReading
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
+
+REFERENCE_TEMPERATURE = 20.0  # degrees C, at which lengths are stated: ISO 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,14 @@ class Prior:
     assumed: bool
 
 
+@dataclass(frozen=True)
+class Separation:
+    """A certified distance of two cones, with its standard uncertainty, mm."""
+
+    distance: float
+    sigma: float
+
+
 @dataclass(frozen=True, eq=False)
 class Priors:
     """What is known of all that a fit holds beside tip, cone and rotations.
@@ -42,18 +54,41 @@ class Priors:
     extrinsics : Prior or None
         Of all cameras but the first, as `Rig.covariance`; None of a single camera.
     scale : Prior
-        Of the pen: relative, of all its coordinates.
+        Of the pen, by its measurement: relative, of all its coordinates.
+    temperature : Prior
+        Of the same, by its temperature.
     diameter : Prior
         Of the discs, mm.
     led_sigma : float or None
         Of one LED coordinate, mm; None: to be found from the images.
+    led_covariance : (3 L, 3 L) array or None
+        Of all of them, mm^2, where more is known than ``led_sigma``.
+    form_error : float
+        Of where the ball sits, along each axis in each form of the lean, mm.
+    center_bias : float
+        Of the centre of an LED's image, px, by what does not average out.
+    reading : DiameterReading or None
+        Of the discs by the areas of their images.
+    separation : Separation or None
+        Of the second cone from the first.
     """
 
     cameras: tuple[Prior, ...]
     extrinsics: Prior | None
     scale: Prior
+    temperature: Prior
     diameter: Prior
     led_sigma: float | None
+    form_error: float
+    center_bias: float
+    led_covariance: FloatArray | None = None
+    reading: DiameterReading | None = None
+    separation: Separation | None = None
+
+    @property
+    def size_covariance(self) -> FloatArray:
+        """Of the scale as it is during the swing, (1, 1)."""
+        return self.scale.covariance + self.temperature.covariance
 
 
 def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
@@ -68,13 +103,21 @@ def priors_of(rig: Rig, pen: Pen, assumptions: Assumptions) -> Priors:
     return Priors(
         cameras=tuple(_intrinsics(camera, assumptions) for camera in rig.cameras),
         extrinsics=extrinsics,
-        scale=_scale(pen, assumptions),
+        scale=(
+            _one(assumptions.scale, assumed=True)
+            if pen.scale_sigma is None
+            else _one(pen.scale_sigma, assumed=False)
+        ),
+        temperature=_temperature(pen, assumptions),
         diameter=(
             _one(assumptions.diameter * pen.diameter, assumed=True)
             if pen.diameter_sigma is None
             else _one(pen.diameter_sigma, assumed=False)
         ),
         led_sigma=pen.led_sigma,
+        form_error=assumptions.form_error,
+        center_bias=assumptions.center_bias,
+        led_covariance=pen.led_covariance,
     )
 
 
@@ -106,11 +149,44 @@ def _assumed_extrinsics(rig: Rig, assumptions: Assumptions) -> Prior:
     return Prior(np.diag(sigmas**2), assumed=True)
 
 
-def _scale(pen: Pen, assumptions: Assumptions) -> Prior:
-    """Return the prior of the scale: its measurement, and what warmth makes of it."""
-    if pen.scale_sigma is not None:
-        return _one(pen.scale_sigma, assumed=False)
-    return _one(assumptions.scale, assumed=True)
+def thermal_growth(pen: Pen, assumptions: Assumptions) -> float:
+    """Return by how much a pen is larger than its file has it, relative.
+
+    0 where its temperature was not measured, or the file states no expansion.
+    """
+    if pen.expansion is None:
+        return 0.0
+    return pen.expansion * _warmth(pen, assumptions)
+
+
+def _warmth(pen: Pen, assumptions: Assumptions) -> float:
+    """Return how much warmer the pen is than at its measurement, K."""
+    if assumptions.temperature_c is None:
+        return 0.0
+    measured = pen.temperature_c
+    return assumptions.temperature_c - (
+        REFERENCE_TEMPERATURE if measured is None else measured
+    )
+
+
+def _temperature(pen: Pen, assumptions: Assumptions) -> Prior:
+    """Return what is not known of the growth of a pen."""
+    is_measured = assumptions.temperature_c is not None
+    warmth = _warmth(pen, assumptions)
+    uncertainty = assumptions.temperature if is_measured else assumptions.warmth
+    if pen.expansion is None:  # nothing is corrected then
+        expansion = sigma = assumptions.expansion
+    else:
+        expansion = pen.expansion
+        sigma = (
+            assumptions.expansion_share * abs(expansion)
+            if pen.expansion_sigma is None
+            else pen.expansion_sigma
+        )
+    return _one(
+        hypot(expansion * uncertainty, sigma * warmth),
+        assumed=pen.expansion is None or not is_measured,
+    )
 
 
 def _one(sigma: float, *, assumed: bool) -> Prior:

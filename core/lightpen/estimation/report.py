@@ -11,6 +11,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.instrument import instrument_record
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.rig_report import (
     count_dropped,
@@ -18,6 +19,7 @@ from lightpen.estimation.rig_report import (
     rig_record,
     rig_warnings,
 )
+from lightpen.estimation.second_cone import SecondCone
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
@@ -95,6 +97,7 @@ def calibration_record(
     record = {
         "program": _program(),
         "created": local_now().isoformat(timespec="seconds"),
+        "origin": None if inputs.origin is None else inputs.origin.value,
         "method": method,
         "tip_pen_mm": tip,
         "cone_cam_mm": result.cone_cam,
@@ -117,6 +120,8 @@ def calibration_record(
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "adjusted": _adjusted(calibration),
+        "second_cone": _second_cone(calibration.second),
+        "instrument": instrument_record(calibration.instrument),
         "weakest_direction": {
             "vector_pen": calibration.budget.weakest_direction,
             "expanded_uncertainty_mm": calibration.budget.weakest_uncertainty,
@@ -132,7 +137,7 @@ def calibration_record(
         },
         "frames": _frames(calibration),
     }
-    return {name: _plain(entry) for name, entry in record.items()}
+    return {name: plain(entry) for name, entry in record.items()}
 
 
 def pivot_record(
@@ -179,7 +184,7 @@ def pivot_record(
             )
         ],
     }
-    return {name: _plain(entry) for name, entry in record.items()}
+    return {name: plain(entry) for name, entry in record.items()}
 
 
 def json_bytes(record: Mapping[str, Any]) -> bytes:
@@ -244,7 +249,7 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     """Return what is told of a tip that did not rest where the model has it."""
     bundle, found = calibration.bundle, calibration.bundle.components
     warnings = []
-    if found.jitter is not None:
+    if found.jitter.covariance is not None:
         warnings.append(
             sentence(
                 "warning.seat-jitter",
@@ -252,7 +257,7 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
                 "{distance:.4f} mm (standard deviation) from image to image. Clean tip "
                 "and cone, look for wear, and press the tip in. It is in the "
                 "uncertainty.",
-                distance=float(np.sqrt(np.trace(found.jitter))),
+                distance=float(np.sqrt(np.trace(found.jitter.covariance))),
             )
         )
     if any(form.is_significant for form in found.seat):
@@ -320,7 +325,7 @@ def _verdict(calibration: Calibration, limits: SwingLimits) -> dict[str, Any]:
     verdict = judge(calibration, limits)
     return {
         "grade": verdict.grade.value,
-        **_plain(verdict.reason),
+        **plain(verdict.reason),
         "next_step": verdict.next_step.value,
         "limits": {
             "max_uncertainty_mm": limits.max_uncertainty,
@@ -388,12 +393,20 @@ def _uncertainty(calibration: Calibration) -> dict[str, Any]:
 def _adjusted(calibration: Calibration) -> dict[str, Any]:
     """Return what the images made of the files."""
     prior = calibration.priors.cameras[0]
+    reading = calibration.priors.reading
     return {
         "intrinsics": intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
         "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
+        "temperature_uncertainty_assumed": calibration.priors.temperature.assumed,
+        "pen_growth": calibration.growth,
         "disc_diameter_mm": calibration.bundle.state.pen.diameter,
+        "disc_diameter_by_areas_mm": (
+            None
+            if reading is None
+            else {"value": reading.value, "standard_uncertainty": reading.sigma}
+        ),
         "contradictions": [
             {
                 "what": str(each.what),
@@ -407,6 +420,20 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
             }
             for each in calibration.contradictions
         ],
+    }
+
+
+def _second_cone(second: SecondCone | None) -> dict[str, Any] | None:
+    if second is None:
+        return None
+    return {
+        "cone_cam_mm": second.cone_cam,
+        "images_used": second.n_used,
+        "stated_distance_mm": second.separation.distance,
+        "stated_standard_uncertainty_mm": second.separation.sigma,
+        "distance_mm": second.distance,
+        "expanded_uncertainty_without_mm": second.uncertainty_without,
+        "expanded_uncertainty_with_mm": second.uncertainty_with,
     }
 
 
@@ -485,16 +512,16 @@ def _dumps(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Return arrays as lists, what is not a number as null, sentences with codes."""
     if isinstance(value, Sentence):
         value = {"code": value.code, "text": str(value), "values": value.values}
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, dict):
-        return {name: _plain(entry) for name, entry in value.items()}
+        return {name: plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

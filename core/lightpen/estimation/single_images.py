@@ -8,7 +8,7 @@ import numpy.typing as npt
 from lightpen.arrays import BoolArray, IntArray
 from lightpen.detection.observations import Observations
 from lightpen.detection.pose import MIN_POSE_LEDS, Poses, fit_poses
-from lightpen.detection.reasons import Reason
+from lightpen.detection.reasons import Reason, counted
 from lightpen.errors import CalibrationError
 from lightpen.estimation.pivot import PivotFit, fit_pivot
 from lightpen.model.camera import Camera
@@ -154,12 +154,7 @@ def require_images(
     if len(chosen) >= MIN_IMAGES:
         return
     left_out = tuple(
-        sentence(
-            "calibrate.images-of-a-reason",
-            "{n_images} {reason}",
-            n_images=int(np.sum(reasons == reason)),
-            reason=reason.words,
-        )
+        counted(int(np.sum(reasons == reason)), reason)
         for reason in Reason
         if reason and np.any(reasons == reason)
     )

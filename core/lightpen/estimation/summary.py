@@ -14,6 +14,7 @@ from lightpen.estimation.report import (
 from lightpen.estimation.rig_report import count_dropped, named_images, rig_lines
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.verdict import Verdict
+from lightpen.model.origin import Origin
 
 
 def calibration_text(
@@ -21,8 +22,15 @@ def calibration_text(
     method: str,
     nominal_tip: FloatArray | None,
     verdict: Verdict,
+    origin: Origin | None = None,
 ) -> str:
-    """Return a calibration as text for the screen, the verdict on it last."""
+    """Return a calibration as text for the screen, the verdict on it last.
+
+    Parameters
+    ----------
+    origin : Origin, optional
+        What the images are of, where that is known.
+    """
     results = {name: result_of(calibration, name) for name in METHODS}
     chosen = results[method]
     lines = [_heading("Tip in the pen frame, mm", "xyz")]
@@ -40,7 +48,13 @@ def calibration_text(
     lines += ["", _heading(f"Cone in the {frame}, mm", "uvw")]
     lines.append(_numbers(method, chosen.cone_cam))
     lines.append(_numbers("  U (k = 2)", chosen.expanded_uncertainty[3:]))
-    lines += ["", *_image_lines(calibration), "", *_quality_lines(calibration, chosen)]
+    lines += [
+        "",
+        *_origin_lines(origin),
+        *_image_lines(calibration),
+        "",
+        *_quality_lines(calibration, chosen),
+    ]
     warnings = warnings_of(calibration)
     if warnings:
         lines += ["", *map(str, warnings)]
@@ -75,6 +89,13 @@ def pivot_text(calibration: PivotCalibration) -> str:
             *(["", *warnings] if calibration.warnings else []),
         ]
     )
+
+
+def _origin_lines(origin: Origin | None) -> list[str]:
+    if origin is None:
+        return []
+    remark = ": this is the tip of no real pen" if origin is Origin.SIMULATED else ""
+    return [f"Origin       {origin.upper()}{remark}"]
 
 
 def _image_lines(calibration: Calibration) -> list[str]:
@@ -122,11 +143,37 @@ def _quality_lines(calibration: Calibration, chosen: MethodResult) -> list[str]:
     )
     if calibration.coverage.missing:
         lines.append(f"  never leant {', '.join(calibration.coverage.missing)}")
+    lines += _pen_lines(calibration)
     if calibration.led_sigma > 0:
         lines.append(
             f"LED file     off by {calibration.led_sigma:.4f} mm (standard "
             "deviation of a coordinate), corrected as far as the images tell"
         )
+    return lines
+
+
+def _pen_lines(calibration: Calibration) -> list[str]:
+    lines = []
+    if calibration.growth != 0:
+        lines.append(
+            f"Temperature  the pen is {1e6 * calibration.growth:+.1f} ppm larger than "
+            "its file says, which is corrected"
+        )
+    reading = calibration.priors.reading
+    if reading is not None:
+        lines.append(
+            f"Discs        {reading.value:.2f} mm wide by their areas, U = "
+            f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
+        )
+    second = calibration.second
+    if second is not None:
+        lines += [
+            f"Second cone  {second.n_used} images used, {second.distance:.4f} mm from "
+            f"the first; certified {second.separation.distance:.4f} mm, U = "
+            f"{COVERAGE_FACTOR * second.separation.sigma:.4f} mm",
+            _numbers("  U without the distance", second.uncertainty_without),
+            _numbers("  U with it", second.uncertainty_with),
+        ]
     return lines
 
 

@@ -20,12 +20,14 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.adjustment import Adjustment
-from lightpen.estimation.bundle import Z_99
+from lightpen.estimation.bundle import Z_99, Bundle
 from lightpen.estimation.joint import JointFit
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
+POSTURES = 30  # that differ enough for centres to be off in another way
+SIDEWAYS = 1.22  # root of 3/2: two of three axes have what is told of all three
 NEGLIGIBLE = 1e-5  # mm, of a standard uncertainty
 
 
@@ -33,10 +35,14 @@ class ShareName(StrEnum):
     """What makes a tip uncertain."""
 
     NOISE = "noise"
+    CENTERS = "led centres"  # what does not average out
     SEAT = "seat"
+    FORM = "ball and cone"
     DRIFT = "drift"
     LEDS = "led geometry"
     SCALE = "pen scale"
+    TEMPERATURE = "temperature"
+    DISTANCE = "cone distance"
     DIAMETER = "disc diameter"
     CAMERA = "camera"
     EXTRINSICS = "rig"
@@ -154,13 +160,23 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     blocks, ratio, blocks_count = _block_scatter(joint, joint.covariance)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     at = bundle.columns
-    jitter = bundle.carried(bundle.jitter_information)
+    jitter = bundle.carried(bundle.jitter_information + bundle.doubted_jitter)
+    moved, by_form = _of_seat(bundle, priors.form_error)
+    drift = bundle.part(at.drift)
+    drift *= _doubt(bundle, at.drift, bundle.components.drift.expected)
+    biased = _center_bias(bundle, priors.center_bias)
+    size = bundle.part(at.scale)
+    warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [
         Share(ShareName.NOISE, raised * correlation.noise),
-        Share(ShareName.SEAT, jitter + bundle.part(*at.seat)),
-        Share(ShareName.DRIFT, bundle.part(at.drift)),
+        Share(ShareName.CENTERS, biased, assumed=True),
+        Share(ShareName.SEAT, jitter + moved),
+        Share(ShareName.FORM, by_form, assumed=True),
+        Share(ShareName.DRIFT, drift),
         Share(ShareName.LEDS, bundle.part(at.leds)),
-        Share(ShareName.SCALE, bundle.part(at.scale), priors.scale.assumed),
+        Share(ShareName.SCALE, (1 - warm) * size, priors.scale.assumed),
+        Share(ShareName.TEMPERATURE, warm * size, priors.temperature.assumed),
+        Share(ShareName.DISTANCE, bundle.part(at.between)),
         Share(ShareName.DIAMETER, bundle.part(at.diameter), priors.diameter.assumed),
         Share(
             ShareName.CAMERA,
@@ -182,6 +198,40 @@ def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
         autocorrelation=correlation.coefficient,
         correlation_factor=raised * correlation.factor,
     )
+
+
+def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
+    """Return what the lean of the pen does, beyond the form error and by it."""
+    moved, by_form = np.zeros((6, 6)), np.zeros((6, 6))
+    expected = [form.expected for form in bundle.components.seat]
+    # It is hardly seen beside the tip, and goes sideways rather than along the cone.
+    expected[0] = SIDEWAYS * max(expected)
+    for at, likely in zip(bundle.columns.seat, expected, strict=True):
+        times = _doubt(bundle, at, likely)
+        share = min(form_error**2 / max(_variance(bundle, at), likely**2), 1.0)
+        part = times * bundle.part(at)
+        by_form += share * part
+        moved += (1 - share) * part
+    return moved, by_form
+
+
+def _doubt(bundle: Bundle, at: slice, expected: float) -> float:
+    """Return how many times the variance of errors is that which they were fitted with.
+
+    What is not likely enough to be fitted may be there all the same.
+    """
+    return max(expected**2 / _variance(bundle, at), 1.0)
+
+
+def _variance(bundle: Bundle, at: slice) -> float:
+    return 1 / float(bundle.prior_information[at.start, at.start])
+
+
+def _center_bias(bundle: Bundle, bias: float) -> FloatArray:
+    """Return what centres that are off in each posture its own way make."""
+    n_images = int(bundle.used.any(axis=(1, 2)).sum())
+    times = max(n_images / POSTURES, 1.0)
+    return times * (bias / bundle.sigma) ** 2 * bundle.independent_noise
 
 
 def compare_halves(joint: JointFit) -> Halves:

@@ -13,8 +13,13 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.linearised import N_CONE, BundleState, Eliminated
-from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.variance_components import Component, find_component
+from lightpen.estimation.priors import Priors
+from lightpen.estimation.variance_components import (
+    FITTED,
+    Component,
+    Jitter,
+    find_component,
+)
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, skew
 
@@ -37,6 +42,7 @@ class Columns(NamedTuple):
     leds: slice
     seat: tuple[slice, ...]
     drift: slice
+    between: slice
 
 
 class Components(NamedTuple):
@@ -51,17 +57,17 @@ class Components(NamedTuple):
         Of the seat by each kind of form in which it may follow the lean, mm.
     drift : Component
         Of the cone from the first to the last image, mm.
-    jitter : (3, 3) array or None
-        Covariance of the seat from image to image, mm^2.
+    jitter : Jitter
+        Of the seat from image to image.
     """
 
     leds: Component
     seat: tuple[Component, ...]
     drift: Component
-    jitter: FloatArray | None
+    jitter: Jitter
 
 
-NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, None)
+NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, Jitter(None, 0.0))
 
 
 def lean_forms(rotations: FloatArray) -> FloatArray:
@@ -97,7 +103,8 @@ class Unknowns:
     mixing : (K, p0) array
         Columns of `Eliminated` by the unknowns common to all images.
     forms : (N, m) array
-        Weights by which each image shifts its cone: the lean, then time.
+        Weights by which each image shifts its cone: the lean, then time, then whether
+        it is at the second cone.
     basis : (3 L, 3 L - 6) array
         Moves of LEDs but those of the pen as a whole.
     scaling : (3 L,) array
@@ -105,6 +112,7 @@ class Unknowns:
     """
 
     columns: Columns
+    start: BundleState
     mixing: FloatArray
     forms: FloatArray
     basis: FloatArray
@@ -120,12 +128,13 @@ class Unknowns:
         n_extrinsics = 6 * (rig.n_cameras - 1)
         basis = led_basis(pen.leds)
         counts = [3, 3, *sizes, n_extrinsics, 1, 1, basis.shape[1]]
-        counts += [3 * n_forms for n_forms in FORMS] + [3]
+        counts += [3 * n_forms for n_forms in FORMS]
+        counts += [3, 0 if start.at_second is None else 3]
         ends = np.cumsum(counts).tolist()
         slices = [slice(end - n, end) for n, end in zip(counts, ends, strict=True)]
         tip, cone, *others = slices
         cameras, others = others[: len(sizes)], others[len(sizes) :]
-        extrinsics, diameter, scale, leds, *seat, drift = others
+        extrinsics, diameter, scale, leds, *seat, drift, between = others
         columns = Columns(
             tip=tip,
             cone=cone,
@@ -136,6 +145,7 @@ class Unknowns:
             leds=leds,
             seat=tuple(seat),
             drift=drift,
+            between=between,
         )
         scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
         K = N_CONE + sum(sizes) + n_extrinsics + 1 + 3 * n_leds
@@ -155,13 +165,14 @@ class Unknowns:
         mixing[at_leds, columns.scale.start] = scaling
         mixing[at_leds, columns.leds] = basis
         time = np.linspace(-0.5, 0.5, len(lean))
-        forms = np.column_stack([lean, time])
-        return cls(columns, mixing, forms, basis, scaling, priors)
+        second = () if start.at_second is None else (start.at_second.astype(float),)
+        forms = np.column_stack([lean, time, *second])
+        return cls(columns, start, mixing, forms, basis, scaling, priors)
 
     @property
     def number(self) -> int:
         """How many there are, rotations apart."""
-        return int(self.columns.drift.stop)
+        return int(self.columns.between.stop)
 
     def system(self, each: Eliminated) -> tuple[FloatArray, FloatArray]:
         """Return information (p, p) and gradient (p,) of the unknowns."""
@@ -199,15 +210,53 @@ class Unknowns:
         at, priors = self.columns, self.priors
         prior = np.zeros((self.number, self.number))
         for place, each in zip(at.cameras, priors.cameras, strict=True):
-            prior[place, place] = _information(each)
+            prior[place, place] = _information(each.covariance)
         if priors.extrinsics is not None:
-            prior[at.extrinsics, at.extrinsics] = _information(priors.extrinsics)
-        prior[at.diameter, at.diameter] = _information(priors.diameter)
-        prior[at.scale, at.scale] = _information(priors.scale)
+            prior[at.extrinsics, at.extrinsics] = _information(
+                priors.extrinsics.covariance
+            )
+        prior[at.diameter, at.diameter] = _information(priors.diameter.covariance)
+        prior[at.scale, at.scale] = _information(priors.size_covariance)
         for place, sigma in self._sigmas(components):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        of_leds = priors.led_covariance
+        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+            known = self.basis.T @ of_leds @ self.basis
+            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
+
+    def measured(
+        self, state: BundleState, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what was measured beside the centres: information and right side.
+
+        Parameters
+        ----------
+        values : (p,) array
+            Those at the state.
+
+        Returns
+        -------
+        information : (p, p) array
+        right : (p,) array
+        """
+        at, priors = self.columns, self.priors
+        information = np.zeros((self.number, self.number))
+        right = np.zeros(self.number)
+        if priors.reading is not None:
+            weight = priors.reading.sigma**-2
+            change = priors.reading.value - self.start.pen.diameter
+            information[at.diameter, at.diameter] = weight
+            right[at.diameter] = weight * change
+        if priors.separation is not None:
+            weight = priors.separation.sigma**-2
+            distance = float(np.linalg.norm(state.between_rig))
+            along = state.between_rig / distance
+            change = priors.separation.distance - distance
+            information[at.between, at.between] = weight * np.outer(along, along)
+            right[at.between] = weight * along * (change + along @ values[at.between])
+        return information, right
 
     def _sigmas(self, components: Components) -> list[tuple[slice, float]]:
         at, stated = self.columns, self.priors.led_sigma
@@ -215,9 +264,10 @@ class Unknowns:
         # A seat that goes once round with the pen is hardly seen beside the tip:
         # nothing says that it does so less than in any other form.
         seat = [max(one_wave, *others), *others]
+        form_error = self.priors.form_error
         return [
             (at.leds, max(components.leds.sigma, stated or 0.0)),
-            *zip(at.seat, seat, strict=True),
+            *((at, max(s, form_error)) for at, s in zip(at.seat, seat, strict=True)),
             (at.drift, components.drift.sigma),
         ]
 
@@ -226,15 +276,11 @@ class Unknowns:
         information: FloatArray,
         right: FloatArray,
         before: Components,
-        least_gain: float,
     ) -> Components:
-        """Return the components, each found beside the others.
-
-        Those of seat and drift count that gain at least so much.
-        """
+        """Return the components, each found beside the others."""
         now = before
         for _ in range(ROUNDS):
-            now = self._found_once(information, right, now, least_gain)
+            now = self._found_once(information, right, now)
         return now
 
     def _found_once(
@@ -242,7 +288,6 @@ class Unknowns:
         information: FloatArray,
         right: FloatArray,
         before: Components,
-        least_gain: float,
     ) -> Components:
         at, prior = self.columns, self.prior_information(before)
         covariance = inverse(information + prior)
@@ -253,39 +298,42 @@ class Unknowns:
             own = known - prior[place, place]
             return find_component(own, known @ values[place], sigma)
 
-        def likely(place: slice) -> Component:
-            component = find(place)
-            return component if component.gain > least_gain else NONE
+        def likely(place: slice, stated: float = 0.0) -> Component:
+            component = find(place, stated)
+            is_more = component.sigma > stated and component.gain > FITTED
+            return component if is_more else component._replace(sigma=0.0)
 
         return before._replace(
             leds=self._found_leds(find),
-            seat=tuple(map(likely, at.seat)),
+            seat=tuple(likely(place, self.priors.form_error) for place in at.seat),
             drift=likely(at.drift),
         )
 
     def _found_leds(self, find: Callable[[slice, float], Component]) -> Component:
-        stated = self.priors.led_sigma
+        stated, of_leds = self.priors.led_sigma, self.priors.led_covariance
+        if of_leds is not None:  # the least known may be off by that much
+            stated = float(np.sqrt(np.linalg.eigvalsh(of_leds)[-1]))
         component = find(self.columns.leds, stated or 0.0)
         if stated is None or (component.is_significant and component.sigma > stated):
             return component
         return NONE
 
     def moved(
-        self,
-        start: BundleState,
-        now: BundleState,
-        values: FloatArray,
-        turns: FloatArray,
+        self, now: BundleState, values: FloatArray, turns: FloatArray
     ) -> BundleState:
         """Return the state by new values and the turn of each image, (N, 3)."""
-        at, rig = self.columns, start.rig
+        at, start, rig = self.columns, self.start, self.start.rig
         cameras = tuple(
             _with_intrinsics(camera, camera.intrinsics + values[place])
             for camera, place in zip(rig.cameras, at.cameras, strict=True)
         )
         places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
         leds = self.basis @ values[at.leds] + self.scaling * values[at.scale]
-        return BundleState(
+        between = start.between_rig
+        if now.at_second is not None:
+            between = between + values[at.between]
+        return replace(
+            now,
             rig=replace(
                 rig,
                 cameras=cameras,
@@ -300,6 +348,7 @@ class Unknowns:
             tip_pen=now.tip_pen + values[at.tip],
             cone_rig=now.cone_rig + values[at.cone],
             rotations=rotation_from_vector(turns) @ now.rotations,
+            between_rig=between,
         )
 
 
@@ -316,9 +365,9 @@ def _with_intrinsics(camera: Camera, intrinsics: FloatArray) -> Camera:
     return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=intrinsics[4:])
 
 
-def _information(prior: Prior) -> FloatArray:
-    floor = np.maximum(np.diag(prior.covariance) * EXACT, EXACT**2)
-    return inverse(prior.covariance + np.diag(floor))
+def _information(covariance: FloatArray) -> FloatArray:
+    floor = np.maximum(np.diag(covariance) * EXACT, EXACT**2)
+    return inverse(covariance + np.diag(floor))
 
 
 def inverse(matrix: FloatArray) -> FloatArray:

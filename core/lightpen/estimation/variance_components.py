@@ -4,6 +4,10 @@ Errors of one kind (of the LEDs, of the seat, of a drift) are taken as normal wi
 standard deviation, found by restricted maximum likelihood (empirical Bayes [1]_): the
 errors themselves, and all that the images leave open beside them, are integrated out.
 
+What chance makes often is not taken for an error; yet it may be one. Its variance is
+expected to be the mean over all that it may be, weighed by how likely the images have
+it: none as a rule, else anything, evenly in the logarithm.
+
 References
 ----------
 .. [1] D. A. Harville, "Maximum likelihood approaches to variance component estimation
@@ -19,6 +23,7 @@ from lightpen.arrays import FloatArray
 SIGNIFICANT = 10.83  # chi-square, 1 degree of freedom, at 0.001
 COUNTED = 2.71  # the same at 0.1: enough to be counted in the uncertainty
 FITTED = 6.63  # the same at 0.01: enough to be fitted
+NONE_SHARE = 0.5  # of swings in which errors of a kind are as good as none
 SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
 SEEN = 1e-9  # of the largest eigenvalue; what is less is not seen at all
 MAX_PASSES = 60
@@ -36,10 +41,13 @@ class Component(NamedTuple):
     gain : float
         Twice the logarithm of how much likelier it is than none, or than what a file
         states.
+    expected : float
+        Root of the mean variance over all that it may be, mm.
     """
 
     sigma: float
     gain: float
+    expected: float = 0.0
 
     @property
     def is_significant(self) -> bool:
@@ -69,12 +77,35 @@ def find_component(S: FloatArray, right: FloatArray, stated: float = 0.0) -> Com
     excess = values * sigmas[:, None] ** 2 + 1
     costs = np.sum(np.log(excess) + projected**2 / (values * excess), axis=1)
     best = int(np.argmin(costs))
-    return Component(float(sigmas[best]), float(costs[0] - costs[best]))
+    gain = float(costs[0] - costs[best])
+    return Component(float(sigmas[best]), gain, _expected(sigmas, costs))
+
+
+def _expected(sigmas: FloatArray, costs: FloatArray) -> float:
+    """Return the root mean square of standard deviations, the first being none, mm."""
+    weights = np.exp(-0.5 * (costs - costs.min()))
+    weights[1:] *= (1 - NONE_SHARE) / (NONE_SHARE * len(SCALES))
+    return float(np.sqrt(weights @ sigmas**2 / weights.sum()))
+
+
+class Jitter(NamedTuple):
+    """What is likely of a vector that is another in each image.
+
+    Attributes
+    ----------
+    covariance : (3, 3) array or None
+        mm^2; None where it is not significant.
+    expected : float
+        Standard deviation along each axis that is expected all the same, mm.
+    """
+
+    covariance: FloatArray | None
+    expected: float
 
 
 def find_jitter(
     information: FloatArray, right: FloatArray, leverage: FloatArray
-) -> FloatArray | None:
+) -> Jitter:
     """Find the covariance of a vector that is another in each image.
 
     Parameters
@@ -87,18 +118,22 @@ def find_jitter(
         Covariance that the unknowns common to all images leave in the vector that
         each image alone would give, mm^2.
 
-    Returns
-    -------
-    (3, 3) array or None
-        mm^2; None where it is not significant.
-
     Notes
     -----
-    Expectation-maximisation.
+    Expectation-maximisation, if one standard deviation along all axes is likely.
     """
     noise = np.linalg.inv(information)
     alone = np.einsum("nij,nj->ni", noise, right)
     excess = np.einsum("ni,nj->nij", alone, alone) + leverage
+
+    values, vectors = np.linalg.eigh(noise)
+    projected = np.einsum("nji,njk,nki->ni", vectors, excess, vectors)
+    sigmas = np.array([0.0, *SCALES])
+    totals = values + sigmas[:, None, None] ** 2
+    costs = np.sum(np.log(totals) + projected / totals, axis=(1, 2))
+    expected = _expected(sigmas, costs)
+    if costs[0] - costs.min() < FITTED:
+        return Jitter(None, expected)
 
     def cost(jitter: FloatArray) -> float:
         total = noise + jitter
@@ -115,6 +150,5 @@ def find_jitter(
         change = np.abs(np.diag(jitter) / np.diag(before) - 1)
         if change.max() < SETTLED:
             break
-    if cost(np.zeros((3, 3))) - cost(jitter) < MATRIX_SIGNIFICANT:
-        return None
-    return np.asarray(jitter)
+    is_significant = cost(np.zeros((3, 3))) - cost(jitter) >= MATRIX_SIGNIFICANT
+    return Jitter(np.asarray(jitter) if is_significant else None, expected)

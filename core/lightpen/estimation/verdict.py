@@ -16,10 +16,12 @@ from lightpen.messages import (
     file_contradicted,
     file_uncertain,
     halves_differ,
+    last_unknown,
     led_displaced,
     leds_misfit,
     leds_off,
     many_dropped,
+    tip_changed,
     tip_is_good,
     too_few_images,
     too_little_tilt,
@@ -33,11 +35,13 @@ FAR_OFF = 3.0  # times the limit of U: no result to work with
 MANY_DROPPED = 0.2  # of the images
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
-USUAL_CHANGE = 0.02  # mm, from one calibration of a tip to the next
-
+CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance alone
+AXES = "xyz"
+TINY = 1e-12  # mm
 
 IMAGES_SHRINK = (
     ShareName.NOISE,
+    ShareName.CENTERS,
     ShareName.SEAT,
     ShareName.DRIFT,
     ShareName.HELD_BACK,
@@ -50,6 +54,19 @@ _ADVICE = {
         "share.scale",
         "the scale of the LED file. State its uncertainty in the file, and measure "
         "where the pen is used",
+    ),
+    ShareName.FORM: sentence(
+        "share.form",
+        "ball and cone, which are not quite round. Use better ones, and state their "
+        "form error",
+    ),
+    ShareName.TEMPERATURE: sentence(
+        "share.temperature",
+        "the temperature of the pen. State its expansion in the LED file, and measure "
+        "its temperature at the swing",
+    ),
+    ShareName.DISTANCE: sentence(
+        "share.distance", "the distance of the two cones. Have it measured better"
     ),
     ShareName.DIAMETER: sentence(
         "share.diameter",
@@ -80,6 +97,7 @@ class NextStep(StrEnum):
     CAPTURE_MORE = "capture more"
     REPEAT = "repeat"
     CHECK_FILES = "check files"
+    CHECK_TIP = "check tip"
 
     @property
     def sentence(self) -> Sentence:
@@ -99,6 +117,10 @@ _TOLD = {
     NextStep.CHECK_FILES: sentence(
         "next-step.check-files",
         "Next: check the intrinsics file and the LED file, then repeat.",
+    ),
+    NextStep.CHECK_TIP: sentence(
+        "next-step.check-tip",
+        "Next: see that it is the tip that is named, clean and tight, then repeat.",
     ),
 }
 
@@ -135,6 +157,8 @@ _NEXT_STEPS = {
     Code.FILE_ASSUMED: NextStep.CHECK_FILES,
     Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
     Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
+    Code.TIP_CHANGED: NextStep.CHECK_TIP,
+    Code.LAST_UNKNOWN: NextStep.CHECK_TIP,
 }
 
 
@@ -159,10 +183,19 @@ class Change:
         return float(np.linalg.norm(self.difference))
 
     @property
-    def is_unusual(self) -> bool:
-        """Whether it is more than both uncertainties and usual wear explain."""
-        beyond = np.abs(self.difference) > self.expanded_uncertainty
-        return self.distance > USUAL_CHANGE and bool(beyond.any())
+    def is_unexplained(self) -> bool:
+        """Whether it is more than both uncertainties explain."""
+        beyond = np.abs(self.difference) > CHANGE_GATE * self.expanded_uncertainty
+        return bool(beyond.any())
+
+    def told(self, date: str) -> Sentence:
+        """Return it in words, beside an earlier tip of this date."""
+        lengths = np.abs(self.difference)
+        axis = int(np.argmax(lengths / np.maximum(self.expanded_uncertainty, TINY)))
+        return tip_changed(
+            *(self.distance, date, AXES[axis], float(lengths[axis])),
+            float(self.expanded_uncertainty[axis]),
+        )
 
 
 def change_since(
@@ -173,6 +206,30 @@ def change_since(
 ) -> Change:
     """Compare a tip with an earlier one: both (3,), pen frame, with U (k = 2), mm."""
     return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
+
+
+def judge_change(verdict: Verdict, change: Change | None, date: str) -> Verdict:
+    """Judge a tip that would pass by how far it lies from the one before.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        On the tip by itself; what is wrong with that counts more.
+    change : Change or None
+        Since the result in force; None if there is none.
+    date : str
+        Of that result.
+    """
+    if verdict.grade is not Grade.PASS or change is None or not change.is_unexplained:
+        return verdict
+    return Verdict(Grade.CHECK, change.told(date))
+
+
+def judge_unknown(verdict: Verdict, why: Sentence) -> Verdict:
+    """Judge a tip that would pass where the one before cannot be read."""
+    if verdict.grade is not Grade.PASS:
+        return verdict
+    return Verdict(Grade.CHECK, last_unknown(why))
 
 
 def distance_from_nominal(

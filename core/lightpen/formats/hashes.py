@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.files import sha256
+from lightpen.model.origin import Origin
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Inputs:
         The images, the video or the file of LED centres.
     nominal_tip : (3,) array or None
         Where the design puts the tip, pen frame, mm.
+    origin : Origin or None
+        What the images are of; None where a record of an earlier version does not say.
     """
 
     camera: InputFile
@@ -44,6 +47,7 @@ class Inputs:
     observations: tuple[InputFile, ...]
     nominal_tip: FloatArray | None
     rig: RigInputs | None = None
+    origin: Origin | None = None
 
 
 def hashed(path: Path) -> InputFile:

@@ -7,6 +7,7 @@ from typing import Self
 from lightpen.errors import LightpenError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
+from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.sentences import Sentence
@@ -14,10 +15,17 @@ from lightpen.sentences import Sentence
 
 @dataclass(frozen=True, eq=False)
 class CameraFile:
-    """An intrinsics file that was read."""
+    """An intrinsics file that was read.
+
+    Attributes
+    ----------
+    is_simulated : bool
+        Whether it is of a simulated camera.
+    """
 
     path: Path
     camera: Camera
+    is_simulated: bool = False
 
     @classmethod
     def read(cls, path: Path) -> Self:
@@ -28,7 +36,7 @@ class CameraFile:
         FileError
             It cannot be read.
         """
-        return cls(path, read_camera(path))
+        return cls(path, read_camera(path), is_simulated(path))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +47,14 @@ class PenFile:
     ----------
     units : str or None
         That were given for a file that does not say.
+    is_simulated : bool
+        Whether it is of a simulated pen.
     """
 
     path: Path
     pen: Pen
     units: str | None = None
+    is_simulated: bool = False
 
     @classmethod
     def read(cls, path: Path, units: str | None = None) -> Self:
@@ -56,7 +67,7 @@ class PenFile:
         FileError
             It cannot be read.
         """
-        return cls(path, read_pen(path, units), units)
+        return cls(path, read_pen(path, units), units, is_simulated(path))
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,7 @@ def has_checksum(text: bytes) -> bool:
     DamagedError
         It is not.
     """
-    body, mark, end = text.rpartition(CHECKSUM)
+    body, mark, end = text.rstrip().rpartition(CHECKSUM)
     if mark and end != _digest(body) + b'"}':
         raise DamagedError("The checksum is another one.")
     return bool(mark)

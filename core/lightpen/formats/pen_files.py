@@ -5,7 +5,9 @@ A table has the columns ``led,x_mm,y_mm,z_mm``, optionally ``nx,ny,nz`` (normals
 optional. Units may be written as in ``x_mm``, ``x [mm]``, ``x (m)`` and ``x/inch``.
 Standard uncertainties (k = 1) are optional columns, the same number in each row:
 ``led_sigma_mm`` of one LED coordinate, ``scale_sigma`` of all coordinates together
-(relative: 1e-5 is 10 um a metre) and ``diameter_sigma_mm``.
+(relative: 1e-5 is 10 um a metre) and ``diameter_sigma_mm``. So are ``expansion``, that
+of the pen by warmth in 1/K, ``expansion_sigma`` and ``temperature_c``, at which the
+LEDs were measured.
 
 A JSON file has
 
@@ -17,8 +19,13 @@ A JSON file has
 ``led_sigma``   standard uncertainty of one LED coordinate, optional
 ``scale_sigma`` of all coordinates together, relative, optional
 ``diameter_sigma`` of the diameter, optional
+``expansion``   of the pen by warmth, 1/K, optional
+``expansion_sigma`` standard uncertainty of that, 1/K, optional
+``temperature_c`` at which the LEDs were measured, degrees C, optional
 ``nominal_tip`` list of three coordinates, optional
 ``name``        name or serial number, optional
+``led_covariance`` of all coordinates but for the scale, 3 L rows of 3 L, optional
+``parent_sha256`` of the file that this one was made better from, not read
 ``comment``     not read
 ================== ===================================================================
 
@@ -72,11 +79,21 @@ _COLUMN = (
 _LED_KEYS = {"led", "x", "y", "z", "normal"}
 _FILE_KEYS = {
     *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
-    *("led_sigma", "scale_sigma", "diameter_sigma"),
+    *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
+    *("expansion", "expansion_sigma", "temperature_c"),
+    "parent_sha256",
 }
-_SIGMAS = ("led_sigma", "scale_sigma", "diameter_sigma")
-LARGEST_SIGMA = 10.0  # mm; and LARGEST_SCALE_SIGMA relative
-LARGEST_SCALE_SIGMA = 0.01
+ASYMMETRY = 1e-6  # of the largest variance
+_LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
+# From above the first to the second: mm, relative, 1/K, degrees C.
+_RANGES = {
+    "led_sigma": (0.0, 10.0),
+    "scale_sigma": (0.0, 0.01),
+    "diameter_sigma": (0.0, 10.0),
+    "expansion": (-1e-5, 1e-4),
+    "expansion_sigma": (0.0, 1e-4),
+    "temperature_c": (-50.0, 100.0),
+}
 
 
 def read_pen(
@@ -172,32 +189,36 @@ def read_unchecked_pen(path: Path, units: str | None = None) -> Pen:
     return _pen(_read(path, units), None, None)
 
 
-def write_pen(pen: Pen, path: Path) -> None:
+def write_pen(pen: Pen, path: Path, parent_sha256: str = "") -> None:
     """Write a pen as a table or as JSON, to be read back to the last digit.
 
     Parameters
     ----------
     path : Path
         Name that ends in .csv or .json.
+    parent_sha256 : str, optional
+        Of the file that the pen was made better from.
 
     Raises
     ------
     UsageError
-        The name ends otherwise, or the pen has a name or a nominal tip, for which a
-        table has no place.
+        The name ends otherwise, or the pen has a name, a nominal tip or a covariance,
+        for which a table has no place.
     FileError
         The file cannot be written.
     """
     suffix = path.suffix.lower()
     if suffix == ".json":
-        text = _json_text(pen)
+        text = _json_text(pen, parent_sha256)
     elif suffix == ".csv":
-        if pen.name or pen.nominal_tip is not None:
+        extras = pen.nominal_tip, pen.led_covariance
+        if pen.name or any(each is not None for each in extras):
             raise UsageError(
                 sentence(
                     "pen-file.table-has-no-place",
-                    "{name} is a table, which has no place for the name and the "
-                    "nominal tip of the pen. Choose a name that ends in .json.",
+                    "{name} is a table, which has no place for the name, the nominal "
+                    "tip and the covariance of the pen. Choose a name that ends in "
+                    ".json.",
                     name=printable(path.name),
                 )
             )
@@ -223,7 +244,8 @@ class _Content:
     diameter: float | None
     nominal_tip: FloatArray | None = None
     name: str = ""
-    sigmas: Mapping[str, float] = field(default_factory=dict)
+    stated: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = None
 
 
 def _pen(
@@ -247,7 +269,13 @@ def _pen(
     if normals is None:
         normals = _facing_normals(len(content.leds))
     return Pen(
-        content.leds, normals, diameter, nominal_tip, content.name, **content.sigmas
+        content.leds,
+        normals,
+        diameter,
+        nominal_tip,
+        content.name,
+        **content.stated,
+        led_covariance=content.covariance,
     )
 
 
@@ -310,14 +338,13 @@ def _from_table(table: Table, units: str | None) -> _Content:
         place = bare.header.index("diameter")
         diameter = _common(table, place, bare) * UNITS[named[place][1] or unit]
         _check_diameter(diameter, table.name)
-    sigmas = {}
-    for what in _SIGMAS:
+    further = {}
+    for what in _RANGES:
         if what in bare.header:
             place = bare.header.index(what)
-            size = 1.0 if what == "scale_sigma" else UNITS[named[place][1] or unit]
-            sigmas[what] = _checked_sigma(
-                what, _common(table, place, bare) * size, table.name
-            )
+            size = UNITS[named[place][1] or unit] if what in _LENGTHS else 1.0
+            number = _common(table, place, bare) * size
+            further[what] = _checked(what, number, table.name)
     normals = None
     if with_normals:
         normals = np.empty((len(numbers), 3))
@@ -326,7 +353,7 @@ def _from_table(table: Table, units: str | None) -> _Content:
                 "pen-file.line", "Line {line} of {name}", line=line, name=table.name
             )
             normals[i] = _unit(numbers[i, 3:], where)
-    return _Content(numbers[:, :3] * UNITS[unit], normals, diameter, sigmas=sigmas)
+    return _Content(numbers[:, :3] * UNITS[unit], normals, diameter, stated=further)
 
 
 def _name_and_unit(column: str) -> tuple[str, str]:
@@ -418,21 +445,22 @@ def _common(table: Table, column: int, bare: Table) -> float:
     return float(numbers[0])
 
 
-def _checked_sigma(what: str, sigma: float, name: str) -> float:
-    most = LARGEST_SCALE_SIGMA if what == "scale_sigma" else LARGEST_SIGMA
-    if not 0 < sigma <= most:
+def _checked(what: str, number: float, name: str) -> float:
+    least, most = _RANGES[what]
+    if not least < number <= most:
         raise FileError(
             sentence(
-                "pen-file.sigma",
-                "{name} has the {what} {sigma:g}. A standard uncertainty above 0 and "
-                "up to {most:g} is needed; leave it away if it is not known.",
+                "pen-file.number",
+                "{name} has the {what} {number:g}. A number above {least:g} and up to "
+                "{most:g} is needed; leave it away if it is not known.",
                 name=name,
                 what=what,
-                sigma=sigma,
+                number=number,
+                least=least,
                 most=most,
             )
         )
-    return sigma
+    return number
 
 
 def _check_diameter(diameter: float, name: str) -> None:
@@ -505,17 +533,39 @@ def _from_json(tree: Tree, units: str | None, name: str) -> _Content:
         diameter=diameter,
         nominal_tip=nominal_tip,
         name=printable(entries.word("name")),
-        sigmas={
-            what: _checked_sigma(
+        stated={
+            what: _checked(
                 what,
                 float(entries.counted(1, what)[0])
-                * (1.0 if what == "scale_sigma" else unit),
+                * (unit if what in _LENGTHS else 1.0),
                 name,
             )
-            for what in _SIGMAS
+            for what in _RANGES
             if entries.has(what)
         },
+        covariance=_covariance(entries, len(leds), unit, name),
     )
+
+
+def _covariance(
+    entries: Entries, n_leds: int, unit: float, name: str
+) -> FloatArray | None:
+    if not entries.has("led_covariance"):
+        return None
+    n = 3 * n_leds
+    matrix = entries.counted(n * n, "led_covariance").reshape(n, n) * unit**2
+    off = float(np.abs(matrix - matrix.T).max())
+    size = float(np.abs(np.diag(matrix)).max())
+    if off > ASYMMETRY * size or np.linalg.eigvalsh(matrix)[0] < -ASYMMETRY * size:
+        raise FileError(
+            sentence(
+                "pen-file.no-covariance",
+                "The led_covariance of {name} is none: it must be symmetric, and no "
+                "variance below 0. Leave it away, or give it as it was written.",
+                name=name,
+            )
+        )
+    return matrix
 
 
 def _listed_leds(entries: Entries, name: str) -> list[Entries]:
@@ -575,30 +625,30 @@ def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
     return np.array([_unit(led.counted(3, "normal"), led.name) for led in leds])
 
 
-def _stated_sigmas(pen: Pen) -> dict[str, float]:
+def _stated(pen: Pen) -> dict[str, float]:
     return {
-        what: float(sigma)
-        for what in _SIGMAS
-        if (sigma := getattr(pen, what)) is not None
+        what: float(number)
+        for what in _RANGES
+        if (number := getattr(pen, what)) is not None
     }
 
 
 def _csv_text(pen: Pen) -> str:
-    sigmas = _stated_sigmas(pen)
+    stated = _stated(pen)
     header = "led,x_mm,y_mm,z_mm,nx,ny,nz,diameter_mm"
     header += "".join(
-        f",{what}" if what == "scale_sigma" else f",{what}_mm" for what in sigmas
+        f",{what}_mm" if what in _LENGTHS else f",{what}" for what in stated
     )
     lines = [header]
     for number, (led, normal) in enumerate(
         zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
     ):
-        cells = [number, *led, *normal, float(pen.diameter), *sigmas.values()]
+        cells = [number, *led, *normal, float(pen.diameter), *stated.values()]
         lines.append(",".join(map(repr, cells)))
     return "\n".join(lines) + "\n"
 
 
-def _json_text(pen: Pen) -> str:
+def _json_text(pen: Pen, parent_sha256: str) -> str:
     import json
 
     leds = [
@@ -613,8 +663,12 @@ def _json_text(pen: Pen) -> str:
         f'"name": {json.dumps(pen.name)}',
         '"units": "mm"',
         f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
-        *(f'"{what}": {sigma!r}' for what, sigma in _stated_sigmas(pen).items()),
+        *(f'"{what}": {number!r}' for what, number in _stated(pen).items()),
         f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
+        *([f'"parent_sha256": "{parent_sha256}"'] if parent_sha256 else []),
         f'"leds": [\n    {rows}\n  ]',
     ]
+    if pen.led_covariance is not None:
+        of_leds = ",\n    ".join(map(json.dumps, pen.led_covariance.tolist()))
+        entries.append(f'"led_covariance": [\n    {of_leds}\n  ]')
     return "{\n  " + ",\n  ".join(entries) + "\n}\n"

@@ -5,6 +5,7 @@ passes over those that came meanwhile; during a swing it takes them all, in orde
 nothing moves it looks twice a second, and where nobody looks on, not at all.
 """
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Event, Thread
@@ -83,6 +84,8 @@ class Live:
         Takes every image.
     clock : Clock, optional
         The one that the camera goes by.
+    known : mapping of str to CameraSettings
+        By serial numbers; a camera that is among them gets these instead.
     """
 
     def __init__(
@@ -92,8 +95,11 @@ class Live:
         listener: LiveListener,
         runner: SwingRunner,
         clock: Clock | None = None,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
-        self._worker = CameraWorker(camera, settings, self._on_event, clock=clock)
+        self._worker = CameraWorker(
+            camera, settings, self._on_event, clock=clock, known=known
+        )
         self._listener = listener
         self._runner = runner
         self._aim = Aim()
@@ -107,6 +113,11 @@ class Live:
         self._ready = Event()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="looking", daemon=True)
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the camera, or what it is looked for by until it is open."""
+        return self._worker.serial
 
     @property
     def caps(self) -> Caps | None:
@@ -152,6 +163,10 @@ class Live:
     def set_gain(self, gain_db: float) -> None:
         """Ask the camera for another gain."""
         self._worker.set_gain(gain_db)
+
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask the camera for other settings, for which it stops for a moment."""
+        self._worker.configure(settings)
 
     def _run(self) -> None:
         try:
@@ -231,17 +246,19 @@ class Live:
         self._notice(image)
         caps = self._worker.caps
         n_images = None if caps is None else caps.n_images
-        self._runner.take(frame, image.sighting, setup, n_images)
+        stats = self._worker.stats
+        self._runner.take(frame, image.sighting, setup, n_images, stats)
         self._listener.on_image(image)
 
     def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:
         camera, pen, mask = wanted.camera, wanted.pen, wanted.mask
         if camera is None or pen is None or not camera.fits(frame.image):
             try:
-                return LiveImage(frame, detect_spots(frame.image, mask), None)
+                spots = detect_spots(frame.image, mask, full_scale=frame.full_scale)
+                return LiveImage(frame, spots, None)
             except MISHAPS:
                 return LiveImage(frame, Spots.none(), None)
-        sighting = look(frame.image, camera, pen, mask, self._last)
+        sighting = look(*(frame.image, camera, pen, mask, self._last, frame.full_scale))
         self._last = sighting
         spots = Spots.none() if sighting.spots is None else sighting.spots
         return LiveImage(frame, spots, sighting)

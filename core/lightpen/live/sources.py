@@ -1,19 +1,27 @@
 """The cameras that stand for the choice of a source."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.cameras.replay import ReplayCamera
-from lightpen.formats.opened_files import CameraFile, OpenedFiles, PenFile
+from lightpen.cameras.source import SourcePlace
+from lightpen.errors import FileError
+from lightpen.formats.opened_files import (
+    CameraFile,
+    OpenedFiles,
+    PenFile,
+    open_files,
+)
+from lightpen.formats.simulated_files import is_simulated, mark_simulated
 from lightpen.local_time import local_now
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +53,25 @@ def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:
     return OpenedFiles(CameraFile.read(files.camera), PenFile.read(files.pen))
 
 
+def files_of_before(
+    samples: Path, camera_path: Path | None, pen_path: Path | None, units: str | None
+) -> OpenedFiles:
+    """Read the files that a station had in use.
+
+    Parameters
+    ----------
+    samples : Path
+        Folder of the simulated camera's files, which an earlier version did not mark.
+    """
+    if samples.is_dir() and not is_simulated(samples):
+        with suppress(FileError):  # where nothing can be written, nothing is accepted
+            mark_simulated(samples)
+    return open_files(camera_path, pen_path, units)
+
+
 def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
     """Return the camera of a source, not yet opened."""
-    match choice.kind:
-        case SourceKind.SIMULATED:
-            return SimulatedCamera(around.scene, around.clock)
-        case SourceKind.RECORDED:
-            return ReplayCamera(choice.place, loops=True, clock=around.clock)
+    camera = choice.source.camera
+    if camera is None:
+        return SimulatedCamera(around.scene, around.clock)
+    return camera(SourcePlace(choice.place, choice.producer), around.clock)

@@ -1,4 +1,4 @@
-"""What is assumed of camera and pen where their files say nothing of it."""
+"""What is known of a station, and assumed where its files say nothing of it."""
 
 from dataclasses import dataclass, fields, replace
 from math import isfinite
@@ -9,8 +9,8 @@ class Assumptions:
     """Standard uncertainties that stand in for what a file leaves out.
 
     Those of the camera are what a lens that was calibrated once, and mounted and
-    focused again since, was seen to be off by; that of the scale is what some K
-    between its measurement and its use make of a pen: 2 to 23 ppm each.
+    focused again since, was seen to be off by. Beside them stands what no file states
+    of a station: how warm the pen is, and how true its ball and cone are.
 
     Attributes
     ----------
@@ -24,8 +24,25 @@ class Assumptions:
         Of the distortion coefficients; ``tangential`` of p1 and of p2.
     scale : float
         Of all LED coordinates of a pen together, relative.
+    expansion : float
+        Thermal, of the pen, 1/K: 2e-6 of carbon fibre to 23e-6 of aluminium.
+    expansion_share : float
+        Of a stated expansion, relative.
+    temperature_c : float or None
+        Of the pen during the swing; None if it was not measured.
+    temperature : float
+        Of that temperature, K.
+    warmth : float
+        Of how much warmer the pen is than at its measurement, where the temperature
+        during the swing was not measured, K.
     diameter : float
         Of the LED discs, relative.
+    form_error : float
+        Of where the ball sits, as ball and cone are not round, along each axis in each
+        form in which it may follow the lean, mm.
+    center_bias : float
+        Of the centre of an LED's image, px, by what does not average out: another in
+        each posture, the same whenever it returns.
     rotation, translation : float
         Of a camera in its rig about and along each axis, rad and mm.
     """
@@ -36,14 +53,23 @@ class Assumptions:
     k1: float = 0.02
     k2: float = 0.1
     tangential: float = 0.0003
-    scale: float = 2e-5
+    scale: float = 1e-5
+    expansion: float = 1.2e-5
+    expansion_share: float = 0.1
+    temperature_c: float | None = None
+    temperature: float = 0.5
+    warmth: float = 1.5
     diameter: float = 0.02
+    form_error: float = 0.0002
+    center_bias: float = 0.003
     rotation: float = 0.02
     translation: float = 20.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
             value = getattr(self, item.name)
+            if item.name == "temperature_c":
+                continue
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"`{item.name}` must be 0 or more, got {value}.")
 

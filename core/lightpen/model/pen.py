@@ -78,6 +78,15 @@ class Pen:
         Standard uncertainty common to all coordinates, relative; None if not stated.
     diameter_sigma : float or None
         Standard uncertainty of the diameter, mm; None if not stated.
+    expansion : float or None
+        Thermal, of all coordinates, 1/K; None if not stated.
+    expansion_sigma : float or None
+        Its standard uncertainty, 1/K; None if not stated.
+    temperature_c : float or None
+        At which the LEDs were measured; None if not stated.
+    led_covariance : (3 L, 3 L) array or None
+        Of all LED coordinates but for the scale that they share, mm^2; None if no more
+        than ``led_sigma`` is known.
     """
 
     leds: FloatArray
@@ -88,11 +97,31 @@ class Pen:
     led_sigma: float | None = None
     scale_sigma: float | None = None
     diameter_sigma: float | None = None
+    expansion: float | None = None
+    expansion_sigma: float | None = None
+    temperature_c: float | None = None
+    led_covariance: FloatArray | None = None
 
     @property
     def n_leds(self) -> int:
         """Number of LEDs."""
         return len(self.leds)
+
+
+def grown(pen: Pen, growth: float) -> Pen:
+    """Return a pen whose LEDs lie further apart about their middle.
+
+    Parameters
+    ----------
+    growth : float
+        Relative.
+    """
+    middle = pen.leds.mean(axis=0)
+    return replace(
+        pen,
+        leds=middle + (1 + growth) * (pen.leds - middle),
+        diameter=(1 + growth) * pen.diameter,
+    )
 
 
 def check_leds(leds: FloatArray, diameter: float) -> None:

@@ -62,11 +62,9 @@ def from_first(rig: Rig) -> Rig:
         Its cam_from_rig is cam_from_there; it has no covariance.
     """
     rotations = rig.rotations @ rig.rotations[0].T
-    return replace(
-        rig,
-        rotations=rotations,
-        translations=rig.translations - rotations @ rig.translations[0],
-    )
+    translations = rig.translations - rotations @ rig.translations[0]
+    rotations[0], translations[0] = np.eye(3), 0.0  # exactly, whatever was rounded
+    return replace(rig, rotations=rotations, translations=translations)
 
 
 def of_camera(name: str, trouble: Sentence) -> Sentence:

@@ -4,31 +4,38 @@ The result is stored first, whole or not at all, and then the swing is concluded
 is stored says which images of which swing it is of, so that a program killed between
 the two leaves nothing undecided: the tip is in force, and whoever finds the swing
 without its verdict next concludes it.
+
+The grade decides how: a tip that passes is accepted as it is, one that is to be checked
+only with a reason, which is stored, and one that is to be repeated not at all.
 """
 
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 
-from lightpen.errors import FileError
+from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.report import calibration_record
-from lightpen.estimation.verdict import judge
+from lightpen.estimation.verdict import Grade, Verdict
 from lightpen.formats.files import printable
 from lightpen.record.archive import Archive
+from lightpen.record.assessment import Assessment, assess
 from lightpen.record.reading import (
     Record,
     open_record,
     recorded_limits,
     recorded_names,
+    recorded_origin,
 )
-from lightpen.record.results import Result
+from lightpen.record.results import Result, Since, Why
 from lightpen.record.solving import Solution, record_inputs
 from lightpen.record.unfinished import Unfinished
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
 
 
-def accept(archive: Archive, solution: Solution, now: datetime) -> Result:
+def accept(
+    archive: Archive, solution: Solution, now: datetime, reason: str = ""
+) -> Result:
     """Put the tip of a recorded swing in force, and conclude the swing.
 
     Killed at any moment, it leaves either the result before in force and the swing to
@@ -41,35 +48,25 @@ def accept(archive: Archive, solution: Solution, now: datetime) -> Result:
         Of a record, as it is on the disk.
     now : datetime
         With its time zone.
+    reason : str
+        Why it is accepted though it is to be checked.
 
     Raises
     ------
+    AcceptanceError
+        The tip is to be repeated, or to be checked and there is no reason.
     FileError
         Another program writes to the record, it has changed since it was solved, or the
         result cannot be stored; what was in force before stays so.
     """
     record = open_record(solution.source.folder)
-    limits = recorded_limits(record)
-    verdict = judge(solution.calibration, limits)
-    if not verdict.can_be_accepted:
-        raise ValueError(f"The verdict must not be {verdict.grade}.")
     with RecordWriter.resume(record) as writer:
         _require_same_images(record, solution)
         result = _stored_result(archive, record)
         if result is None:
-            result = Result(
-                names=recorded_names(record),
-                accepted=now,
-                grade=verdict.grade,
-                record=record.folder,
-                images=_images_of(record),
-                calibration=calibration_record(
-                    solution.calibration,
-                    record_inputs(solution.source),
-                    "joint",
-                    limits,
-                ),
-            )
+            assessment = assess(archive, record, solution)
+            _require_acceptable(assessment.verdict, reason)
+            result = _result(record, solution, assessment, now, reason.strip())
             archive.store(result)
         _conclude(writer, record, result)
     return result
@@ -92,6 +89,59 @@ def conclude_accepted(archive: Archive, found: Unfinished) -> Unfinished:
         with suppress(FileError), RecordWriter.resume(record) as writer:
             _conclude(writer, record, result)
     return replace(found, interrupted=tuple(interrupted))
+
+
+def _require_acceptable(verdict: Verdict, reason: str) -> None:
+    """Let a tip pass whose grade allows it to be accepted so."""
+    if verdict.grade is Grade.REPEAT:
+        raise AcceptanceError(
+            sentence(
+                "acceptance.repeat",
+                "The tip cannot be accepted. {why}",
+                why=verdict.reason,
+            )
+        )
+    if verdict.grade is Grade.CHECK and not reason.strip():
+        raise AcceptanceError(
+            sentence(
+                "acceptance.no-reason",
+                "The tip is to be checked. {why} Accept it with a reason, or not at "
+                "all.",
+                why=verdict.reason,
+            )
+        )
+
+
+def _result(
+    record: Record,
+    solution: Solution,
+    assessment: Assessment,
+    now: datetime,
+    reason: str,
+) -> Result:
+    last, change, since = assessment.last, assessment.change, None
+    if last is not None and change is not None:
+        since = Since(
+            last.accepted,
+            tuple(change.difference.tolist()),
+            tuple(change.expanded_uncertainty.tolist()),
+        )
+    return Result(
+        names=recorded_names(record),
+        accepted=now,
+        grade=assessment.verdict.grade,
+        record=record.folder,
+        images=_images_of(record),
+        calibration=calibration_record(
+            *(solution.calibration, record_inputs(solution.source), "joint"),
+            recorded_limits(record),
+        ),
+        origin=recorded_origin(record),
+        reason=reason,
+        why=Why.of(assessment.verdict.reason),
+        doubts=tuple(map(Why.of, assessment.doubts)),
+        change=since,
+    )
 
 
 def _stored_result(archive: Archive, record: Record) -> Result | None:

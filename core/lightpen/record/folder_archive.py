@@ -4,11 +4,16 @@ A file is written once and never changed. Its name is a number, one higher than 
 any before: the order of acceptance, which no clock that was set back can turn round. Of
 two programs that take the same number one gets it, and the other the next. Where its
 swing is recorded is written as a path from the data folder, so that the whole of it can
-be moved, or copied to another machine.
+be moved, or copied to another machine. Results of simulated pens are in a folder of
+their own; those of earlier versions stand among the others, and are told by the swing
+that they come from. One whose swing is gone counts as real, and says nothing of it.
 """
 
 import os
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
+from datetime import datetime
 from itertools import count
 from pathlib import Path, PureWindowsPath
 
@@ -23,6 +28,8 @@ from lightpen.formats.files import (
     sync_folder,
     unreadable,
 )
+from lightpen.model.origin import Origin
+from lightpen.record.reading import open_record, recorded_origin
 from lightpen.record.results import (
     Heading,
     Result,
@@ -30,10 +37,12 @@ from lightpen.record.results import (
     parse_heading,
     parse_result,
     result_bytes,
+    withdrawal_bytes,
 )
 from lightpen.sentences import sentence
 
 RECORDS, RESULTS = "records", "results"
+SIMULATED = "simulated"  # that the files of the simulated pen, and its results, are in
 WHAT = sentence("file.result", "result")
 LIMIT = 64 * MEGABYTE
 HEAD = 16_384  # bytes, in which the first entries of a result end, or it is read whole
@@ -56,12 +65,106 @@ class FolderArchive:
 
     @property
     def folder(self) -> Path:
-        """That the files are in."""
+        """That the files of real pens are in."""
         return self._data / RESULTS
 
     def store(self, result: Result) -> None:
         """Put a result in force; see `lightpen.record.archive.Archive`."""
-        root = self.folder
+        data = result_bytes(result, self._place_of(result.record))
+        self._add(self._root(result.is_simulated), data)
+
+    def take_back(self, result: Result, operator: str, now: datetime) -> None:
+        """Let the result before be in force; see `lightpen.record.archive.Archive`."""
+        names = result.names
+        file = self._newest(names.pen, names.tip, result.is_simulated)
+        if file is None or not _is_same(self._read(file), result):
+            raise FileError(
+                sentence(
+                    "results.not-in-force",
+                    "This result of tip {tip}, pen {pen}, is not the one in force any "
+                    "more. Look at which one is before you take it back.",
+                    tip=names.tip,
+                    pen=names.pen,
+                )
+            )
+        self._add(file.parent, withdrawal_bytes(result, file.stem, operator, now))
+
+    def in_force(
+        self, pen: str, tip: str, *, is_simulated: bool = False
+    ) -> Result | None:
+        """Return the last accepted result of a pen and a tip, or None."""
+        file = self._newest(pen, tip, is_simulated)
+        return None if file is None else self._read(file)
+
+    def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
+        """Return the tips of a pen that have a result in force, the newest first."""
+        found = [
+            heading.tip
+            for root in self._roots(is_simulated)
+            for _, heading in self._standing(root, passes_over_damage=True)
+            if heading.pen == pen and self._is_simulated(heading) is is_simulated
+        ]
+        return tuple(filter(None, dict.fromkeys(found)))
+
+    def of_record(self, folder: Path) -> Result | None:
+        """Return the last accepted result of the swing in a folder, or None."""
+        for root in self._roots(is_simulated=True):
+            for file, heading in self._standing(root, passes_over_damage=True):
+                place = heading.record
+                with suppress(FileError, ValueError):  # a name that no file can have
+                    if place is not None and self._located(place) == folder.absolute():
+                        return self._read(file)
+        return None
+
+    def _root(self, is_simulated: bool) -> Path:
+        return (self._data / SIMULATED if is_simulated else self._data) / RESULTS
+
+    def _roots(self, is_simulated: bool) -> tuple[Path, ...]:
+        """Return where such results may be, the newer ones first."""
+        return (self._root(True), self.folder) if is_simulated else (self.folder,)
+
+    def _newest(self, pen: str, tip: str, is_simulated: bool) -> Path | None:
+        """Return the file of the result in force."""
+        for root in self._roots(is_simulated):
+            # Damage among the results of real pens is no matter to a simulated one.
+            passes = is_simulated and root == self.folder
+            for file, heading in self._standing(root, passes_over_damage=passes):
+                is_named = heading.pen in (pen, None) and heading.tip in (tip, None)
+                if is_named and self._is_simulated(heading) is is_simulated:
+                    return file
+        return None
+
+    def _is_simulated(self, heading: Heading) -> bool:
+        origin = heading.origin
+        if origin is None and heading.record is not None:
+            origin = self._origin_of_swing(self._located(heading.record))
+        return origin == Origin.SIMULATED
+
+    def _origin_of_swing(self, folder: Path) -> Origin | None:
+        """Return what the images of a swing are of, if it is there and says so."""
+        with suppress(FileError, ValueError):  # a name that no file can have
+            return recorded_origin(open_record(folder))
+        return None
+
+    def _standing(
+        self, root: Path, *, passes_over_damage: bool = False
+    ) -> Iterator[tuple[Path, Heading]]:
+        """Yield the results that are not taken back, the newest first."""
+        taken_back = set[str]()
+        for file in self._files(root):
+            try:
+                heading = _read_heading(file)
+            except FileError:
+                if passes_over_damage:
+                    continue
+                raise
+            if heading.takes_back is not None:
+                taken_back.add(heading.takes_back)
+            elif file.stem not in taken_back:
+                yield file, heading
+
+    def _add(self, root: Path, data: bytes) -> None:
+        """Add a file, the newest of all."""
         try:
             root.mkdir(parents=True, exist_ok=True)
             sync_folder(root.parent)
@@ -75,34 +178,15 @@ class FolderArchive:
                     reason=strerror(error),
                 )
             ) from error
-        newest = self._files()[:1]
+        newest = self._files(root)[:1]
         number = 1 + (_number(newest[0]) if newest else 0)
-        data = result_bytes(result, self._place_of(result.record))
         for free in count(number):
             with suppress(NameTakenError):  # by another program, just now
                 create_whole(root / f"{free:06d}.json", data)
                 return
 
-    def in_force(self, pen: str, tip: str) -> Result | None:
-        """Return the last accepted result of a pen and a tip, or None."""
-        for file in self._files():
-            heading = _read_heading(file)
-            if heading.pen in (pen, None) and heading.tip in (tip, None):
-                return self._read(file)
-        return None
-
-    def of_record(self, folder: Path) -> Result | None:
-        """Return the last accepted result of the swing in a folder, or None."""
-        for file in self._files():
-            with suppress(FileError, ValueError):  # a name that no file can have
-                place = _read_heading(file).record
-                if place is not None and self._located(place) == folder.absolute():
-                    return self._read(file)
-        return None
-
-    def _files(self) -> list[Path]:
+    def _files(self, root: Path) -> list[Path]:
         """Return the files of results, the newest first; others are left alone."""
-        root = self.folder
         try:
             paths = list(root.iterdir()) if root.is_dir() else []
         except OSError as error:
@@ -111,7 +195,10 @@ class FolderArchive:
         return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
 
     def _read(self, file: Path) -> Result:
-        return parse_result(read_bytes(file, WHAT, LIMIT), file, self._located)
+        result = parse_result(read_bytes(file, WHAT, LIMIT), file, self._located)
+        if result.origin is not None:
+            return result
+        return replace(result, origin=self._origin_of_swing(result.record))
 
     def _place_of(self, record: Path) -> str:
         """Return where a record is, from the data folder if it is in there."""
@@ -128,6 +215,11 @@ class FolderArchive:
             if os.access(moved, os.F_OK):
                 return moved
         return folder
+
+
+def _is_same(one: Result, other: Result) -> bool:
+    """Return whether two results are of the same acceptance."""
+    return (one.accepted, one.record) == (other.accepted, other.record)
 
 
 def _number(file: Path) -> int:

@@ -30,8 +30,10 @@ from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 from msgspec import Meta, Struct
+from msgspec.structs import asdict
 
 from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, read_camera
 from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
@@ -51,6 +53,7 @@ from lightpen.formats.own_json import (
 from lightpen.formats.pen_files import PEN_FILE, read_pen
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.journal import (
     JOURNAL,
@@ -178,6 +181,8 @@ class RecordedImage:
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen, mm.
+    stats : Stats
+        What became of the camera's images since the swing began.
     """
 
     number: int
@@ -188,6 +193,7 @@ class RecordedImage:
     pixels: FloatArray
     rotation: FloatArray
     translation: FloatArray
+    stats: Stats = field(default_factory=Stats)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,6 +238,11 @@ class Record:
         return np.array([i.number for i in self.used_images], dtype=np.int64)
 
     @property
+    def stats(self) -> Stats:
+        """What became of the camera's images up to the last one that was kept."""
+        return self.images[-1].stats if self.images else Stats()
+
+    @property
     def next_number(self) -> int:
         """Number that the next image gets."""
         return self.images[-1].number + 1 if self.images else 1
@@ -250,6 +261,8 @@ class RecordSource:
         loaded.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
+    origin : Origin or None
+        What the images are of; None where the record does not say.
     """
 
     folder: Path
@@ -259,6 +272,7 @@ class RecordSource:
     mask: FloatArray
     camera_file: Path
     pen_file: Path
+    origin: Origin | None = None
 
 
 def open_record(folder: Path) -> Record:
@@ -385,6 +399,7 @@ def source(record: Record) -> RecordSource:
         mask=header.mask,
         camera_file=camera_file,
         pen_file=pen_file,
+        origin=recorded_origin(record),
     )
 
 
@@ -423,6 +438,7 @@ def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
         pixels=np.array(points, dtype=np.float64).reshape(-1, 2),
         rotation=np.array(line.rotation, dtype=np.float64),
         translation=np.array(line.translation, dtype=np.float64),
+        stats=Stats() if line.camera is None else Stats(**asdict(line.camera)),
     )
 
 
@@ -511,6 +527,21 @@ def recorded_names(record: Record) -> Names:
         cone=header.cone,
         ball_diameter=_number(header.settings, "ball_diameter_mm", 0.0) or None,
     )
+
+
+def recorded_origin(record: Record) -> Origin | None:
+    """Return what the images of a record are of; None if it does not say.
+
+    Records of earlier versions name the kind of the source alone.
+    """
+    settings = record.header.settings
+    said = settings.get("origin", settings.get("source"))
+    return Origin(said) if said in set(Origin) else None
+
+
+def is_of_recording(record: Record) -> bool:
+    """Return whether the images of a record were recorded before its swing."""
+    return record.header.settings.get("source") == Origin.RECORDED
 
 
 def recorded_limits(record: Record) -> SwingLimits:

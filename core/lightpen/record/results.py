@@ -1,11 +1,14 @@
-"""An accepted calibration, and how it is written.
+"""An accepted calibration, the taking back of one, and how each is written.
 
 A result is one JSON object. Its first entries, the head, say who accepted what and
 when, and which swing it comes from; they end with their checksum. The last entry,
 ``calibration``, is the whole record of the calibration, as
 `lightpen.estimation.report` makes it; its checksum is in the head, so that a head is
-known to be sound without the rest. Results of format 2 had no checksums, and those of
-format 1 of the calibration no more than tip and uncertainty.
+known to be sound without the rest. A result that is taken back stays as it is: what
+takes it back is a file of its own, a head without a calibration. Results of format 3
+did not say what their images are of, nor why one with doubts was accepted; those of
+format 2 had no checksums, and those of format 1 of the calibration no more than tip and
+uncertainty.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,10 +16,10 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
@@ -34,10 +37,11 @@ from lightpen.formats.own_json import (
     require_usual,
     with_checksum,
 )
+from lightpen.model.origin import Origin
 from lightpen.record.names import Names
-from lightpen.sentences import sentence
+from lightpen.sentences import Sentence, sentence
 
-FORMAT = 3
+FORMAT = 4
 FIRST_WITH_CHECKSUM = 3
 OLD = timedelta(days=30)  # after which a tip is better calibrated again
 CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
@@ -53,15 +57,51 @@ class Heading(Struct):
     ----------
     pen, tip, record : str or None
         None where a later version does not say; else as `Names` and `Result`.
+    origin : str or None
+        What its images are of; None where an earlier version did not say.
+    takes_back : str or None
+        Name of the result's file, without suffix, that is taken back; None of a result.
     """
 
     format: Annotated[int, Meta(ge=1)]
     pen: str | None = None
     tip: str | None = None
     record: str | None = None
+    takes_back: str | None = None
+    origin: str | None = None
 
     def __post_init__(self) -> None:
         require_path(self.record or "")
+
+
+class Why(Struct, frozen=True):
+    """A sentence of the core, as it is kept: its code and its words in English."""
+
+    code: str
+    text: str
+
+    @classmethod
+    def of(cls, told: Sentence) -> Self:
+        """Return what is kept of a sentence."""
+        return cls(told.code, str(told))
+
+
+class Since(Struct, frozen=True):
+    """How far a tip lies from the one that was in force before, when it was accepted.
+
+    Attributes
+    ----------
+    accepted : datetime
+        When that one was.
+    difference_mm : triple of float
+        Now minus then, pen frame.
+    expanded_uncertainty_mm : triple of float
+        U (k = 2) of the difference.
+    """
+
+    accepted: Moment
+    difference_mm: Vector
+    expanded_uncertainty_mm: Vector
 
 
 class _Entries(Struct):
@@ -76,6 +116,11 @@ class _Entries(Struct):
     grade: str
     record: str
     images: tuple[int, ...] | None = None
+    origin: Origin | None = None
+    reason: str = ""
+    why: Why | None = None
+    doubts: tuple[Why, ...] = ()
+    change: Since | None = None
     calibration_sha256: Digest | None = None
 
     def __post_init__(self) -> None:
@@ -115,6 +160,16 @@ class Result:
     calibration : mapping
         The whole record of the calibration, as README.md documents it; of a result of
         format 1 only ``tip_pen_mm`` and ``expanded_uncertainty_mm``.
+    origin : Origin or None
+        What its images are of; None where neither it nor its swing says.
+    reason : str
+        Why it was accepted though its grade is no pass, in the words of who did.
+    why : Why or None
+        What its grade is for.
+    doubts : tuple of Why
+        What else there was to look into.
+    change : Since or None
+        Since the result that was in force; None if there was none.
     """
 
     names: Names
@@ -123,6 +178,21 @@ class Result:
     record: Path
     images: tuple[int, ...] | None
     calibration: Mapping[str, Any]
+    origin: Origin | None = None
+    reason: str = ""
+    why: Why | None = None
+    doubts: tuple[Why, ...] = ()
+    change: Since | None = None
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it is of no real pen."""
+        return self.origin is Origin.SIMULATED
+
+    @property
+    def nominal_tip(self) -> FloatArray | None:
+        """The tip by design that it was compared with, (3,), mm."""
+        return self._numbers("nominal_tip_mm")
 
     @property
     def tip_pen(self) -> FloatArray:
@@ -175,9 +245,38 @@ def result_bytes(result: Result, record: str) -> bytes:
         "grade": result.grade,
         "record": record,
         "images": result.images,
+        "origin": result.origin,
+        "reason": result.reason,
+        "why": to_builtins(result.why),
+        "doubts": to_builtins(result.doubts),
+        "change": to_builtins(result.change),
         "calibration_sha256": sha256(rest).hexdigest(),
     }
     return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
+
+
+def withdrawal_bytes(result: Result, name: str, operator: str, now: datetime) -> bytes:
+    """Return what takes a result back, as JSON.
+
+    Parameters
+    ----------
+    name : str
+        Of the result's file, without suffix.
+    operator : str
+        Who takes it back.
+    """
+    return with_checksum(
+        json_bytes(
+            {
+                "format": FORMAT,
+                "takes_back": name,
+                "at": now.isoformat(),
+                "operator": operator,
+                "pen": result.names.pen,
+                "tip": result.names.tip,
+            }
+        )
+    )
 
 
 def has_head(start: bytes) -> bool:
@@ -241,6 +340,11 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
             record=locate(entries.record),
             images=entries.images,
             calibration=_calibration(data, number),
+            origin=entries.origin,
+            reason=entries.reason,
+            why=entries.why,
+            doubts=entries.doubts,
+            change=entries.change,
         )
     except DamagedError as error:
         raise _damaged(file) from error

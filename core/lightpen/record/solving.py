@@ -143,6 +143,7 @@ def record_inputs(source: RecordSource) -> Inputs:
         pen=hashed(source.pen_file),
         observations=all_hashed([f for f in source.images.files if f.is_file()]),
         nominal_tip=source.pen.nominal_tip,
+        origin=source.origin,
     )
 
 

@@ -126,6 +126,7 @@ class Operator:
         self._wishes: list[tuple[float, Callable[[], None]]] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)
+        self._seat = SEAT  # where the tip rests when it is put down
         place = SEAT if seated else AWAY
         self._offset, self._offset_rate = place.copy(), np.zeros(3)
         self._route: list[FloatArray] = []
@@ -142,15 +143,25 @@ class Operator:
         """What the operator did when the last image was taken."""
         with self._lock:
             if self._route:
-                leaves = self._place is not SEAT
+                leaves = self._place is not self._seat
                 return Doing.LEAVING if leaves else Doing.APPROACHING
-            if self._place is not SEAT:
+            if self._place is not self._seat:
                 return Doing.ABSENT if self._place is AWAY else Doing.LIFTED
             return Doing.SEATED if self._goal is not None else Doing.SWINGING
 
     def seat(self) -> None:
         """Bring the pen to the cone, put its tip in and hold it still."""
-        self._wish(partial(self._go, SEAT))
+        self.touch(SEAT)
+
+    def touch(self, place: FloatArray) -> None:
+        """Put the tip on a place and hold it still.
+
+        Parameters
+        ----------
+        place : (3,) array
+            From the bottom of the cone in the camera frame, mm.
+        """
+        self._wish(partial(self._put, place))
         self.hold()
 
     def lift(self) -> None:
@@ -164,7 +175,7 @@ class Operator:
 
     def swing(self) -> None:
         """Swing the pen round the cone until told otherwise, seating it first."""
-        self._wish(partial(self._go, SEAT))
+        self._wish(partial(self._put, SEAT))
         self._wish(partial(self._aim, None, SWUNG))
 
     def hold(self) -> None:
@@ -240,7 +251,8 @@ class Operator:
             )
             leans, offsets = self._between(steps)
             leans = leans + TREMOR * self._turn_tremor.at(times)
-            freedom = np.minimum(np.linalg.norm(offsets, axis=-1) / FREE_AT, 1)
+            raised = np.linalg.norm(offsets - self._seat, axis=-1)
+            freedom = np.minimum(raised / FREE_AT, 1)
             tremor = FREE_TREMOR * self._tip_tremor.at(times)
             offsets = offsets + freedom[:, None] * tremor
             for slip in self._slips:
@@ -281,10 +293,10 @@ class Operator:
             self._offset, self._offset_rate, goal, np.zeros(3), ARM
         )
         distance = np.linalg.norm(goal - self._offset)
-        if goal is SEAT and distance < CAUGHT:
-            self._offset, self._offset_rate = SEAT.copy(), np.zeros(3)
+        if goal is self._seat and distance < CAUGHT:
+            self._offset, self._offset_rate = goal.copy(), np.zeros(3)
             self._route.clear()
-        elif goal is not SEAT and distance < (ARRIVED if is_last else PASSED):
+        elif goal is not self._seat and distance < (ARRIVED if is_last else PASSED):
             self._route.pop(0)
 
     def _move_lean(self) -> None:
@@ -298,11 +310,16 @@ class Operator:
             self._lean, self._lean_rate, goal, rate, self._pursuit
         )
 
+    def _put(self, place: FloatArray) -> None:
+        self._seat = place
+        self._go(place)
+
     def _go(self, place: FloatArray) -> None:
         if place is self._place:
             return
         self._place = place
-        self._route = [HOVER] if place is HOVER else [HOVER, place]
+        above = self._seat + HOVER
+        self._route = [above] if place is HOVER else [above, place]
 
     def _aim(self, goal: FloatArray | None, pursuit: Pursuit) -> None:
         self._goal, self._pursuit = goal, pursuit

@@ -16,6 +16,7 @@ from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import strerror, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_rig
+from lightpen.formats.simulated_files import mark_simulated
 from lightpen.model.ellipse import disc_images
 from lightpen.model.pen import pen_frame_from_raw
 from lightpen.model.rig import Rig, from_first
@@ -81,6 +82,7 @@ def write_scene(
     images = folder / "images"
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
     _make_folder(images, names)
+    mark_simulated(folder)
     plan = plan_scene(scene)
     write_camera(scene.camera, folder / "camera.yaml", "opencv")
     _write_measured_pen(plan, folder)
@@ -122,6 +124,7 @@ def write_rig_scene(
     names = [f"frame_{index + 1:04d}.png" for index in range(scene.n_images)]
     for name in rig.names:
         _make_folder(folder / name, names)
+    mark_simulated(folder)
     plans = plan_rig(scene, rig)
     there = from_first(rig)
     camera_files = [f"{name}.yaml" for name in rig.names]
@@ -188,6 +191,7 @@ def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _no_folder(folder, error) from error
+    mark_simulated(folder)
     files = SampleFiles(folder / "camera.yaml", folder / "pen.json")
     write_camera(scene.camera, files.camera, "opencv")
     write_pen(scene.pen, files.pen)

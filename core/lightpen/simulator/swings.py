@@ -61,6 +61,8 @@ class Swing:
 
 SCALE_SIGMA = 5e-6  # of a coordinate measuring machine
 DIAMETER_SIGMA = 0.02  # mm, of a turned disc
+EXPANSION, EXPANSION_SIGMA = 2e-6, 5e-7  # 1/K, of carbon fibre
+MEASURED_AT = 20.0  # degrees C
 
 
 def paper_camera(binning: int = 1) -> Camera:
@@ -118,6 +120,9 @@ def flat_pen(name: str, leds: Sequence[tuple[float, float, float]]) -> Pen:
         name=name,
         scale_sigma=SCALE_SIGMA,
         diameter_sigma=DIAMETER_SIGMA,
+        expansion=EXPANSION,
+        expansion_sigma=EXPANSION_SIGMA,
+        temperature_c=MEASURED_AT,
     )
 
 

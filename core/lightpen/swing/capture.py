@@ -1,11 +1,17 @@
 """From a live image to a longer record: decide, and put on disk what is kept."""
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 from lightpen.arrays import Image
+from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.rules import Transition, advance
 from lightpen.swing.state import Happening, SwingSetup, SwingState
+
+Rule: TypeAlias = Callable[[SwingSetup, SwingState, Sighting, float], Transition]
 
 
 def capture_image(
@@ -16,8 +22,10 @@ def capture_image(
     sighting: Sighting,
     time: float,
     device_time_ns: int | None = None,
+    stats: Stats | None = None,
+    rule: Rule | None = None,
 ) -> Transition:
-    """Take one live image into a swing.
+    """Take one image into a swing.
 
     Parameters
     ----------
@@ -31,6 +39,10 @@ def capture_image(
         When it was taken, s.
     device_time_ns : int, optional
         By the clock of the camera.
+    stats : Stats, optional
+        What became of the camera's images since the swing began.
+    rule : Rule, optional
+        What the image does to the swing; that of a live one by default.
 
     Returns
     -------
@@ -47,7 +59,7 @@ def capture_image(
             f"The swing is at image {state.next_number}, the record at "
             f"{writer.next_number}."
         )
-    transition = advance(setup, state, sighting, time)
+    transition = (rule or advance)(setup, state, sighting, time)
     # The image last: if the disk fails before, state and record both go without it.
     for event in transition.events:
         if event.what is Happening.SLIPPED and event.numbers:
@@ -61,5 +73,6 @@ def capture_image(
                 sighting.translation,
                 time,
                 device_time_ns,
+                stats,
             )
     return transition

@@ -5,33 +5,39 @@ computations made elsewhere.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.errors import LightpenError
-from lightpen.estimation.verdict import Grade, judge
+from lightpen.errors import AcceptanceError, LightpenError
+from lightpen.estimation.verdict import Grade
+from lightpen.formats.decoding import encode_png
 from lightpen.messages import no_tip
-from lightpen.model.limits import SwingLimits
 from lightpen.record.acceptance import accept
 from lightpen.record.archive import Archive
+from lightpen.record.assessment import Assessment, assess
 from lightpen.record.reading import (
     DISCARDED,
+    Record,
     open_record,
-    recorded_limits,
     recorded_names,
+    recorded_origin,
 )
+from lightpen.record.results import Result
 from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.unfinished import discard_swing
 from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
-from lightpen.swing.capture import capture_image
+from lightpen.swing.capture import Rule, capture_image
 from lightpen.swing.preparation import Preparation
+from lightpen.swing.recorded import pass_over, read_image
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rules import (
     Transition,
@@ -45,6 +51,7 @@ from lightpen.swing.rules import (
 from lightpen.swing.serial_queue import Act, Report, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.tally import Tally
 
 T = TypeVar("T")
 
@@ -93,10 +100,11 @@ class SwingCourse:
         self._start_task = start
         self._status = SwingStatus()
         self._attendance = Attendance()
-        self._limits = SwingLimits()
         self._writer: RecordWriter | None = None
-        self._n_since_kept = 0
-        self._recorded = frozenset[int]()  # times of the images in the record
+        self._tally = Tally()
+        self._record: Record | None = None  # as it was when it was entered
+        self._n_others = 0  # images of a recording since the last that was read
+        self._known = frozenset[str]()  # checksums of images that were recorded by then
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
@@ -224,15 +232,14 @@ class SwingCourse:
         status, record = self._status, swing.record
         if status.is_capturing and record.folder == status.record_folder:
             return  # it goes on already
-        names, limits = recorded_names(record), recorded_limits(record)
+        names = recorded_names(record)
         writer = RecordWriter.resume(record)
         self._drop_task()
         self._close_record()
-        self._writer = writer
-        self._limits = limits  # asking for more does not raise them
-        self._n_since_kept = 0
-        times = (image.device_time_ns for image in record.images)
-        self._recorded = frozenset(time for time in times if time is not None)
+        self._writer, self._record = writer, record
+        self._n_others = 0
+        self._known = frozenset(image.sha256 for image in record.images)
+        self._tally = Tally(record.stats)
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
         self._relieve()
@@ -242,6 +249,7 @@ class SwingCourse:
                 state=swing.state,
                 record_folder=record.folder,
                 names=names,
+                origin=recorded_origin(record),
             )
         )
         self._hold_back()
@@ -252,6 +260,7 @@ class SwingCourse:
         sighting: Sighting | None,
         setup: SwingSetup | None,
         n_images: int | None,
+        stats: Stats | None,
     ) -> None:
         """Take an image, as `SwingRunner.take` has it."""
         status, choices = self._status, self._attendance.choices
@@ -263,8 +272,11 @@ class SwingCourse:
         elif sighting is None:
             pass
         elif status.state.phase is Phase.VERDICT:
-            self._watch(status.state, sighting, frame)
+            if status.setup is not None and not status.setup.is_recording:
+                self._watch(status.state, sighting, frame)
         elif status.is_capturing and setup is status.setup:
+            if stats is not None:
+                self._tally = self._tally.after(stats)
             self._capture(status.state, sighting, frame, n_images)
 
     def _capture(
@@ -277,33 +289,48 @@ class SwingCourse:
         setup, writer = self._status.setup, self._writer
         assert setup is not None
         assert writer is not None
+        rule: Rule | None = None
+        if setup.is_recording:
+            if n_images is None or before.phase is Phase.PAUSED:
+                return
+            if not self._is_next(before, frame, n_images):
+                return
+            is_known = self._is_known(frame)
+            rule = partial(read_image, n_images=n_images, is_known=is_known)
         time = frame.host_ts_ns * 1e-9
-        if n_images is not None and frame.device_ts_ns in self._recorded:
-            self._n_since_kept += 1  # a recording gone on with: this one was taken
-            if self._n_since_kept >= n_images:
-                self._become(finish(before))
-            return
         try:
             transition = capture_image(
                 *(setup, before, writer, frame.image, sighting, time),
-                frame.device_ts_ns,
+                *(frame.device_ts_ns, self._tally.total, rule),
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)
             self._tell_trouble(error.sentence)
             return
-        state = transition.state
-        if state.phase is Phase.CAPTURING:
-            is_kept = any(e.what is Happening.KEPT for e in transition.events)
-            if is_kept:
-                self._relieve()
-            self._n_since_kept = 0 if is_kept else self._n_since_kept + 1
-            if n_images is not None and self._n_since_kept >= n_images:
-                ended = finish(state)
-                transition = Transition(
-                    ended.state, (*transition.events, *ended.events)
-                )
+        if any(event.what is Happening.KEPT for event in transition.events):
+            self._relieve()
         self._become(transition)
+
+    def _is_next(self, before: SwingState, frame: Frame, n_images: int) -> bool:
+        """Return whether it is the turn of an image of a recording.
+
+        The recording is shown over and over; each image is read once, in its order.
+        One that does not come in a whole pass cannot be read, and is passed over.
+        """
+        if frame.seq % n_images == before.progress.n_read:
+            self._n_others = 0
+            return True
+        self._n_others += 1
+        if self._n_others > n_images:
+            self._n_others = 0
+            self._become(pass_over(before, n_images))
+        return False
+
+    def _is_known(self, frame: Frame) -> bool:
+        """Return whether a recorded image was taken before an interruption."""
+        if not self._known:
+            return False
+        return sha256(encode_png(frame.image)).hexdigest() in self._known
 
     def _watch(self, before: SwingState, sighting: Sighting, frame: Frame) -> None:
         """See whether the pen is held upright and still, by which its holder agrees."""
@@ -378,6 +405,8 @@ class SwingCourse:
             return
         if state.phase is not Phase.VERDICT or status.is_reading:
             return
+        if status.setup is None or status.setup.is_recording:
+            return
         self.cancel()
         self._start(
             *(Activity.READING, lambda _: read_for_more(folder)),
@@ -438,8 +467,15 @@ class SwingCourse:
         self._compute(lambda _: solve_again(solution, wanted))
 
     def _compute(self, work: Callable[[Report], Solution]) -> None:
+        archive, record = self._archive, self._record
+        assert record is not None
+
+        def solved(report: Report) -> _Solved:
+            solution = work(report)
+            return _Solved(solution, assess(archive, record, solution))
+
         self._tried = self._wanted
-        self._start(Activity.SOLVING, work, self._on_solved, self._on_unsolved)
+        self._start(Activity.SOLVING, solved, self._on_solved, self._on_unsolved)
 
     def _start(
         self,
@@ -467,8 +503,8 @@ class SwingCourse:
             self._wanted = self._status.solution.taken_out
         self._publish(replace(self._status, activity=Activity.NONE))
 
-    def _on_solved(self, solution: Solution) -> None:
-        self._task = None
+    def _on_solved(self, solved: "_Solved") -> None:
+        self._task, solution = None, solved.solution
         status = self._status
         before, folder, state = status.solution, status.record_folder, status.state
         assert folder is not None
@@ -482,11 +518,15 @@ class SwingCourse:
                 self._keep_solution(before, error.sentence)
                 return
         self._relieve()
-        verdict = judge(solution.calibration, self._limits)
+        verdict = solved.assessment.verdict
         goes_on = self._wanted != solution.taken_out
         activity = Activity.SOLVING if goes_on else Activity.NONE
         status = replace(
-            status, solution=solution, verdict=verdict, result=None, activity=activity
+            status,
+            solution=solution,
+            assessment=solved.assessment,
+            result=None,
+            activity=activity,
         )
         self._conclude(status, verdict.reason, verdict.grade is not Grade.REPEAT)
         if goes_on:
@@ -523,21 +563,42 @@ class SwingCourse:
         status = replace(status, state=transition.state)
         self._publish(status, *(transition.events if is_first else ()))
 
-    def accept(self) -> None:
-        """Put the tip in force, or say why it cannot be stored."""
-        self._trying(self._store)
+    def accept(self, reason: str) -> None:
+        """Put the tip in force, or say why it cannot be."""
+        self._trying(lambda: self._store(reason))
 
-    def _store(self) -> None:
-        status = self._status
-        solution, verdict = status.solution, status.verdict
-        if solution is None or verdict is None or self._task is not None:
-            return
-        if status.result is not None or not verdict.can_be_accepted:
+    def _store(self, reason: str) -> None:
+        status, solution = self._status, self._status.solution
+        if solution is None or self._task is not None or status.result is not None:
             return
         self._publish(replace(status, activity=Activity.ACCEPTING))
         try:
-            result = accept(self._archive, solution, self._now())
+            result = accept(self._archive, solution, self._now(), reason)
             status = replace(status, result=result)
             self._relieve()
+        except AcceptanceError:  # something else has come into force meanwhile
+            record = open_record(solution.source.folder)
+            assessment = assess(self._archive, record, solution)
+            status = replace(status, assessment=assessment)
+            raise
         finally:
             self._publish(status)
+
+    def take_back(self, result: Result, operator: str) -> None:
+        """Let the result before one in force be in force again, or say why not."""
+        self._trying(lambda: self._withdraw(result, operator))
+
+    def _withdraw(self, result: Result, operator: str) -> None:
+        self._archive.take_back(result, operator, self._now())
+        status, own = self._status, self._status.result
+        if own is not None and own.record == result.record:
+            status = replace(status, result=None)
+        self._publish(replace(status, taken_back=result))
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """What came of computing the tip."""
+
+    solution: Solution
+    assessment: Assessment

@@ -3,10 +3,15 @@
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from importlib.metadata import version
+from typing import Self
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.replay import RECORDED
+from lightpen.cameras.source import Needs, Source
+from lightpen.cameras.sources import SIMULATED, source_named
 from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -14,19 +19,20 @@ from lightpen.formats.pen_files import PEN_FILE
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.record.names import Names
 from lightpen.record.reading import FileCopy, Header, Plain
-from lightpen.swing.state import (
-    SwingSetup,
-)
+from lightpen.record.recordings import is_simulated_recording
+from lightpen.record.results import Result
+from lightpen.swing.state import SwingSetup
 
 
 class SourceKind(StrEnum):
-    """Where images come from."""
+    """The sources that are no cameras; all are in `lightpen.cameras.sources`."""
 
-    SIMULATED = "simulated"
-    RECORDED = "recorded"
+    SIMULATED = SIMULATED.key
+    RECORDED = RECORDED.key
 
 
 @dataclass(frozen=True)
@@ -35,12 +41,41 @@ class SourceChoice:
 
     Attributes
     ----------
+    kind : str
+        Key of a source.
     place : str
-        Folder, pattern or video of a recording; else empty.
+        Folder, pattern or video of a recording; serial number or address of a camera.
+    producer : str
+        File of a GenTL producer; empty for those that the system names.
     """
 
-    kind: SourceKind = SourceKind.SIMULATED
+    kind: str = SourceKind.SIMULATED
     place: str = ""
+    producer: str = ""
+
+    @property
+    def source(self) -> Source:
+        """What was chosen; the simulated pen for a kind of a later version."""
+        return source_named(self.kind) or SIMULATED
+
+    @property
+    def lacks_place(self) -> bool:
+        """Whether it has to be said where the images come from."""
+        return self.source.needs is not Needs.NOTHING and not self.place
+
+
+@dataclass(frozen=True)
+class CameraInUse:
+    """The camera that images come from.
+
+    Attributes
+    ----------
+    settings : CameraSettings
+        In force.
+    """
+
+    serial: str
+    settings: CameraSettings
 
 
 class Lack(StrEnum):
@@ -52,6 +87,7 @@ class Lack(StrEnum):
     TIP = "tip"
     CONE = "cone"
     SOURCE_PLACE = "source place"
+    DEVICE = "device"
     IMAGES = "images"
     CAMERA_FILE = "camera file"
     IMAGE_SIZE = "image size"
@@ -69,6 +105,8 @@ class Preparation:
         Its centre by design, pen frame, mm; None leaves that of the LED file in force.
     image_size : pair of int or None
         Width and height of the live images, px; None while there are none.
+    camera_in_use : CameraInUse or None
+        None until one is open.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
     has_unsaved_leds : bool
@@ -79,6 +117,7 @@ class Preparation:
     nominal_tip: FloatArray | None = None
     source: SourceChoice = field(default_factory=SourceChoice)
     image_size: tuple[int, int] | None = None
+    camera_in_use: CameraInUse | None = None
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -100,6 +139,58 @@ class Preparation:
         return replace(self.pen_file.pen, nominal_tip=self.nominal_tip)
 
     @property
+    def origin(self) -> Origin:
+        """What its images are of: nothing is real that needs a simulated file."""
+        files = self.camera_file, self.pen_file
+        if any(file is not None and file.is_simulated for file in files):
+            return Origin.SIMULATED
+        return _ORIGINS.get(self.source.kind, Origin.LIVE)
+
+    def with_source(self, source: SourceChoice) -> Self:
+        """Return it with images of another source.
+
+        The files of a simulated pen are not those of another source, nor is the stray
+        light.
+        """
+        if source == self.source:
+            return self
+        simulates = source.kind == SourceKind.SIMULATED
+        camera_file, pen_file = self.camera_file, self.pen_file
+        if camera_file is not None and camera_file.is_simulated is not simulates:
+            camera_file = None
+        if pen_file is not None and pen_file.is_simulated is not simulates:
+            pen_file = None
+        return replace(
+            self,
+            source=source,
+            camera_file=camera_file,
+            pen_file=pen_file,
+            mask=np.zeros((0, 3)),
+        )
+
+    def renamed(self, names: Names) -> Self:
+        """Return it with other names; another tip has another ball and nominal centre.
+
+        They are forgotten, unless a diameter was given with the name.
+        """
+        now = self.names
+        if names.tip == now.tip:
+            return replace(self, names=names)
+        if names.ball_diameter == now.ball_diameter:
+            names = replace(names, ball_diameter=None)
+        return replace(self, names=names, nominal_tip=None)
+
+    def with_last(self, last: Result) -> Self:
+        """Return it for the tip of a result, whose ball and nominal centre it has."""
+        tip, ball_diameter = last.names.tip, last.names.ball_diameter
+        names = replace(self.names, tip=tip, ball_diameter=ball_diameter)
+        nominal_tip = last.nominal_tip
+        of_file = None if self.pen_file is None else self.pen_file.pen.nominal_tip
+        if _same(nominal_tip, of_file):  # it is not the tip's own
+            nominal_tip = None
+        return replace(self, names=names, nominal_tip=nominal_tip)
+
+    @property
     def aim(self) -> Aim:
         """What to look for in the images."""
         return Aim(self.camera, self.pen, self.mask)
@@ -119,8 +210,9 @@ class Preparation:
     def camera_lacks(self) -> tuple[Lack, ...]:
         """Return what the step Camera lacks."""
         lacks = []
-        if self.source.kind is SourceKind.RECORDED and not self.source.place:
-            lacks.append(Lack.SOURCE_PLACE)
+        if self.source.lacks_place:
+            is_of_files = self.source.source.needs is Needs.FILES
+            lacks.append(Lack.SOURCE_PLACE if is_of_files else Lack.DEVICE)
         elif self.image_size is None:
             lacks.append(Lack.IMAGES)
         camera = self.camera
@@ -147,7 +239,8 @@ class Preparation:
         camera, pen = self.camera, self.pen
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
-        return SwingSetup(camera, pen, self.limits, self.mask)
+        is_recording = self.source.kind == SourceKind.RECORDED
+        return SwingSetup(camera, pen, self.limits, self.mask, is_recording)
 
     def swings_like(self, other: "Preparation") -> bool:
         """Return whether a swing begun with the other would be the same."""
@@ -164,7 +257,9 @@ class Preparation:
         """Return the header of a record that begins now; files are read again."""
         if self.camera_file is None or self.pen_file is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
-        limits = self.limits
+        limits, origin = self.limits, self.origin
+        if origin is Origin.RECORDED and is_simulated_recording(self.source.place):
+            origin = Origin.SIMULATED
         return Header(
             camera=FileCopy.of(self.camera_file.path, CAMERA_FILE),
             pen=FileCopy.of(self.pen_file.path, PEN_FILE),
@@ -180,8 +275,10 @@ class Preparation:
             settings={
                 "pen": self.names.pen,
                 "ball_diameter_mm": self.names.ball_diameter,
+                "origin": str(origin),
                 "source": str(self.source.kind),
                 "source_place": self.source.place,
+                **_camera_entries(self.camera_in_use),
                 "max_uncertainty_mm": limits.max_uncertainty,
                 "min_images": limits.min_images,
                 "max_images": limits.max_images,
@@ -190,6 +287,32 @@ class Preparation:
                 **(settings or {}),
             },
         )
+
+
+def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
+    """Return what a record tells of the camera that took its images."""
+    if used is None:
+        return {}
+    settings, region = used.settings, used.settings.region
+    entries: dict[str, Plain] = {
+        "camera_serial": used.serial,
+        "exposure_us": settings.exposure_us,
+        "gain_db": settings.gain_db,
+        "frame_rate": settings.frame_rate,
+        "pixel_format": settings.pixel_format,
+        "trigger": None if settings.trigger is None else str(settings.trigger),
+        "packet_size": settings.packet_size,
+        "region_px": None
+        if region is None
+        else f"{region.width} x {region.height} at {region.x}, {region.y}",
+    }
+    return {name: entry for name, entry in entries.items() if entry is not None}
+
+
+_ORIGINS: dict[str, Origin] = {
+    SourceKind.SIMULATED: Origin.SIMULATED,
+    SourceKind.RECORDED: Origin.RECORDED,
+}
 
 
 def _same(one: FloatArray | None, other: FloatArray | None) -> bool:

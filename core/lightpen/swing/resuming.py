@@ -10,12 +10,14 @@ from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import (
     Record,
     damaged_file,
+    is_of_recording,
     open_record,
     recorded_limits,
     source,
 )
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.kept_images import kept_before
+from lightpen.swing.preparation import SourceChoice
 from lightpen.swing.rules import start_again
 from lightpen.swing.shortfall import limits_for_more
 from lightpen.swing.state import SwingSetup, SwingState
@@ -38,6 +40,16 @@ class Resumable:
     record: Record
     setup: SwingSetup
     state: SwingState
+
+    def is_of(self, source: SourceChoice) -> bool:
+        """Return whether images of this source can go on with it."""
+        settings = self.record.header.settings
+        kind, place = settings.get("source"), settings.get("source_place")
+        if kind is None:  # of a version that did not say
+            return True
+        return source.kind == kind and (
+            not self.setup.is_recording or source.place == place
+        )
 
     def fits(self, image_size: tuple[int, int]) -> bool:
         """Return whether images of this width and height, px, can go on with it."""
@@ -128,4 +140,7 @@ def recorded_setup(record: Record) -> SwingSetup:
         The copy of the camera or pen file cannot be read.
     """
     found = source(record)
-    return SwingSetup(found.camera, found.pen, recorded_limits(record), found.mask)
+    return SwingSetup(
+        *(found.camera, found.pen, recorded_limits(record), found.mask),
+        is_recording=is_of_recording(record),
+    )

@@ -33,6 +33,7 @@ from lightpen.messages import (
     TOO_FAST,
     bad_fit,
     few_leds,
+    images_read,
     starts_in,
     tip_elsewhere,
     tip_slipped,
@@ -122,9 +123,15 @@ def pause(state: SwingState) -> SwingState:
 
 
 def resume(state: SwingState) -> SwingState:
-    """Return the swing going on after the user's pause, from finding the seat."""
+    """Return the swing going on after the user's pause, from finding the seat.
+
+    Of recorded images the next one is read.
+    """
     if state.phase is not Phase.PAUSED or state.pause is not Pause.BY_USER:
         return state
+    n_read, n_images = state.progress.n_read, state.progress.n_images
+    if n_images:
+        return _enter(state, Phase.CAPTURING, images_read(n_read, n_images))
     return _await_seat(state)
 
 

@@ -12,10 +12,11 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.sighting import Sighting
 from lightpen.local_time import local_now
 from lightpen.record.archive import Archive
+from lightpen.record.results import Result
 from lightpen.swing.course import SwingCourse
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable
@@ -120,9 +121,25 @@ class SwingRunner:
         """Go on with this swing after its verdict, as soon as its images are read."""
         self._queue.ask(self._course.capture_more)
 
-    def accept(self) -> None:
-        """Put the tip in force; the one before stays where it cannot be stored."""
-        self._queue.ask(self._course.accept)
+    def accept(self, reason: str = "") -> None:
+        """Put the tip in force; the one before stays where it cannot be stored.
+
+        Parameters
+        ----------
+        reason : str
+            Why it is accepted though it is to be checked.
+        """
+        self._queue.ask(partial(self._course.accept, reason))
+
+    def take_back(self, result: Result, operator: str) -> None:
+        """Let the result before one in force be in force again.
+
+        Parameters
+        ----------
+        operator : str
+            Who takes it back.
+        """
+        self._queue.ask(partial(self._course.take_back, result, operator))
 
     def set_aside(self) -> None:
         """Leave the swing for good, as before a repetition; its images are kept."""
@@ -153,6 +170,7 @@ class SwingRunner:
         sighting: Sighting | None,
         setup: SwingSetup | None = None,
         n_images: int | None = None,
+        stats: Stats | None = None,
     ) -> None:
         """Take an image, and return when all is done that it asks for.
 
@@ -163,9 +181,11 @@ class SwingRunner:
         setup : SwingSetup, optional
             What was looked for; images of another swing than the present are not kept.
         n_images : int, optional
-            Of the recording that is played over and over: a whole pass without a new
-            image ends the swing.
+            Of the recording that is shown over and over; a swing of recorded images
+            ends with the last.
+        stats : Stats, optional
+            What the camera has counted by now.
         """
         self._queue.ask_and_wait(
-            partial(self._course.take, frame, sighting, setup, n_images)
+            partial(self._course.take, frame, sighting, setup, n_images, stats)
         )

@@ -18,7 +18,7 @@ import numpy as np
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.messages import SHOW_PEN
+from lightpen.messages import SHOW_PEN, images_read
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
@@ -96,12 +96,16 @@ class SwingSetup:
     ----------
     mask : (M, 3) array or None
         Circles of stray light: centre x, y and radius, px.
+    is_recording : bool
+        Whether its images were recorded before: all are read, once and in their order,
+        and nobody is asked to lean the pen.
     """
 
     camera: Camera
     pen: Pen
     limits: SwingLimits = field(default_factory=SwingLimits)
     mask: FloatArray | None = None
+    is_recording: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +160,14 @@ def trace_of(camera: Camera, pen: Pen, kept: KeptImages) -> Trace:
     for n_images in sorted({int(n) for n in counts if n >= MIN_JOINT} - {len(kept)}):
         trace = trace.with_estimate(first_images(camera, pen, kept, n_images))
     return trace.with_estimate(kept)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How many images of a recording are read; all zero for a live camera."""
+
+    n_read: int = 0
+    n_images: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +232,7 @@ class SwingState:
     slipped_at: float | None
     still_since: float | None
     trace: Trace
+    progress: Progress = Progress()
 
     @property
     def n_kept(self) -> int:
@@ -239,11 +252,12 @@ class SwingState:
 
 def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
     """Return a swing of which nothing has been seen; the time is in s."""
+    is_recording = setup.is_recording
     return SwingState(
-        phase=Phase.WAIT,
+        phase=Phase.CAPTURING if is_recording else Phase.WAIT,
         since=time,
         time=time,
-        message=SHOW_PEN,
+        message=images_read(0, 0) if is_recording else SHOW_PEN,
         kept=none_kept(setup.pen.n_leds),
         next_number=1,
         n_dropped=Counter(),

@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from lightpen.estimation.verdict import Verdict
+from lightpen.model.origin import Origin
+from lightpen.record.assessment import Assessment
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
@@ -38,10 +40,14 @@ class SwingStatus:
         Who calibrates what with it.
     solution : Solution or None
         The tip by its images; None until it is solved.
-    verdict : Verdict or None
-        What the solution is worth.
+    origin : Origin or None
+        What its images are of.
+    assessment : Assessment or None
+        What the solution is worth, beside what is in force.
     result : Result or None
         The result that was accepted.
+    taken_back : Result or None
+        The result that was taken back last, of this swing or another.
     refusal : Sentence or None
         Why no swing could begin by itself.
     is_troubled : bool
@@ -54,13 +60,20 @@ class SwingStatus:
     state: SwingState | None = None
     record_folder: Path | None = None
     names: Names = field(default_factory=Names)
+    origin: Origin | None = None
     solution: Solution | None = None
-    verdict: Verdict | None = None
+    assessment: Assessment | None = None
     result: Result | None = None
+    taken_back: Result | None = None
     activity: Activity = Activity.NONE
     refusal: Sentence | None = None
     is_troubled: bool = False
     has_other_choices: bool = False
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict on the solution."""
+        return None if self.assessment is None else self.assessment.verdict
 
     @property
     def is_capturing(self) -> bool:

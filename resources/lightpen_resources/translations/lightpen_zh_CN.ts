@@ -55,6 +55,29 @@
     </message>
 </context>
 <context>
+    <name>DataFolderPanel</name>
+    <message>
+        <source>Data folder</source>
+        <translation>数据文件夹</translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation>打开文件夹</translation>
+    </message>
+    <message>
+        <source>Open the data folder</source>
+        <translation>打开数据文件夹</translation>
+    </message>
+    <message>
+        <source>Swings and results are kept here. Options choose another folder.</source>
+        <translation>摆动记录和结果保存在这里。可在“选项”中另选文件夹。</translation>
+    </message>
+    <message>
+        <source>Other windows of the program that use this folder: {0}. All of them put their tips in force here.</source>
+        <translation>使用此文件夹的其他程序窗口：{0} 个。它们接受的测头都在这里生效。</translation>
+    </message>
+</context>
+<context>
     <name>Demo</name>
     <message>
         <source>The demo ends here: there is no tip to accept.</source>
@@ -120,6 +143,10 @@
         <translation>合适：{0} 个光点</translation>
     </message>
     <message>
+        <source>LED {0}: {1} %</source>
+        <translation>LED {0}：{1} %</translation>
+    </message>
+    <message>
         <source>dark</source>
         <translation>过暗</translation>
     </message>
@@ -155,12 +182,48 @@
         <translation>用上下键调整；输入数值后按 Enter。</translation>
     </message>
     <message>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <source>Set by the LEDs</source>
+        <translation>按 LED 设定</translation>
+    </message>
+    <message>
+        <source>Exposure and gain for 80 % of full scale at the brightest LED.</source>
+        <translation>设定曝光和增益，使最亮的 LED 达到满量程的 80 %。</translation>
+    </message>
+    <message>
         <source>No images come.</source>
         <translation>没有图像。</translation>
     </message>
     <message>
         <source>Recorded: exposure and gain are as they were taken.</source>
         <translation>录制的图像：曝光和增益为拍摄时的值。</translation>
+    </message>
+    <message>
+        <source>Hold the pen still. Brightest LED: {0}</source>
+        <translation>请保持光笔不动。最亮的 LED：{0}</translation>
+    </message>
+    <message>
+        <source>Set. Brightest LED: {0}, none is saturated.</source>
+        <translation>已设定。最亮的 LED：{0}，没有 LED 饱和。</translation>
+    </message>
+    <message>
+        <source>No LEDs are seen. Hold the pen before the camera.</source>
+        <translation>看不到 LED。请把光笔放到相机前。</translation>
+    </message>
+    <message>
+        <source>The least exposure and gain are too bright ({0}). Close the aperture of the lens.</source>
+        <translation>曝光和增益已最小，仍然过亮（{0}）。请调小镜头光圈。</translation>
+    </message>
+    <message>
+        <source>The LEDs reach {0} only: a longer exposure would smear the moving pen. Open the aperture of the lens.</source>
+        <translation>LED 只能达到 {0}：再延长曝光会使移动的光笔拖影。请调大镜头光圈。</translation>
+    </message>
+    <message>
+        <source>The light changes from image to image ({0}). Hold the pen still, and check the supply of its LEDs.</source>
+        <translation>各幅图像的亮度不一致（{0}）。请保持光笔不动，并检查 LED 的供电。</translation>
     </message>
     <message>
         <source>Hold the pen so that the camera sees its LEDs.</source>
@@ -603,8 +666,8 @@
         <translation>与实时图像一致：{0}</translation>
     </message>
     <message>
-        <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera or switch off binning.</source>
-        <translation>相机图像为 {0}，标定文件适用于 {1}。请选择该相机的文件，或关闭像素合并。</translation>
+        <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera, set the region to the whole sensor, or switch off binning.</source>
+        <translation>相机送来 {0}，标定文件是为 {1} 做的。请选择此相机的文件，把区域设为整个传感器，或关闭像素合并。</translation>
     </message>
     <message>
         <source>no date</source>
@@ -626,12 +689,40 @@
 <context>
     <name>LastResultPanel</name>
     <message>
+        <source>Last practice with this pen and tip</source>
+        <translation>本光笔和测头的上次练习</translation>
+    </message>
+    <message>
         <source>Last calibration of this pen and tip</source>
         <translation>本光笔和测头的上次标定</translation>
     </message>
     <message>
+        <source>Take back...</source>
+        <translation>撤回…</translation>
+    </message>
+    <message>
+        <source>Put the result before in force again; both are kept.</source>
+        <translation>使之前的结果重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>Take this acceptance back? The result before is in force again.</source>
+        <translation>撤回此次接受吗？之前的结果将重新生效。</translation>
+    </message>
+    <message>
+        <source>Take back</source>
+        <translation>撤回</translation>
+    </message>
+    <message>
+        <source>Leave it in force</source>
+        <translation>保持生效</translation>
+    </message>
+    <message>
         <source>None yet</source>
         <translation>尚无结果</translation>
+    </message>
+    <message>
+        <source>What you accept is kept apart from the tips of real pens.</source>
+        <translation>在此接受的结果与真实光笔的测头分开保存。</translation>
     </message>
     <message>
         <source>The tip that you accept will be the first in force.</source>
@@ -652,6 +743,10 @@
     <message>
         <source>U (k = 2) / mm</source>
         <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Accepted with the reason: {0}</source>
+        <translation>接受理由：{0}</translation>
     </message>
     <message>
         <source>It is dated later than now. Check the clock here.</source>
@@ -1022,6 +1117,14 @@
         <translation>声音已打开。</translation>
     </message>
     <message>
+        <source>Data folder</source>
+        <translation>数据文件夹</translation>
+    </message>
+    <message>
+        <source>Swings and results are kept in {0} from the next start of the program on. Those of now stay where they are.</source>
+        <translation>从下次启动起，摆动记录和结果保存在 {0}。现有的仍留在原处。</translation>
+    </message>
+    <message>
         <source>Stay</source>
         <translation>不关闭</translation>
     </message>
@@ -1196,6 +1299,21 @@
     </message>
 </context>
 <context>
+    <name>NextTipsRow</name>
+    <message>
+        <source>Next tip</source>
+        <translation>下一个测头</translation>
+    </message>
+    <message>
+        <source>Next tip {0}</source>
+        <translation>下一个测头 {0}</translation>
+    </message>
+    <message>
+        <source>Calibrate tip {0} next, with its ball and nominal centre</source>
+        <translation>接着标定测头 {0}，并采用其测球直径和标称中心</translation>
+    </message>
+</context>
+<context>
     <name>NoticeBar</name>
     <message>
         <source>Close</source>
@@ -1246,6 +1364,10 @@
     <message>
         <source>Mute the sounds</source>
         <translation>关闭声音</translation>
+    </message>
+    <message>
+        <source>Data folder...</source>
+        <translation>数据文件夹…</translation>
     </message>
     <message>
         <source>About Lightpen</source>
@@ -1465,18 +1587,46 @@
     </message>
 </context>
 <context>
-    <name>ReviewDoubts</name>
+    <name>ResultTools</name>
     <message>
-        <source>This swing is of tip {0}, pen {1}, whatever the step Start names now: tip {2}, pen {3}.</source>
-        <translation>本次摆动属于测头 {0}、光笔 {1}；“开始”步骤现在填写的是测头 {2}、光笔 {3}。</translation>
+        <source>Open the folder of the swing</source>
+        <translation>打开本次摆动的文件夹</translation>
     </message>
     <message>
-        <source>The tip lies {0} mm from the calibration of {1} (usual change: {2} mm). Was the tip exchanged?</source>
-        <translation>测头与 {1} 的标定相差 {0} mm（通常变化：{2} mm）。是否更换过测头？</translation>
+        <source>Copy x, y, z in mm, parted by tabs</source>
+        <translation>复制 x、y、z（mm，以制表符分隔）</translation>
     </message>
     <message>
-        <source>The tip lies {0} mm from its nominal place. Is it the tip that is named?</source>
-        <translation>测头偏离标称位置 {0} mm。是否为所填写的测头？</translation>
+        <source>Save results and plots under the name of pen, tip and date</source>
+        <translation>以光笔、测头和日期命名，保存结果和图</translation>
+    </message>
+    <message>
+        <source>Open folder</source>
+        <translation>打开文件夹</translation>
+    </message>
+    <message>
+        <source>Copy the tip</source>
+        <translation>复制测头坐标</translation>
+    </message>
+    <message>
+        <source>Save...</source>
+        <translation>保存…</translation>
+    </message>
+    <message>
+        <source>All at once...</source>
+        <translation>全部一次保存…</translation>
+    </message>
+    <message>
+        <source>Record (JSON)...</source>
+        <translation>记录（JSON）…</translation>
+    </message>
+    <message>
+        <source>Tip and images (CSV)...</source>
+        <translation>测头和图像（CSV）…</translation>
+    </message>
+    <message>
+        <source>All plots (PNG)...</source>
+        <translation>全部图（PNG）…</translation>
     </message>
 </context>
 <context>
@@ -1502,16 +1652,16 @@
         <translation>请先摆动光笔。</translation>
     </message>
     <message>
-        <source>The tip is in force.</source>
-        <translation>测头已生效。</translation>
-    </message>
-    <message>
         <source>Start the next calibration</source>
         <translation>开始下一次标定</translation>
     </message>
     <message>
         <source>Accept</source>
         <translation>接受</translation>
+    </message>
+    <message>
+        <source>Check the files</source>
+        <translation>检查文件</translation>
     </message>
     <message>
         <source>The tip is not accepted. The swing is kept and offered again at the next start.</source>
@@ -1562,6 +1712,14 @@
         <translation>重做</translation>
     </message>
     <message>
+        <source>Since {0}, to be checked; accepted with the reason: {1}</source>
+        <translation>自 {0} 起，需检查；接受理由：{1}</translation>
+    </message>
+    <message>
+        <source>This swing is of tip {0}, pen {1}, whatever the step Start names now: tip {2}, pen {3}.</source>
+        <translation>本次摆动属于测头 {0}、光笔 {1}；“开始”步骤现在填写的是测头 {2}、光笔 {3}。</translation>
+    </message>
+    <message>
         <source>Repeat the swing from the start? These images stay on the disk.</source>
         <translation>从头重做摆动吗？这些图像仍保留在磁盘上。</translation>
     </message>
@@ -1572,6 +1730,42 @@
     <message>
         <source>The tip is being computed.</source>
         <translation>正在计算测头。</translation>
+    </message>
+    <message>
+        <source>Next: record more images, and read them all again.</source>
+        <translation>下一步：补录图像，然后重新读取全部图像。</translation>
+    </message>
+    <message>
+        <source>The tip is accepted.</source>
+        <translation>测头已接受。</translation>
+    </message>
+    <message>
+        <source>Accept...</source>
+        <translation>接受…</translation>
+    </message>
+    <message>
+        <source>Take back...</source>
+        <translation>撤回…</translation>
+    </message>
+    <message>
+        <source>Put the result before in force again; both are kept.</source>
+        <translation>使之前的结果重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>The tip is to be checked. Why is it accepted nevertheless? The reason is stored with it.</source>
+        <translation>该测头需检查。为何仍要接受？理由将随结果保存。</translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Accept with this reason</source>
+        <translation>按此理由接受</translation>
+    </message>
+    <message>
+        <source>Do not accept</source>
+        <translation>不接受</translation>
     </message>
     <message>
         <source>The swing goes on.</source>
@@ -1590,6 +1784,10 @@
         <translation>测头已接受；请开始下一次标定。</translation>
     </message>
     <message>
+        <source>All recorded images are read.</source>
+        <translation>录制的图像已全部读取。</translation>
+    </message>
+    <message>
         <source>Add images to this swing</source>
         <translation>为本次摆动增加图像</translation>
     </message>
@@ -1598,12 +1796,36 @@
         <translation>不用这些图像，重新摆动</translation>
     </message>
     <message>
+        <source>Put it in force with a reason</source>
+        <translation>注明理由后使其生效</translation>
+    </message>
+    <message>
         <source>Since {0}. Earlier results are kept.</source>
         <translation>自 {0} 起。更早的结果均保留。</translation>
     </message>
     <message>
-        <source>IN FORCE</source>
-        <translation>已生效</translation>
+        <source>Take this acceptance back? The result before is in force again; both are kept.</source>
+        <translation>撤回此次接受吗？之前的结果将重新生效；两者都保留。</translation>
+    </message>
+    <message>
+        <source>Take back</source>
+        <translation>撤回</translation>
+    </message>
+    <message>
+        <source>Leave it in force</source>
+        <translation>保持生效</translation>
+    </message>
+    <message>
+        <source>The tip is copied: x, y, z in mm.</source>
+        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
+    </message>
+    <message>
+        <source>Folder to save in</source>
+        <translation>保存到的文件夹</translation>
+    </message>
+    <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
     </message>
     <message>
         <source>The tip shows here once the pen is swung.</source>
@@ -1619,7 +1841,110 @@
     </message>
 </context>
 <context>
+    <name>SettingsPanel</name>
+    <message>
+        <source>The whole sensor is read out.</source>
+        <translation>已读出整个传感器。</translation>
+    </message>
+    <message>
+        <source>Colours are made grey, which costs sharpness. A grey format such as Mono8 gives better centres, a monochrome camera the best.</source>
+        <translation>彩色会转换为灰度，清晰度因此下降。Mono8 等灰度格式的中心更准，黑白相机最好。</translation>
+    </message>
+    <message>
+        <source>delivered: {0}</source>
+        <translation>送达：{0}</translation>
+    </message>
+    <message>
+        <source>incomplete: {0}</source>
+        <translation>不完整：{0}</translation>
+    </message>
+    <message>
+        <source>missed: {0}</source>
+        <translation>丢失：{0}</translation>
+    </message>
+    <message>
+        <source>skipped: {0}</source>
+        <translation>跳过：{0}</translation>
+    </message>
+    <message>
+        <source>Free running</source>
+        <translation>自由运行</translation>
+    </message>
+    <message>
+        <source>By software</source>
+        <translation>软件触发</translation>
+    </message>
+    <message>
+        <source>Settings of the camera</source>
+        <translation>相机设置</translation>
+    </message>
+    <message>
+        <source>Frame rate</source>
+        <translation>帧率</translation>
+    </message>
+    <message>
+        <source>Pixel format</source>
+        <translation>像素格式</translation>
+    </message>
+    <message>
+        <source>Trigger</source>
+        <translation>触发</translation>
+    </message>
+    <message>
+        <source>Packet size</source>
+        <translation>数据包大小</translation>
+    </message>
+    <message>
+        <source>Region width</source>
+        <translation>区域宽度</translation>
+    </message>
+    <message>
+        <source>Region from left</source>
+        <translation>区域左边距</translation>
+    </message>
+    <message>
+        <source>Region</source>
+        <translation>区域</translation>
+    </message>
+    <message>
+        <source>from left, top</source>
+        <translation>左、上边距</translation>
+    </message>
+    <message>
+        <source>Region height</source>
+        <translation>区域高度</translation>
+    </message>
+    <message>
+        <source>Region from top</source>
+        <translation>区域上边距</translation>
+    </message>
+    <message>
+        <source>Whole sensor</source>
+        <translation>整个传感器</translation>
+    </message>
+    <message>
+        <source>Of this camera&apos;s images: came whole; came in part and were left out; never came; were not measured, as the computer was too slow.</source>
+        <translation>此相机的图像：完整送达；只到达一部分而被舍弃；从未到达；因计算机太慢而未测量。</translation>
+    </message>
+    <message>
+        <source>Larger packets cost the computer less. The network card and every switch must let them pass (jumbo frames).</source>
+        <translation>数据包越大，计算机的负担越小。网卡和每个交换机都必须允许其通过（巨型帧）。</translation>
+    </message>
+</context>
+<context>
     <name>Sidebar</name>
+    <message>
+        <source>Pen {0}</source>
+        <translation>光笔 {0}</translation>
+    </message>
+    <message>
+        <source>Tip {0}</source>
+        <translation>测头 {0}</translation>
+    </message>
+    <message>
+        <source>Cone {0}</source>
+        <translation>锥孔 {0}</translation>
+    </message>
     <message>
         <source>Pen tip calibration</source>
         <translation>光笔测头标定</translation>
@@ -1687,12 +2012,20 @@
 <context>
     <name>SourcePanel</name>
     <message>
-        <source>Simulated pen</source>
-        <translation>模拟光笔</translation>
+        <source>Cameras found: {0}</source>
+        <translation>找到的相机：{0}</translation>
     </message>
     <message>
-        <source>Recorded images</source>
-        <translation>录制的图像</translation>
+        <source>No camera was found. Check its power and its cable, or enter its serial number or its address.</source>
+        <translation>没有找到相机。请检查电源和线缆，或输入其序列号或地址。</translation>
+    </message>
+    <message>
+        <source>GenTL producer of the camera</source>
+        <translation>相机的 GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>GenTL producers ({0})</source>
+        <translation>GenTL 生产者文件 ({0})</translation>
     </message>
     <message>
         <source>Folder of the recorded images</source>
@@ -1707,8 +2040,36 @@
         <translation>视频和图像 ({0})</translation>
     </message>
     <message>
+        <source>The search is on.</source>
+        <translation>正在搜索。</translation>
+    </message>
+    <message>
+        <source>Cameras are being looked for.</source>
+        <translation>正在搜索相机。</translation>
+    </message>
+    <message>
+        <source> and </source>
+        <translation> 和 </translation>
+    </message>
+    <message>
+        <source>Beside the images: {0}</source>
+        <translation>图像旁边有：{0}</translation>
+    </message>
+    <message>
+        <source>Use both</source>
+        <translation>两者都用</translation>
+    </message>
+    <message>
+        <source>Use it</source>
+        <translation>使用</translation>
+    </message>
+    <message>
         <source>Source of the images</source>
         <translation>图像来源</translation>
+    </message>
+    <message>
+        <source>{0} - not installed</source>
+        <translation>{0} - 未安装</translation>
     </message>
     <message>
         <source>Folder, record or video</source>
@@ -1725,6 +2086,22 @@
     <message>
         <source>Video...</source>
         <translation>视频...</translation>
+    </message>
+    <message>
+        <source>GenTL producer</source>
+        <translation>GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>GenTL producers of the system</source>
+        <translation>系统的 GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>Serial number or address</source>
+        <translation>序列号或地址</translation>
+    </message>
+    <message>
+        <source>Search</source>
+        <translation>搜索</translation>
     </message>
     <message>
         <source>Use its files</source>
@@ -1754,14 +2131,6 @@
         <translation>下一步：相机</translation>
     </message>
     <message>
-        <source>Pen {0}</source>
-        <translation>光笔 {0}</translation>
-    </message>
-    <message>
-        <source>Cone {0}</source>
-        <translation>锥孔 {0}</translation>
-    </message>
-    <message>
         <source>The last calibration cannot be shown.</source>
         <translation>无法显示上次标定。</translation>
     </message>
@@ -1772,6 +2141,10 @@
     <message>
         <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
         <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
+        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
     </message>
     <message>
         <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
@@ -1791,6 +2164,10 @@
     <message>
         <source>done</source>
         <translation>已完成</translation>
+    </message>
+    <message>
+        <source>done, with doubts</source>
+        <translation>已完成，需检查</translation>
     </message>
     <message>
         <source>now</source>
@@ -2001,6 +2378,10 @@
         <translation>继续采集</translation>
     </message>
     <message>
+        <source>All recorded images are read.</source>
+        <translation>录制的图像已全部读取。</translation>
+    </message>
+    <message>
         <source>Begin anew? The images of this swing ({0}) are set aside; they stay on the disk.</source>
         <translation>重新开始？本次摆动的图像（{0} 幅）将被搁置，但仍保留在磁盘上。</translation>
     </message>
@@ -2056,6 +2437,10 @@
     <message>
         <source>No swing</source>
         <translation>没有摆动</translation>
+    </message>
+    <message>
+        <source>recorded images</source>
+        <translation>录制的图像</translation>
     </message>
     <message>
         <source>{0}; {1} dropped</source>
@@ -2146,8 +2531,16 @@
         <translation>已停止</translation>
     </message>
     <message>
+        <source>READING</source>
+        <translation>读取中</translation>
+    </message>
+    <message>
         <source>NOT KEPT</source>
         <translation>未保留</translation>
+    </message>
+    <message>
+        <source>{0} of {1} read</source>
+        <translation>已读取 {0} / {1}</translation>
     </message>
     <message>
         <source>{0} kept, {1} to go</source>
@@ -2194,10 +2587,6 @@
         <translation>从现在起使用该测头。</translation>
     </message>
     <message>
-        <source>IN FORCE</source>
-        <translation>已生效</translation>
-    </message>
-    <message>
         <source>{0} of at least {1}</source>
         <translation>{0} / 至少 {1}</translation>
     </message>
@@ -2235,6 +2624,13 @@
     <message>
         <source>Images hang together: their noise counts {0} times (variance).</source>
         <translation>各图像相关：噪声方差按 {0} 倍计。</translation>
+    </message>
+</context>
+<context>
+    <name>Wizard</name>
+    <message>
+        <source>Other windows of the program use the data folder {0}. All of them put their tips in force there.</source>
+        <translation>其他程序窗口也在使用数据文件夹 {0}。它们接受的测头都在那里生效。</translation>
     </message>
 </context>
 <context>
@@ -2290,6 +2686,14 @@
         <translation>内参文件以 YAML 保存，但 {name} 不以 .yaml 结尾。请选择这样的名称。</translation>
     </message>
     <message>
+        <source>A control chart is written as .csv or .svg, but {name} ends in neither. Choose such a name.</source>
+        <translation>控制图写为 .csv 或 .svg，而 {name} 不以二者结尾。请选择这样的文件名。</translation>
+    </message>
+    <message>
+        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, the tip did not rest in the cone, or each touch was of too few images.</source>
+        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定的测头仅散布 {of_tip:.4f} mm。测头是稳定的：锥孔或相机在触测之间移动，测头没有停稳在锥孔中，或每次触测的图像太少。</translation>
+    </message>
+    <message>
         <source>A pen is written as .csv or .json, but {name} ends in neither. Choose such a name.</source>
         <translation>光笔以 .csv 或 .json 保存，但 {name} 的结尾两者都不是。请选择这样的名称。</translation>
     </message>
@@ -2298,16 +2702,40 @@
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
     </message>
     <message>
+        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
+        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个检定长度。</translation>
+    </message>
+    <message>
         <source>All of them were taken, so the tip lies between both.</source>
         <translation>全部位姿均已采用，因此所得测头位于两者之间。</translation>
+    </message>
+    <message>
+        <source>All recorded images are read, then the tip is computed.</source>
+        <translation>先读取全部录制的图像，再计算测头。</translation>
+    </message>
+    <message>
+        <source>All touches of {run} lie within {extent:.3f} mm: one end was touched again and the other not at all. Touch both ends.</source>
+        <translation>{run} 的全部触测点都在 {extent:.3f} mm 之内：同一端被重复触测，另一端没有触测。请触测两端。</translation>
     </message>
     <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
         <translation>另一个程序正在写入 {folder} 中的摆动。请在那里继续，或关闭该程序后重试。</translation>
     </message>
     <message>
+        <source>Another program uses the camera {place}. Close that program, or wait a few seconds if it has just ended.</source>
+        <translation>另一个程序正在使用相机 {place}。请关闭该程序；如果它刚刚结束，请等待几秒钟。</translation>
+    </message>
+    <message>
         <source>Another program uses the simulated camera {serial}. Close that program, or wait a few seconds.</source>
         <translation>另一个程序正在使用模拟相机 {serial}。请关闭该程序，或稍等几秒。</translation>
+    </message>
+    <message>
+        <source>Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: apt-get install libaravis-0.8-0</source>
+        <translation>未安装 Aravis。它在 Linux 上驱动 GigE Vision 和 USB3 Vision 相机：apt-get install libaravis-0.8-0</translation>
+    </message>
+    <message>
+        <source>Basler (pylon)</source>
+        <translation>Basler (pylon)</translation>
     </message>
     <message>
         <source>Calibrate each of both from a file of its own.</source>
@@ -2320,6 +2748,10 @@
     <message>
         <source>Camera {camera} has no image at {n_absent} of {n_moments} moments, such as that of {example}. What the other cameras saw there is used.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_absent} 个没有图像，例如 {example} 所在的时刻。这些时刻采用其他相机的图像。</translation>
+    </message>
+    <message>
+        <source>Camera {camera} is out of step with the first camera by some {lag:.2f} of the time between two images. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
+        <translation>相机 {camera} 与第一台相机不同步，约差两幅图像间隔的 {lag:.2f}。这会使测头位置偏移，也可能引起其他警告。请用同一信号触发所有相机，或在每次拍摄时握稳光笔。</translation>
     </message>
     <message>
         <source>Camera {camera}: {trouble}</source>
@@ -2338,6 +2770,10 @@
         <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
     </message>
     <message>
+        <source>Dask is not installed here, which a cluster needs. Install the extra named cluster, or compute on this machine.</source>
+        <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
+    </message>
+    <message>
         <source>Diameter of the discs: {flaw}</source>
         <translation>发光面直径：{flaw}</translation>
     </message>
@@ -2350,12 +2786,28 @@
         <translation>视频第 {number} 帧</translation>
     </message>
     <message>
+        <source>GenICam with a vendor&apos;s GenTL producer</source>
+        <translation>GenICam，使用厂商的 GenTL 生产者</translation>
+    </message>
+    <message>
+        <source>GigE and USB3 Vision (Aravis)</source>
+        <translation>GigE 和 USB3 Vision (Aravis)</translation>
+    </message>
+    <message>
+        <source>Harvesters is not installed. With the GenTL producer of its vendor it drives any GenICam camera: {python} -m pip install harvesters genicam</source>
+        <translation>未安装 Harvesters。它通过厂商的 GenTL 生产者驱动任何 GenICam 相机：{python} -m pip install harvesters genicam</translation>
+    </message>
+    <message>
         <source>Hold it so that the camera sees its LEDs.</source>
         <translation>握住光笔，使相机能看到 LED。</translation>
     </message>
     <message>
         <source>If numbers have decimal commas, separate the columns by semicolons.</source>
         <translation>如果数字使用小数逗号，请用分号分隔各列。</translation>
+    </message>
+    <message>
+        <source>Image {seq} of the camera {serial} arrived incomplete and was left out. Check the cable and the network.</source>
+        <translation>相机 {serial} 的图像 {seq} 到达时不完整，已舍弃。请检查线缆和网络。</translation>
     </message>
     <message>
         <source>Image {seq} of the simulated camera {serial} arrived incomplete. Check the cable and the network.</source>
@@ -2404,6 +2856,10 @@
     <message>
         <source>LED centres</source>
         <translation>LED 中心</translation>
+    </message>
+    <message>
+        <source>LED {led} has moved by {distance:.3f} mm against the others, as {swing} has it: it was bent or knocked, or came loose.</source>
+        <translation>据 {swing}，LED {led} 相对其他 LED 移动了 {distance:.3f} mm：它被碰弯、碰撞或松动。</translation>
     </message>
     <message>
         <source>LED {led} is listed already on line {line}.</source>
@@ -2570,12 +3026,48 @@
         <translation>下一步：继续采集图像；本次摆动的图像会保留。</translation>
     </message>
     <message>
+        <source>Next: check that camera file and LED file are of this camera and this pen.</source>
+        <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
+    </message>
+    <message>
         <source>Next: check the intrinsics file and the LED file, then repeat.</source>
         <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
     </message>
     <message>
+        <source>Next: clean tip and artefact, clamp artefact and camera, and verify again.</source>
+        <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
+    </message>
+    <message>
+        <source>Next: look at the pen, fix the LED, and measure the LEDs again.</source>
+        <translation>下一步：检查光笔，固定该 LED，并重新测量各 LED。</translation>
+    </message>
+    <message>
         <source>Next: repeat the swing with the tip pressed in.</source>
         <translation>下一步：压紧测头，重做摆动。</translation>
+    </message>
+    <message>
+        <source>Next: seat the tip firmly, calibrate it again, and verify the new result.</source>
+        <translation>下一步：装紧测头，重新标定，并验证新的结果。</translation>
+    </message>
+    <message>
+        <source>Next: see that it is the tip that is named, clean and tight, then repeat.</source>
+        <translation>下一步：确认测头与所填写的一致、清洁且已拧紧，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: use the tip.</source>
+        <translation>下一步：使用该测头。</translation>
+    </message>
+    <message>
+        <source>No Dask scheduler answers at {address}. Check the address, such as tcp://10.0.0.5:8786, and that the scheduler runs.</source>
+        <translation>{address} 处没有 Dask 调度器应答。请检查地址（例如 tcp://10.0.0.5:8786）以及调度器是否在运行。</translation>
+    </message>
+    <message>
+        <source>No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.</source>
+        <translation>没有安装 GenTL 生产者：{variable} 指定的文件夹中没有 {suffix} 文件。请安装相机的软件，或打开它的 {suffix} 文件。</translation>
+    </message>
+    <message>
+        <source>No LED has moved against the others over {n_swings} swings.</source>
+        <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
     <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
@@ -2598,6 +3090,10 @@
         <translation>奇数与偶数图像求得的测头相差 {difference:.4f} mm，通常为 {usual:.4f} mm。测头可能移动过：请压紧测头，重做摆动。</translation>
     </message>
     <message>
+        <source>One swing tells nothing of how a pen changes; give two at least.</source>
+        <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
         <source>Press the tip into the cone and keep it there.</source>
         <translation>把测头压入锥孔并保持。</translation>
     </message>
@@ -2606,8 +3102,28 @@
         <translation>把测头压入锥孔，轻轻摆动光笔。</translation>
     </message>
     <message>
+        <source>Put the tip into the cone and hold it still, each time leant another way: {n_touches} of {needed}.</source>
+        <translation>把测头放入锥孔并保持不动，每次向不同方向倾斜：{n_touches} / {needed}。</translation>
+    </message>
+    <message>
         <source>RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.</source>
         <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>Recorded images</source>
+        <translation>录制的图像</translation>
+    </message>
+    <message>
+        <source>Show the camera the pen that the tip belongs to.</source>
+        <translation>请让相机看到该测头所属的光笔。</translation>
+    </message>
+    <message>
+        <source>Simulated pen</source>
+        <translation>模拟光笔</translation>
+    </message>
+    <message>
+        <source>The GenTL producer {file} does not load: {why}. Choose the producer of this camera, for this system and 64 bit.</source>
+        <translation>无法加载 GenTL 生产者 {file}：{why}。请选择适用于此相机、此系统和 64 位的生产者。</translation>
     </message>
     <message>
         <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
@@ -2674,16 +3190,40 @@
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
     </message>
     <message>
+        <source>The calibration {path} is not as it was written: it was changed or damaged since. Restore it from a copy, or calibrate again.</source>
+        <translation>标定结果 {path} 与写出时不同：此后被改动或损坏。请从副本恢复，或重新标定。</translation>
+    </message>
+    <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
+    </message>
+    <message>
+        <source>The camera sends no images in the pixel format {wanted} that can be used; it offers {offered}. Choose Mono8, or another of Mono8 to Mono16.</source>
+        <translation>相机不能以像素格式 {wanted} 送来可用的图像；它提供 {offered}。请选择 Mono8，或 Mono8 到 Mono16 中的另一种。</translation>
+    </message>
+    <message>
+        <source>The camera sends {sent:.1f} images a second, not the {wanted:.1f} that are set: its link or its exposure allows no more. Lower the frame rate, or take a smaller region or a shorter exposure.</source>
+        <translation>相机每秒送来 {sent:.1f} 幅图像，而不是设定的 {wanted:.1f} 幅：其链路或曝光不允许更多。请降低帧率，或使用更小的区域或更短的曝光。</translation>
     </message>
     <message>
         <source>The camera {serial} did not stop within {waited:.0f} s. Unplug it, and start the program again before you use it.</source>
         <translation>相机 {serial} 在 {waited:.0f} s 内没有停止。请拔下相机，重新启动程序后再使用。</translation>
     </message>
     <message>
+        <source>The camera {serial} no longer answers ({why}). Check its cable and its power.</source>
+        <translation>相机 {serial} 不再响应（{why}）。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} refuses a setting: {why}. Choose another.</source>
+        <translation>相机 {serial} 拒绝一项设置：{why}。请另选。</translation>
+    </message>
+    <message>
         <source>The camera {serial} sent no image for {silence:.0f} s. Check its cable and its power.</source>
         <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} sent no image for {waited:.1f} s. Check its cable and its trigger.</source>
+        <translation>相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆和触发。</translation>
     </message>
     <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
@@ -2734,6 +3274,10 @@
         <translation>图像与 LED 文件不符：其坐标偏差为 {found:.4f} mm（标准差），文件给出 {stated:.4f} mm。请重新测量光笔，或检查该文件是否属于此光笔。</translation>
     </message>
     <message>
+        <source>The images contradict the LED file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this pen, or measure the pen again.</source>
+        <translation>图像与 LED 文件矛盾：图像要求{what}为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件给出 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于这支笔，或重新测量这支笔。</translation>
+    </message>
+    <message>
         <source>The images contradict the camera file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this camera, lens and focus, or calibrate the camera again.</source>
         <translation>图像与内参文件不符：按图像，{what}应为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件为 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于此相机、镜头和对焦，或重新标定相机。</translation>
     </message>
@@ -2774,12 +3318,28 @@
         <translation>联合拟合在 {n_steps} 步内未收敛。图像可能不属于这支光笔和这台相机：请检查两个文件。</translation>
     </message>
     <message>
+        <source>The led_covariance of {name} is none: it must be symmetric, and no variance below 0. Leave it away, or give it as it was written.</source>
+        <translation>{name} 的 led_covariance 不是协方差矩阵：它必须对称，且方差不得小于 0。请去掉它，或按原样给出。</translation>
+    </message>
+    <message>
+        <source>The length at {run} is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Is it the certified length of this bar? Else the scale of the LED file or the camera file is wrong, or the pen is warmer than when it was measured.</source>
+        <translation>{run} 处的长度偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这是该标准杆的检定长度吗？否则是 LED 文件的尺度或内参文件有误，或光笔比测量 LED 时更热。</translation>
+    </message>
+    <message>
+        <source>The length is off by {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>长度最大偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
         <source>The lens distortion of the camera file cannot be undone for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
     </message>
     <message>
         <source>The line, the plane and the columns are not parallel, or too close.</source>
         <translation>直线、平面和两列不平行，或相距太近。</translation>
+    </message>
+    <message>
+        <source>The link to the camera loses images: of {n_sent}, {n_incomplete} came incomplete and {n_missed} not at all. Lower the frame rate, take a smaller region or larger packets, or check cable and switch.</source>
+        <translation>到相机的链路丢失图像：{n_sent} 幅中有 {n_incomplete} 幅不完整，{n_missed} 幅未到达。请降低帧率，使用更小的区域或更大的数据包，或检查线缆和交换机。</translation>
     </message>
     <message>
         <source>The next image of {place} comes {seconds:.1f} s later. Wait, or replay the images faster.</source>
@@ -2802,8 +3362,32 @@
         <translation>光笔已抬起。放回测头即可继续。</translation>
     </message>
     <message>
+        <source>The pen was held alike each time: its postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed to prove a tip. Lean it to all sides.</source>
+        <translation>光笔每次的握持姿态相同：各姿态仅相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜。</translation>
+    </message>
+    <message>
         <source>The pen was swung about one axis only, {axis}: that axis itself turned by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the tip&apos;s place along it is not fixed. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
+    </message>
+    <message>
+        <source>The point moves as the pen leans, by {deviation:.4f} mm along {axis} (limit {limit:.4f} mm): the tip sits {x:+.4f} {y:+.4f} {z:+.4f} mm from where it was calibrated. Was it exchanged, bent or screwed in anew, or is it the tip of another pen?</source>
+        <translation>该点随光笔倾斜而移动，沿 {axis} 为 {deviation:.4f} mm（限值 {limit:.4f} mm）：测头偏离标定位置 {x:+.4f} {y:+.4f} {z:+.4f} mm。测头是否被更换、碰弯或重新拧过，或者是另一支光笔的测头？</translation>
+    </message>
+    <message>
+        <source>The point scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm), which no other tip would mend. The tip may not rest in the cone: look for dirt, wear and a loose cone.</source>
+        <translation>该点沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm），换用其他测头位置也不能消除。测头可能没有停稳在锥孔中：请检查污物、磨损和锥孔是否松动。</translation>
+    </message>
+    <message>
+        <source>The point stays within a sphere of {error:.4f} mm as the pen leans (limit {limit:.4f} mm).</source>
+        <translation>光笔倾斜时，该点保持在直径 {error:.4f} mm 的球内（限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The point stays within {u:.4f} {v:.4f} {w:.4f} mm (standard deviation along u v w) however the pen is held.</source>
+        <translation>无论光笔如何握持，该点保持在 {u:.4f} {v:.4f} {w:.4f} mm 以内（沿 u v w 的标准差）。</translation>
+    </message>
+    <message>
+        <source>The point wanders within a sphere of {error:.4f} mm as the pen leans (limit {limit:.4f} mm).</source>
+        <translation>光笔倾斜时，该点在直径 {error:.4f} mm 的球内游移（限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
         <source>The poses are of two tips, {distance:.2f} mm apart in the pen, as if the tip had been exchanged or had slipped in its holder. One: poses {first}. The other: poses {second}. {consequence}</source>
@@ -2812,6 +3396,10 @@
     <message>
         <source>The poses have no tip in common: the best one scatters by {scatter:.0f} mm, while the poses themselves are {movement:.0f} mm apart. Check that they are of one pen that was swung on its tip, as cam_from_pen, and that rotations and translations belong together.</source>
         <translation>这些位姿没有共同的测头：最佳结果的散布为 {scatter:.0f} mm，而位姿本身彼此相距 {movement:.0f} mm。请检查：位姿是否来自同一支绕测头摆动的光笔，是否以 cam_from_pen 给出，旋转与平移是否对应。</translation>
+    </message>
+    <message>
+        <source>The postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed. Hold the pen upright, and lean it to four sides.</source>
+        <translation>各姿态仅相差 {found:.1f}°（均方根），需要 {needed:.0f}°。请将光笔竖直握持，并向四个方向倾斜。</translation>
     </message>
     <message>
         <source>The program failed on this image ({kind}: {problem}). Keep the image, and report it.</source>
@@ -2824,6 +3412,14 @@
     <message>
         <source>The program made a mistake of its own. The images kept so far are safe; go on, or start the program again.</source>
         <translation>程序自身出错。已保留的图像是安全的；请继续，或重新启动程序。</translation>
+    </message>
+    <message>
+        <source>The radius is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>半径偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The radius is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Tip, LED file or camera file may be wrong, or the ball is not compensated.</source>
+        <translation>半径偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或内参文件可能有误，或未补偿测球半径。</translation>
     </message>
     <message>
         <source>The record {name} holds no images. Resume the swing, or begin a new one.</source>
@@ -2842,16 +3438,140 @@
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
     </message>
     <message>
+        <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
+        <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
+    </message>
+    <message>
+        <source>The tip cannot be accepted. {why}</source>
+        <translation>不能接受该测头。{why}</translation>
+    </message>
+    <message>
+        <source>The tip cannot be compared with the one in force. {why}</source>
+        <translation>无法与已生效的测头比较。{why}</translation>
+    </message>
+    <message>
+        <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
+        <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
+    </message>
+    <message>
         <source>The tip is being computed. Keep the pen at hand.</source>
         <translation>正在计算测头。请把光笔放在手边。</translation>
+    </message>
+    <message>
+        <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
+        <translation>该测头需检查。{why}请注明理由后接受，否则不要接受。</translation>
+    </message>
+    <message>
+        <source>The tip lies {distance:.1f} mm from its nominal place. Is it the tip that is named?</source>
+        <translation>测头偏离标称位置 {distance:.1f} mm。是否为所填写的测头？</translation>
+    </message>
+    <message>
+        <source>The tip lies {distance:.4f} mm from that of {date}: along {axis} {difference:.4f} mm, where U (k = 2) of both explains {uncertainty:.4f} mm. Was it exchanged, bent, or mounted anew?</source>
+        <translation>测头与 {date} 的结果相差 {distance:.4f} mm：沿 {axis} 方向相差 {difference:.4f} mm，而两者的 U (k = 2) 只能解释 {uncertainty:.4f} mm。测头是否更换、弯曲或重新安装过？</translation>
+    </message>
+    <message>
+        <source>The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.</source>
+        <translation>测头沿 {axis} 的重复性为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。</translation>
+    </message>
+    <message>
+        <source>The tip scatters by {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm. Touch a fixed point several times: whether that scatters alike tells what moved.</source>
+        <translation>测头沿 {axis} 的散布为 {deviation:.4f} mm（标准差，限值 {limit:.4f} mm）；各次标定给出 {stated:.4f} mm。请多次触测一个固定点：它是否同样散布可说明是什么在移动。</translation>
+    </message>
+    <message>
+        <source>The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point touched with it by only {of_point:.4f} mm. An error of the calibration would move both alike: so something moved with the pen between the calibrations. Look for a tip that is not screwed in firmly, a loose or knocked LED, or LEDs that were measured too coarsely.</source>
+        <translation>各次标定的测头散布为 {of_tip:.4f} mm，而用它触测的固定点仅散布 {of_point:.4f} mm。标定误差会使二者同样变化：因此两次标定之间光笔上有东西移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 是否测量得太粗。</translation>
+    </message>
+    <message>
+        <source>The touches lie in one place or on a line, which is no circle. Touch the ring all round.</source>
+        <translation>各触测点位于同一处或一条直线上，不成圆。请沿环一周触测。</translation>
+    </message>
+    <message>
+        <source>The touches lie on a circle of radius {measured:.3f} mm, {certified} mm is certified. Is it this ring, and its radius rather than its diameter?</source>
+        <translation>触测点所在圆的半径为 {measured:.3f} mm，检定值为 {certified} mm。是这个环吗？给出的是半径而不是直径吗？</translation>
+    </message>
+    <message>
+        <source>The touches of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed: a radius from less is hardly worth anything. Touch the ring also in the gap between {first} and {second}.</source>
+        <translation>{run} 的触测覆盖环的 {covered:.0f}°，至少需要 {needed:.0f}°：更少时求得的半径几乎没有意义。请在 {first} 与 {second} 之间的空缺处也触测。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie at more than two places: {touch} is {distance:.2f} mm from the others of its end. Was the pen lifted there? Touch nothing but the two ends.</source>
+        <translation>{run} 的触测点不止两处：{touch} 与同一端的其他点相距 {distance:.2f} mm。光笔是否在该处抬起？请只触测两端。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie on no circle: {n_off} of {n_touches} are off it, and the others by up to {off:.2f} mm. Touch one ring, in one plane.</source>
+        <translation>{run} 的触测点不在一个圆上：{n_touches} 个点中有 {n_off} 个偏离，其余最多偏离 {off:.2f} mm。请在一个平面内触测同一个环。</translation>
+    </message>
+    <message>
+        <source>The touches of {run} lie up to {form:.4f} mm off a circle in a plane (limit {limit:.4f} mm): the tip slipped, the ring is dirty, or the tip is off.</source>
+        <translation>{run} 的触测点最多偏离平面圆 {form:.4f} mm（限值 {limit:.4f} mm）：测头滑动，环不清洁，或测头有误。</translation>
+    </message>
+    <message>
+        <source>The verification is done. Put the pen down.</source>
+        <translation>验证已完成。可以放下光笔。</translation>
+    </message>
+    <message>
+        <source>The witness moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the witness is not clamped, or the camera was not warm yet. What was measured in between is off by as much.</source>
+        <translation>监视点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或监视点没有夹紧，或相机尚未预热。其间的测量结果也有同样的偏差。</translation>
+    </message>
+    <message>
+        <source>The witness stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>监视点的移动在 {distance:.4f} mm 以内（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The witness was visited once, which tells nothing of a drift. Touch it before, during and after the session.</source>
+        <translation>监视点只触测了一次，看不出漂移。请在工作之前、期间和之后各触测一次。</translation>
+    </message>
+    <message>
+        <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
+        <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
     <message>
         <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
         <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
     </message>
     <message>
+        <source>There are {n_postures} postures, {needed} are needed: upright, and leant to four sides.</source>
+        <translation>共有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
+    </message>
+    <message>
+        <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
+        <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
+    </message>
+    <message>
+        <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
+        <translation>测头 {tip}、光笔 {pen} 的这一结果已不再生效。撤回之前，请先查看现在生效的是哪一个。</translation>
+    </message>
+    <message>
+        <source>Touch one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
+        <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
+    </message>
+    <message>
+        <source>Touch the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees by {n_touches} touches.</source>
+        <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
+    </message>
+    <message>
         <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
         <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip. Touch each end more often, and lay the length across the view.</source>
+        <translation>{run} 处长度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。请对每端多次触测，并使长度方向横对视线。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of the radius is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip.</source>
+        <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
+    </message>
+    <message>
+        <source>Webcam, to try it</source>
+        <translation>网络摄像头（试用）</translation>
+    </message>
+    <message>
+        <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
+        <translation>测球与锥孔不够圆。请换用更好的，并给出其形状误差</translation>
+    </message>
+    <message>
+        <source>calibration</source>
+        <translation>标定结果</translation>
     </message>
     <message>
         <source>camera {number} of {name}</source>
@@ -2864,6 +3584,10 @@
     <message>
         <source>centimetres</source>
         <translation>厘米</translation>
+    </message>
+    <message>
+        <source>diameter of the discs</source>
+        <translation>发光圆面的直径</translation>
     </message>
     <message>
         <source>further turn of cam_from_rig about {axis}</source>
@@ -2890,8 +3614,16 @@
         <translation>不是同一时刻</translation>
     </message>
     <message>
+        <source>pypylon is not installed. It drives Basler cameras: {python} -m pip install pypylon</source>
+        <translation>未安装 pypylon。它驱动 Basler 相机：{python} -m pip install pypylon</translation>
+    </message>
+    <message>
         <source>rig file</source>
         <translation>相机组文件</translation>
+    </message>
+    <message>
+        <source>scale of the LEDs</source>
+        <translation>LED 坐标的比例</translation>
     </message>
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
@@ -2904,14 +3636,6 @@
     <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
-    </message>
-    <message>
-        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images earlier than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
-        <translation>相机 {camera} 的拍摄时刻比第一台相机早 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
-    </message>
-    <message>
-        <source>Camera {camera} takes its images some {lag:.2f} of the time between two images later than the first camera. That moves the tip, and other warnings may come of it. Trigger all cameras by one signal, or hold the pen still for each image.</source>
-        <translation>相机 {camera} 的拍摄时刻比第一台相机晚 约 {lag:.2f} 个图像间隔。这会使测尖结果偏移，其他警告也可能由此引起。请用同一信号触发所有相机，或在拍摄每幅图像时保持光笔静止。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -3306,6 +4030,10 @@
         <translation>磁盘是只读的。请选择其他文件夹。</translation>
     </message>
     <message>
+        <source>the distance of the two cones. Have it measured better</source>
+        <translation>两个锥孔的间距。请更精确地测量它</translation>
+    </message>
+    <message>
         <source>the file ends within the number {number}, which has {n_decimals} decimals where all others have {n_others}. Copy the file again, or remove the line.</source>
         <translation>文件在数字 {number} 处中断：它有 {n_decimals} 位小数，而其他都有 {n_others} 位。请重新复制文件，或删除该行。</translation>
     </message>
@@ -3340,6 +4068,10 @@
     <message>
         <source>the scatter of the poses, and that it hangs together from pose to pose</source>
         <translation>位姿的散布，以及相邻位姿之间的相关性</translation>
+    </message>
+    <message>
+        <source>the temperature of the pen. State its expansion in the LED file, and measure its temperature at the swing</source>
+        <translation>笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
     </message>
     <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
@@ -3526,12 +4258,24 @@
         <translation>{n_images} 幅图像中有 {n_dropped} 幅未参与计算。若测头滑动过，请重做摆动。</translation>
     </message>
     <message>
+        <source>{n_failed} of {n_trials} trials gave no tip: the swing is too poor to be repeated by simulation. Capture more images in other postures.</source>
+        <translation>{n_trials} 次模拟中有 {n_failed} 次求不出测头：该摆动太差，无法用模拟重复。请以其他姿态采集更多图像。</translation>
+    </message>
+    <message>
         <source>{n_images} {reason}</source>
         <translation>{reason} {n_images} 幅</translation>
     </message>
     <message>
         <source>{n_left_out} of {n_poses} poses agree with no common tip and were left out: {poses}. Look for what disturbed the tracking.</source>
         <translation>{n_poses} 个位姿中有 {n_left_out} 个与共同的测头不符，已剔除：{poses}。请查找干扰跟踪的原因。</translation>
+    </message>
+    <message>
+        <source>{n_left_out} of {n_touches} touches lie elsewhere and were left out, the first {first}: the pen was lifted there, or slipped.</source>
+        <translation>{n_touches} 次触测中有 {n_left_out} 次位于别处，已剔除，第一次为 {first}：光笔在该处抬起或滑动。</translation>
+    </message>
+    <message>
+        <source>{n_left_out} touches lie off the ring and were left out, the first {first}: the pen was lifted there, or slipped.</source>
+        <translation>{n_left_out} 次触测不在环上，已剔除，第一次为 {first}：光笔在该处抬起或滑动。</translation>
     </message>
     <message>
         <source>{n_pairs} of {n_moments} moments show the pen to camera {camera} and to another one; {needed} are needed to tell how both stand. Give the images of one moment the same name, and turn the cameras so that each sees the pen.</source>
@@ -3544,6 +4288,18 @@
     <message>
         <source>{n_poses} poses are usable; the two-stage method starts from {needed}. Capture more images.</source>
         <translation>可用位姿 {n_poses} 个；两步法至少需要 {needed} 个。请采集更多图像。</translation>
+    </message>
+    <message>
+        <source>{n_swings} swings are given; {needed} are needed to pool, and one more to confirm what comes of them.</source>
+        <translation>给出了 {n_swings} 次摆动；合并需要 {needed} 次，另需一次来确认所得结果。</translation>
+    </message>
+    <message>
+        <source>{n_tips} calibration tells nothing of how well it repeats; give two at least, ten are usual.</source>
+        <translation>{n_tips} 次标定看不出重复性；请至少给出两次，通常为十次。</translation>
+    </message>
+    <message>
+        <source>{n_touches} touches of the point can be used, at least {needed} are needed, {usual} are usual. Touch the cone again, each time in another posture.</source>
+        <translation>该点有 {n_touches} 次可用的触测，至少需要 {needed} 次，通常为 {usual} 次。请再次触测锥孔，每次换一个姿态。</translation>
     </message>
     <message>
         <source>{n_usable} of {n_images} images are usable</source>
@@ -3666,10 +4422,6 @@
         <translation>{name} 的单位 {unit} 不受支持。请使用 {known} 之一。</translation>
     </message>
     <message>
-        <source>{name} has the {what} {sigma:g}. A standard uncertainty above 0 and up to {most:g} is needed; leave it away if it is not known.</source>
-        <translation>{name} 的 {what} 为 {sigma:g}。标准不确定度必须大于 0 且不超过 {most:g}；未知时请省略。</translation>
-    </message>
-    <message>
         <source>{name} has two cameras called {camera}. Give each a name of its own.</source>
         <translation>{name} 中有两台相机都名为 {camera}。请为每台相机取不同的名称。</translation>
     </message>
@@ -3722,10 +4474,6 @@
         <translation>{name} 是列表；LED 文件应为含 leds 和 units 的映射。请照此编写。</translation>
     </message>
     <message>
-        <source>{name} is a table, which has no place for the name and the nominal tip of the pen. Choose a name that ends in .json.</source>
-        <translation>{name} 是表格，无法存放光笔的名称和标称测头。请选择以 .json 结尾的名称。</translation>
-    </message>
-    <message>
         <source>{name} is an animation. Save its images one by one.</source>
         <translation>{name} 是动画。请将其中的图像逐幅保存。</translation>
     </message>
@@ -3748,6 +4496,14 @@
     <message>
         <source>{name} is nested more than {n_levels} levels deep. Check that the right file is named.</source>
         <translation>{name} 的嵌套超过 {n_levels} 层。请检查是否选对了文件。</translation>
+    </message>
+    <message>
+        <source>{name} has the {what} {number:g}. A number above {least:g} and up to {most:g} is needed; leave it away if it is not known.</source>
+        <translation>{name} 中的 {what} 为 {number:g}。需要大于 {least:g} 且不超过 {most:g} 的数；若未知请略去。</translation>
+    </message>
+    <message>
+        <source>{name} is a table, which has no place for the name, the nominal tip and the covariance of the pen. Choose a name that ends in .json.</source>
+        <translation>{name} 是表格，无处存放光笔的名称、标称测头和协方差。请选择以 .json 结尾的文件名。</translation>
     </message>
     <message>
         <source>{name} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
@@ -3790,6 +4546,10 @@
         <translation>{others}和{last}</translation>
     </message>
     <message>
+        <source>{other} was made with another pen file than {first}. Give calibrations of one pen with one pen file.</source>
+        <translation>{other} 所用的光笔文件与 {first} 不同。请给出同一支光笔、同一光笔文件的标定结果。</translation>
+    </message>
+    <message>
         <source>{path} cannot be written: it is a folder. Name a file.</source>
         <translation>无法写入 {path}：它是文件夹。请指定文件。</translation>
     </message>
@@ -3806,8 +4566,16 @@
         <translation>{path} 已损坏。请用备份恢复。</translation>
     </message>
     <message>
+        <source>{path} is no record of a calibration. Give what the command calibrate wrote, or an accepted result.</source>
+        <translation>{path} 不是标定记录。请给出 calibrate 命令写出的文件，或已接受的结果。</translation>
+    </message>
+    <message>
         <source>{path} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} is of several cameras; only calibrations of a single camera are solved again. Leave it out.</source>
+        <translation>{path} 来自多台相机；只能重新求解单台相机的标定。请将其去掉。</translation>
     </message>
     <message>
         <source>{path} was written by a later version of the program (format {number}; this version reads up to {known}). Open the record with that version.</source>
@@ -3838,12 +4606,40 @@
         <translation>{place}：法向量 {normal} 的长度不为 1。请改正；若所有发光面都朝 +z，可以不给法向量。</translation>
     </message>
     <message>
+        <source>{posture} has {n_touches} touches that can be used, {needed} are needed in each posture.</source>
+        <translation>{posture} 有 {n_touches} 次可用的触测，每个姿态需要 {needed} 次。</translation>
+    </message>
+    <message>
         <source>{reason}. Choose another folder or name.</source>
         <translation>{reason}。请选择其他文件夹或名称。</translation>
     </message>
     <message>
+        <source>{run} has {n_touches} touches that can be used; a circle needs at least {needed}, 20 are usual. Touch the ring all round.</source>
+        <translation>{run} 有 {n_touches} 次可用的触测；圆至少需要 {needed} 次，通常为 20 次。请沿环一周触测。</translation>
+    </message>
+    <message>
+        <source>{run} has {n_touches} touches that can be used; a length needs both its ends. Touch each end once at least.</source>
+        <translation>{run} 有 {n_touches} 次可用的触测；长度需要两端。请对每一端至少触测一次。</translation>
+    </message>
+    <message>
+        <source>{run}: none of the {n_images} images shows the pen ({why}). {advice}</source>
+        <translation>{run}：{n_images} 幅图像均未显示光笔（{why}）。{advice}</translation>
+    </message>
+    <message>
+        <source>{run}: the LED positions do not fit the images: {rms:.1f} px, {usual} px or less is usual. Check that the images are of this pen and this camera.</source>
+        <translation>{run}：LED 位置与图像不符：{rms:.1f} px，通常不超过 {usual} px。请检查图像是否属于这支光笔和这台相机。</translation>
+    </message>
+    <message>
+        <source>{run}: the pen was held still nowhere for {n_frames} images. Hold it still on each point, or take each image for a touch.</source>
+        <translation>{run}：光笔没有在任何一处保持不动达 {n_frames} 幅图像。请在每个点上保持不动，或把每幅图像当作一次触测。</translation>
+    </message>
+    <message>
         <source>{told} They have the size of {other}: the images may be given in another order than the cameras of the rig file.</source>
         <translation>{told}它们的尺寸与 {other} 相符：给出图像的顺序可能与相机组文件中相机的顺序不同。</translation>
+    </message>
+    <message>
+        <source>{touch} lies {distance:.2f} mm from where the others are: the pen was lifted, or slipped. Touch that posture again.</source>
+        <translation>{touch} 与其余各点相距 {distance:.2f} mm：光笔曾抬起或滑动。请在该姿态下重新触测。</translation>
     </message>
     <message>
         <source>{unit} is not a unit of length known here. Choose one of {known}.</source>
@@ -3961,6 +4757,10 @@
         <translation>{seconds} 秒后开始</translation>
     </message>
     <message>
+        <source>Reading</source>
+        <translation>读取中</translation>
+    </message>
+    <message>
         <source>More images</source>
         <translation>继续采集</translation>
     </message>
@@ -4005,6 +4805,14 @@
         <translation>拍摄不同时</translation>
     </message>
     <message>
+        <source>Tip has changed</source>
+        <translation>测头有变化</translation>
+    </message>
+    <message>
+        <source>Nothing to compare with</source>
+        <translation>无从比较</translation>
+    </message>
+    <message>
         <source>No tip found</source>
         <translation>未求得测头</translation>
     </message>
@@ -4015,6 +4823,22 @@
     <message>
         <source>noise</source>
         <translation>噪声</translation>
+    </message>
+    <message>
+        <source>centers</source>
+        <translation>中心</translation>
+    </message>
+    <message>
+        <source>ball, cone</source>
+        <translation>球与锥孔</translation>
+    </message>
+    <message>
+        <source>warmth</source>
+        <translation>温度</translation>
+    </message>
+    <message>
+        <source>cone distance</source>
+        <translation>锥孔间距</translation>
     </message>
     <message>
         <source>seat</source>
@@ -4071,6 +4895,10 @@
     <message>
         <source>Choose the folder of the recorded images.</source>
         <translation>请选择录制图像的文件夹。</translation>
+    </message>
+    <message>
+        <source>Search for the camera and choose it.</source>
+        <translation>请搜索并选择相机。</translation>
     </message>
     <message>
         <source>No image has come from the camera yet.</source>
@@ -4131,6 +4959,22 @@
     <message>
         <source>TIP MOVED</source>
         <translation>测头移位</translation>
+    </message>
+    <message>
+        <source>LIVE CAMERA</source>
+        <translation>实时相机</translation>
+    </message>
+    <message>
+        <source>RECORDED</source>
+        <translation>录制图像</translation>
+    </message>
+    <message>
+        <source>SIMULATED</source>
+        <translation>模拟</translation>
+    </message>
+    <message>
+        <source>ORIGIN NOT STATED</source>
+        <translation>来源未注明</translation>
     </message>
     <message>
         <source>PASS</source>
@@ -4235,6 +5079,18 @@
     <message>
         <source>{0} images</source>
         <translation>{0} 幅图像</translation>
+    </message>
+    <message>
+        <source>IN FORCE</source>
+        <translation>已生效</translation>
+    </message>
+    <message>
+        <source>PRACTICE KEPT</source>
+        <translation>练习已保存</translation>
+    </message>
+    <message>
+        <source>A simulated tip is in force for no pen; it is kept apart.</source>
+        <translation>模拟测头不对任何光笔生效，单独保存。</translation>
     </message>
 </context>
 <context>

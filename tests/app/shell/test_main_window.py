@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
+from lightpen.model.origin import Origin
+from lightpen.record.names import Names
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.notice_bar import NoticeBar
@@ -27,6 +29,7 @@ from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Subject
 
 Key = Qt.Key
 
@@ -414,11 +417,11 @@ def test_the_operator_view_names_pen_and_notice_and_the_key_that_leaves_it(
     QTest.keyClick(shell.window, Key.Key_F11)
     view = shell.window.operator_view()
 
-    shell.pages[0].subject_changed.emit("Pen LP-04, tip T-10")
+    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.LIVE))
     shell.window.show_notice("The disk is full.")
 
     words = [text.text() for text in view.findChildren(FittedText) if text.isVisible()]
-    assert {"Pen LP-04, tip T-10", "The disk is full."} <= set(words)
+    assert {"Pen\xa0LP-04  \u00b7  Tip\xa0T-10", "The disk is full."} <= set(words)
     assert any("Esc" in text for text in words)
     shell.window.drop_notice("The disk is full.")
     assert not any(
@@ -484,13 +487,17 @@ def test_f11_in_the_operator_view_leaves_it(shell: Shell, qtbot: QtBot) -> None:
 def test_a_page_speaks_through_the_window(shell: Shell) -> None:
     page = shell.pages[0]
     page.status_changed.emit("21 images a second")
-    page.subject_changed.emit("Pen LP-04")
+    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.SIMULATED))
     page.notice_raised.emit("The file holds no LED.")
     page.operator_value_changed.emit(OperatorValue(instruction="Lean right"))
 
     words = shell.window.words()
 
-    assert {"21 images a second", "Pen LP-04", "The file holds no LED."} <= set(words)
+    assert {
+        "21 images a second",
+        "Pen\xa0LP-04  \u00b7  Tip\xa0T-10",
+        "The file holds no LED.",
+    } <= set(words)
     assert shell.window.operator_view().value().instruction == "Lean right"
     page.notice_raised.emit("")
     assert "The file holds no LED." not in shell.window.words()

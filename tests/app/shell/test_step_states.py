@@ -37,3 +37,12 @@ def test_going_back_keeps_what_is_done() -> None:
 
 def test_the_step_that_is_shown_is_never_closed() -> None:
     assert list_steps(STATUSES, now=3)[3] == Step("Swing", StepState.NOW)
+
+
+def test_a_step_that_was_taken_with_doubts_says_so() -> None:
+    doubtful = Status("Review", complete=True, why_closed="", doubtful=True)
+    undone = Status("Review", complete=False, why_closed="", doubtful=True)
+
+    assert list_steps([doubtful, undone], 2)[0].state is StepState.DOUBTFUL
+    assert list_steps([doubtful, undone], 2)[1].state is StepState.TO_DO
+    assert list_steps([doubtful], 0)[0].state is StepState.NOW

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.priors import priors_of
+from lightpen.estimation.priors import priors_of, thermal_growth
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.rig import Rig, rig_of
 from lightpen.simulator.swings import paper_camera, paper_pen
@@ -14,7 +14,9 @@ from lightpen.simulator.swings import paper_camera, paper_pen
 CAMERA = paper_camera()
 UNKNOWN = replace(CAMERA, covariance=None)
 PEN = replace(paper_pen(), led_sigma=0.003)
-BARE = replace(PEN, led_sigma=None, scale_sigma=None, diameter_sigma=None)
+BARE = replace(
+    PEN, led_sigma=None, scale_sigma=None, diameter_sigma=None, expansion=None
+)
 
 
 def pair(covariance: FloatArray | None) -> Rig:
@@ -37,7 +39,7 @@ def test_what_files_state_is_taken_as_stated() -> None:
 def test_what_files_leave_out_is_assumed_and_not_zero() -> None:
     priors = priors_of(rig_of(UNKNOWN), BARE, USUAL)
 
-    assumed = (*priors.cameras, priors.scale, priors.diameter)
+    assumed = (*priors.cameras, priors.scale, priors.temperature, priors.diameter)
     assert all(prior.assumed for prior in assumed)
     assert all((np.diag(prior.covariance)[:8] > 0).all() for prior in assumed)
     assert priors.led_sigma is None
@@ -78,6 +80,40 @@ def test_where_cameras_stand_is_taken_as_stated_or_assumed() -> None:
     np.testing.assert_allclose(
         np.sqrt(np.diag(assumed.covariance)), [0.01] * 3 + [5.0] * 3
     )
+
+
+def test_a_warm_pen_is_larger_by_its_expansion() -> None:
+    warm = Assumptions(temperature_c=26.0, temperature=0.5)
+    pen = replace(PEN, expansion=2e-5, expansion_sigma=1e-6, temperature_c=21.0)
+    prior = priors_of(rig_of(CAMERA), pen, warm).temperature
+
+    assert thermal_growth(pen, warm) == pytest.approx(5 * 2e-5)
+    # Half a kelvin of 20 ppm, and five of 1 ppm.
+    assert prior.covariance[0, 0] == pytest.approx(1e-5**2 + 5e-6**2)
+    assert not prior.assumed
+
+
+def test_a_pen_is_measured_at_20_degrees_unless_its_file_says_otherwise() -> None:
+    pen = replace(PEN, expansion=2e-5, temperature_c=None)
+    assert thermal_growth(pen, Assumptions(temperature_c=23.0)) == pytest.approx(6e-5)
+
+
+def test_an_unknown_temperature_corrects_nothing_and_is_assumed() -> None:
+    pen = replace(PEN, expansion=2e-5)
+    prior = priors_of(rig_of(CAMERA), pen, USUAL).temperature
+
+    assert thermal_growth(pen, USUAL) == 0.0
+    assert np.sqrt(prior.covariance[0, 0]) == pytest.approx(2e-5 * USUAL.warmth)
+    assert prior.assumed
+
+
+def test_an_unknown_expansion_corrects_nothing_and_counts_all_warmth() -> None:
+    warm = Assumptions(temperature_c=30.0)
+    prior = priors_of(rig_of(CAMERA), BARE, warm).temperature
+
+    assert thermal_growth(BARE, warm) == 0.0
+    assert np.sqrt(prior.covariance[0, 0]) > 10 * USUAL.expansion
+    assert prior.assumed
 
 
 @pytest.mark.parametrize("value", [-0.001, float("nan"), float("inf")])

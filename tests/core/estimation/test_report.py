@@ -37,6 +37,7 @@ CAMERA = paper_camera()
 PEN = paper_pen()
 FILE = InputFile(Path("folder/file.csv"), 64 * "0")
 INPUTS = Inputs(FILE, FILE, (FILE,), PEN.nominal_tip)
+OF_THE_STATION = ["led centres", "ball and cone", "temperature"]  # no file states them
 LIMITS = SwingLimits(max_uncertainty=0.0987, min_images=41)
 
 
@@ -153,7 +154,8 @@ def test_the_record_holds_each_share_of_the_uncertainty() -> None:
     np.testing.assert_allclose(
         2 * np.sqrt(squares), record()["expanded_uncertainty_mm"]
     )
-    assert not any(share["assumed"] for share in found["shares"])
+    assumed = [share["name"] for share in found["shares"] if share["assumed"]]
+    assert assumed == OF_THE_STATION
     assert np.shape(found["independent_noise_mm"]) == (3,)
     for share in found["shares"]:
         by_name = found[f"{share['name'].replace(' ', '_')}_mm"]
@@ -181,9 +183,10 @@ def test_what_is_assumed_is_marked_in_record_and_text() -> None:
     text = calibration_text(result, "joint", None, judge(result, LIMITS))
 
     shares = json.loads(written)["uncertainty"]["shares"]
-    assert [share["name"] for share in shares if share["assumed"]] == ["camera"]
+    assumed = [share["name"] for share in shares if share["assumed"]]
+    assert assumed == [*OF_THE_STATION, "camera"]
     assert "U from camera, assumed" in text
-    assert text.count(", assumed") == 1
+    assert text.count(", assumed") == len(OF_THE_STATION) + 1  # and the camera
 
 
 def test_a_contradicted_file_is_in_record_warnings_and_text() -> None:

@@ -57,14 +57,15 @@ def test_what_no_image_sees_is_no_evidence() -> None:
     S, right = np.zeros((4, 4)), np.zeros(4)
     S[0, 0], right[0] = 1e4, 0.0
 
-    assert find_component(S, right) == (0.0, 0.0)
+    nothing = find_component(S, right)
+    assert (nothing.sigma, nothing.gain) == (0.0, 0.0)
 
 
 def test_a_jitter_is_found_with_its_directions() -> None:
     root = np.array([[0.01, 0.0, 0.0], [0.0, 0.002, 0.0], [0.006, 0.0, 0.008]])
     found = np.zeros((3, 3))
     for seed in range(N_RUNS):
-        jitter = find_jitter(*shaken(60, root, seed))
+        jitter = find_jitter(*shaken(60, root, seed)).covariance
         assert jitter is not None
         found += jitter / N_RUNS
 
@@ -81,4 +82,19 @@ def test_a_still_seat_has_no_jitter() -> None:
     still = np.zeros((3, 3))
     found = [find_jitter(*shaken(60, still, seed)) for seed in range(N_RUNS)]
 
-    assert sum(jitter is not None for jitter in found) <= 1
+    assert sum(jitter.covariance is not None for jitter in found) <= 1
+
+
+def test_a_jitter_that_is_not_certain_is_expected_all_the_same() -> None:
+    root = 0.001 * np.eye(3)  # images see each vector to 0.002
+    found = [find_jitter(*shaken(8, root, seed)) for seed in range(N_RUNS)]
+
+    assert sum(jitter.covariance is None for jitter in found) > N_RUNS / 2
+    expected = np.sqrt(np.mean([jitter.expected**2 for jitter in found]))
+    assert 0.5 * 0.001 < expected < 2 * 0.001
+
+
+def test_what_is_expected_of_errors_is_what_they_are() -> None:
+    found = [find_component(*observed(24, 0.02, seed)) for seed in range(N_RUNS)]
+    expected = np.sqrt(np.mean([component.expected**2 for component in found]))
+    assert expected == pytest.approx(0.02, rel=0.1)

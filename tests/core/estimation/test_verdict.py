@@ -20,6 +20,8 @@ from lightpen.estimation.verdict import (
     distance_from_nominal,
     halves_agree,
     judge,
+    judge_change,
+    judge_unknown,
 )
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import (
@@ -310,21 +312,55 @@ def test_a_change_is_uncertain_by_both_calibrations() -> None:
     assert found.distance == pytest.approx(0.05)
 
 
+PASSED = Verdict(Grade.PASS, tip_is_good(0.004))
+
+
 @pytest.mark.parametrize(
-    ("difference", "unusual"),
+    ("difference", "grade"),
     [
-        ([0.0, 0.0, 0.0], False),
-        ([0.019, 0.0, 0.0], False),  # beyond U, but no more than is usual
-        ([0.0, -0.021, 0.0], True),
-        ([0.3, 0.2, 0.1], True),
+        ([0.0, 0.0, 0.0], Grade.PASS),
+        ([0.0059, 0.0, -0.0059], Grade.PASS),
+        ([0.0, -0.0061, 0.0], Grade.CHECK),
+        ([0.3, 0.2, 0.1], Grade.CHECK),
     ],
 )
-def test_a_change_beyond_the_usual_is_unusual(
-    difference: list[float], unusual: bool
+def test_a_change_that_uncertainty_does_not_explain_is_to_be_checked(
+    difference: list[float], grade: Grade
 ) -> None:
-    assert change(difference).is_unusual is unusual
+    assert judge_change(PASSED, change(difference), "2026-01-02").grade is grade
 
 
-def test_a_large_change_that_uncertainty_explains_is_not_unusual() -> None:
+def test_a_change_of_3_8_um_at_a_u_of_0_5_um_is_told() -> None:
+    u = np.full(3, 0.0005)
+    found = change_since(np.array([0.0, 0.0038, 0.0005]), u, np.zeros(3), u)
+    verdict = judge_change(PASSED, found, "2026-01-02")
+
+    assert verdict.grade is Grade.CHECK
+    assert str(verdict.reason) == (
+        "The tip lies 0.0038 mm from that of 2026-01-02: along y 0.0038 mm, where U "
+        "(k = 2) of both explains 0.0007 mm. Was it exchanged, bent, or mounted anew?"
+    )
+    assert verdict.next_step is NextStep.CHECK_TIP
+
+
+def test_a_large_change_that_uncertainty_explains_passes() -> None:
     tip, wide = np.zeros(3), np.full(3, 0.5)
-    assert not change_since(tip + 0.3, wide, tip, wide).is_unusual
+    found = change_since(tip + 0.3, wide, tip, wide)
+    assert judge_change(PASSED, found, "") is PASSED
+    assert judge_change(PASSED, None, "") is PASSED
+
+
+def test_what_is_wrong_with_a_tip_by_itself_counts_more_than_its_change() -> None:
+    repeat = Verdict(Grade.REPEAT, tip_is_good(0.4))
+    assert judge_change(repeat, change([0.3, 0.2, 0.1]), "") is repeat
+    assert judge_unknown(repeat, tip_is_good(0.4)) is repeat
+
+
+def test_a_fair_share_of_unchanged_tips_passes() -> None:
+    """Of independent calibrations of one tip some 5 % are asked about."""
+    rng = np.random.default_rng(3)
+    u = np.array([0.002, 0.003, 0.004])
+    tips = rng.normal(0.0, u / 2, (2, 2000, 3))
+    found = [change_since(now, u, then, u) for now, then in zip(*tips, strict=True)]
+    share = np.mean([each.is_unexplained for each in found])
+    assert 0.035 < share < 0.065  # four standard deviations about 4.8 %

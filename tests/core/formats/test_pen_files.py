@@ -315,6 +315,26 @@ def test_only_uncertainties_that_are_known_are_written(
     assert "diameter_sigma" not in text
 
 
+def test_how_a_pen_grows_with_warmth_is_read_from_tables_and_json(
+    tmp_path: Path,
+) -> None:
+    numbers = {"expansion": 2.3e-5, "expansion_sigma": 1e-6, "temperature_c": 20.5}
+    columns = with_columns(",".join(numbers), ",".join(map(str, numbers.values())))
+    for text in (columns, document(**numbers)):
+        pen = read_pen(saved(tmp_path, text))
+        assert (pen.expansion, pen.expansion_sigma) == (2.3e-5, 1e-6)
+        assert pen.temperature_c == 20.5
+
+
+@pytest.mark.parametrize(
+    ("what", "value"), [("expansion", "0.002"), ("temperature_c", "293.15")]
+)
+def test_other_units_of_warmth_are_refused(
+    tmp_path: Path, what: str, value: str
+) -> None:
+    assert f"has the {what} {value}." in refusal(tmp_path, with_columns(what, value))
+
+
 @pytest.mark.parametrize("what", ["led_sigma", "scale_sigma", "diameter_sigma"])
 @pytest.mark.parametrize("value", ["0", "-0.001", "11"])
 def test_what_is_no_standard_uncertainty_is_refused(
@@ -409,10 +429,14 @@ def test_a_pen_is_written_as_csv_or_json_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "pen",
-    [Pen(LEDS, FACING, name="LP04"), Pen(LEDS, FACING, nominal_tip=np.zeros(3))],
+    [
+        Pen(LEDS, FACING, name="LP04"),
+        Pen(LEDS, FACING, nominal_tip=np.zeros(3)),
+        Pen(LEDS, FACING, led_covariance=np.eye(3 * len(LEDS))),
+    ],
 )
 def test_what_a_table_has_no_place_for_is_not_dropped(tmp_path: Path, pen: Pen) -> None:
-    with pytest.raises(UsageError, match=r"no place for the name and the nominal tip"):
+    with pytest.raises(UsageError, match=r"no place for the name, the nominal tip"):
         write_pen(pen, tmp_path / "pen.csv")
 
 
@@ -435,6 +459,9 @@ def pens(draw: st.DrawFn) -> Pen:
         led_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
         scale_sigma=draw(st.none() | st.floats(1e-9, 0.01)),
         diameter_sigma=draw(st.none() | st.floats(1e-6, 10.0)),
+        expansion=draw(st.none() | st.floats(-9e-6, 1e-4)),
+        expansion_sigma=draw(st.none() | st.floats(1e-9, 1e-4)),
+        temperature_c=draw(st.none() | st.floats(-49.0, 100.0)),
     )
 
 
@@ -512,3 +539,14 @@ def test_what_is_no_number_cannot_be_read_to_be_mended_either(tmp_path: Path) ->
 
     with pytest.raises(FileError, match=r"Line 3 of leds\.csv"):
         read_unchecked_pen(path)
+
+
+def test_a_covariance_that_is_none_is_refused(tmp_path: Path) -> None:
+    lopsided = np.eye(3 * len(LEDS))
+    lopsided[0, 1] = 0.5
+    negative = np.eye(3 * len(LEDS))
+    negative[2, 2] = -1.0
+    for matrix in (lopsided, negative):
+        write_pen(Pen(LEDS, FACING, led_covariance=matrix), tmp_path / "pen.json")
+        with pytest.raises(FileError, match=r"led_covariance of pen.json is none"):
+            read_pen(tmp_path / "pen.json")

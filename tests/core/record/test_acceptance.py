@@ -11,20 +11,28 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
 import pytest
 
-from lightpen.errors import FileError
-from lightpen.estimation.verdict import Grade
+from lightpen.arrays import FloatArray
+from lightpen.errors import AcceptanceError, FileError
+from lightpen.estimation.verdict import Grade, judge
+from lightpen.messages import Code
+from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.record.acceptance import accept, conclude_accepted
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.reading import open_record, recorded_names
-from lightpen.record.results import Result
+from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, load_image, solve_again, solve_record
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter, note_taken_out
+from lightpen.simulator.swings import swing_poses
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 LATER = NOON + timedelta(hours=1)
+LIMITS = SwingLimits(max_uncertainty=1.0, min_images=20)
+REASON = "The tip was exchanged."
 
 # Solves the swing in a data folder, then for each line accepts it in another one, which
 # has the same swing, in a process of its own: that is killed before a line of the steps
@@ -37,11 +45,12 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.record.acceptance import accept
 from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.reading import open_record
+from lightpen.record.reading import open_record, recorded_names
 from lightpen.record.solving import solve_record
 
 STEPS = {
-    *("accept", "store", "create_whole", "part_of", "_name_anew", "sync_folder"),
+    *("accept", "take_back", "store", "_add", "create_whole", "part_of", "_name_anew"),
+    *("sync_folder",),
     *("_conclude", "_own_journal", "_write_line", "close"),
 }
 
@@ -65,9 +74,15 @@ def limit(n_bytes):
 def run(order, number, data):
     folder = Path(data, "records", "swing")
     swing = replace(solution, source=replace(solution.source, folder=folder))
-    {"die": die_before, "limit": limit}[order](int(number))
+    takes_back = order == "die taking back"
+    {"limit": limit}.get(order, die_before)(int(number))
     try:
-        accept(FolderArchive(Path(data)), swing, datetime(2026, 1, 2, 13, tzinfo=UTC))
+        archive, now = FolderArchive(Path(data)), datetime(2026, 1, 2, 13, tzinfo=UTC)
+        if takes_back:
+            names = recorded_names(open_record(folder))
+            archive.take_back(archive.in_force(names.pen, names.tip), "Ann", now)
+        else:
+            accept(archive, swing, now, "The tip was exchanged.")
     except FileError:
         os._exit(1)
     os._exit(0)
@@ -77,7 +92,7 @@ print("solved", flush=True)
 for line in sys.stdin:
     child = os.fork()
     if child == 0:
-        run(*line.rstrip("\\n").split(" ", 2))
+        run(*line.rstrip("\\n").split("|"))
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
@@ -93,7 +108,7 @@ def swing(
     """A data folder with a swing whose tip can be accepted; copy it to change it."""
     data = tmp_path_factory.mktemp("accepting") / "data"
     folder = Path(shutil.copytree(swung(), data / RECORDS / "swing"))
-    rewrite_header(folder, {"max_uncertainty_mm": 1.0})
+    rewrite_header(folder, {"max_uncertainty_mm": 1.0, "origin": Origin.LIVE})
     return data
 
 
@@ -139,8 +154,11 @@ class Case:
             )
         )
 
-    def accept(self) -> Result:
-        return accept(self.archive, self.solution, LATER)
+    def accept(self, reason: str = REASON) -> Result:
+        return accept(self.archive, self.solution, LATER, reason)
+
+    def take_back(self) -> None:
+        self.archive.take_back(self.in_force(), "Ben", LATER)
 
     def in_force(self) -> Result:
         found = self.archive.in_force(self.names.pen, self.names.tip)
@@ -181,7 +199,7 @@ def elsewhere(swing: Path) -> Iterator[Callable[[str, int, Path], int]]:
         assert told.readline() == "solved\n"
 
         def run(order: str, number: int, data: Path) -> int:
-            orders.write(f"{order} {number} {data}\n")
+            orders.write(f"{order}|{number}|{data}\n")
             orders.flush()
             return int(told.readline())
 
@@ -220,19 +238,168 @@ def test_the_result_holds_what_the_command_line_writes_of_the_record(
 
     assert stored.pop("created")
     assert written.pop("created")
+    assert written.pop("checksum")  # a result has its own
     assert stored == written
     assert {"covariance", "cone_cam_mm", "uncertainty", "frames", "verdict"} < {*stored}
     assert len(stored["inputs"]["observations"]) == 20
 
 
-def test_a_tip_that_must_be_repeated_is_a_mistake_to_accept(
+def test_a_tip_that_must_be_repeated_is_refused_whatever_the_reason(
     case: Case, rewrite_header: Callable[..., None]
 ) -> None:
     rewrite_header(case.folder, {"max_uncertainty_mm": 1e-9})
 
-    with pytest.raises(ValueError, match="must not be repeat"):
+    with pytest.raises(AcceptanceError, match="The tip cannot be accepted"):
         case.accept()
     assert case.n_results() == 1
+    assert case.verdict() is None
+
+
+@pytest.mark.parametrize("reason", ["", "  "])
+def test_a_tip_that_is_to_be_checked_needs_a_reason(case: Case, reason: str) -> None:
+    with pytest.raises(AcceptanceError, match="Accept it with a reason"):
+        case.accept(reason)
+    assert case.n_results() == 1
+    assert case.verdict() is None
+
+
+def test_a_tip_that_passes_needs_no_reason(case: Case) -> None:
+    passing = _passing(case)
+
+    assert accept(case.archive, passing, LATER).grade == Grade.PASS
+    assert case.in_force().reason == ""
+    assert case.in_force().why == Why.of(judge(passing.calibration, LIMITS).reason)
+
+
+def test_a_tip_that_passes_by_itself_is_to_be_checked_where_it_has_moved(
+    case: Case,
+) -> None:
+    passing = _passing(case)
+    tip = passing.calibration.joint.tip_pen
+    u = passing.calibration.budget.expanded_uncertainty[:3]
+    _put_in_force(case, tip - 1.5 * np.hypot(u, u), u)
+
+    with pytest.raises(AcceptanceError, match="Was it exchanged, bent, or mounted"):
+        accept(case.archive, passing, LATER)
+
+    result = accept(case.archive, passing, LATER, f" {REASON} ")
+    assert (result.grade, result.reason) == (Grade.CHECK, REASON)
+    stored = case.in_force()
+    assert (stored.grade, stored.reason) == (Grade.CHECK, REASON)
+    assert stored.why is not None
+    assert stored.why.code == Code.TIP_CHANGED
+    assert stored.change is not None
+    assert stored.change.accepted == NOON
+    np.testing.assert_allclose(
+        stored.change.expanded_uncertainty_mm, np.hypot(u, u), rtol=1e-12
+    )
+
+
+def test_what_is_doubtful_besides_is_stored_with_the_result(case: Case) -> None:
+    case.accept()
+    stored = case.in_force()
+
+    assert stored.why is not None
+    assert stored.why.code == Code.TOO_LITTLE_TILT
+    assert Code.TIP_CHANGED in {doubt.code for doubt in stored.doubts}
+    assert stored.why.code not in {doubt.code for doubt in stored.doubts}
+
+
+def test_a_tip_that_cannot_be_compared_is_to_be_checked(case: Case) -> None:
+    passing = _passing(case)
+    newest = max(case.archive.folder.glob("*.json"))
+    newest.write_bytes(newest.read_bytes()[:-100])
+
+    with pytest.raises(AcceptanceError, match="cannot be compared with the one in"):
+        accept(case.archive, passing, LATER)
+
+
+def test_a_simulated_tip_is_never_in_force_for_a_pen(
+    case: Case, rewrite_header: Callable[..., None]
+) -> None:
+    rewrite_header(case.folder, {"origin": Origin.SIMULATED})
+    result = case.accept()
+
+    assert result.origin is Origin.SIMULATED
+    assert case.in_force().accepted == NOON
+    names = case.names
+    practised = case.archive.in_force(names.pen, names.tip, is_simulated=True)
+    assert practised is not None
+    assert (practised.origin, practised.record) == (Origin.SIMULATED, case.folder)
+    assert case.offered() == []
+
+
+def test_what_is_taken_back_is_kept_and_the_tip_before_in_force_again(
+    case: Case,
+) -> None:
+    before = [path.read_bytes() for path in case.archive.folder.glob("*.json")]
+    case.accept()
+    case.take_back()
+
+    assert case.in_force().accepted == NOON
+    assert case.n_results() == 3
+    kept = [path.read_bytes() for path in case.archive.folder.glob("*.json")]
+    assert set(before) < set(kept)
+    newest = json.loads(max(case.archive.folder.glob("*.json")).read_bytes())
+    assert (newest["takes_back"], newest["operator"]) == ("000002", "Ben")
+
+
+def test_what_was_taken_back_can_be_accepted_again_and_taken_back_again(
+    case: Case,
+) -> None:
+    for _ in range(2):
+        case.accept()
+        assert case.in_force().record == case.folder
+        case.take_back()
+        assert case.in_force().accepted == NOON
+    case.take_back()
+
+    assert case.archive.in_force(case.names.pen, case.names.tip) is None
+    assert case.n_results() == 6
+
+
+def test_only_what_is_in_force_can_be_taken_back(case: Case) -> None:
+    first = case.in_force()
+    case.accept()
+
+    with pytest.raises(FileError, match="is not the one in force any more"):
+        case.archive.take_back(first, "Ben", LATER)
+    assert case.in_force().record == case.folder
+
+
+def test_the_tips_of_a_pen_are_known_by_their_results(case: Case) -> None:
+    other = replace(case.names, tip="T-20")
+    case.archive.store(replace(case.in_force(), names=other))
+    case.archive.store(
+        replace(case.in_force(), names=replace(other, tip="T-30", pen="LP-05"))
+    )
+
+    assert case.archive.tips(case.names.pen) == ("T-20", case.names.tip)
+    assert case.archive.tips(case.names.pen, is_simulated=True) == ()
+
+
+def _passing(case: Case) -> Solution:
+    """Put the swing's own tip in force, and let the pen have leant to all sides."""
+    calibration = case.solution.calibration
+    u = calibration.budget.expanded_uncertainty[:3]
+    _put_in_force(case, calibration.joint.tip_pen, u)
+    rotations = swing_poses(150, np.random.default_rng(0)).rotations
+    joint = replace(calibration.joint, rotations=rotations)
+    return replace(case.solution, calibration=replace(calibration, joint=joint))
+
+
+def _put_in_force(case: Case, tip: FloatArray, u: FloatArray) -> None:
+    """Put a tip in force in place of the first one."""
+    shutil.rmtree(case.archive.folder)
+    names = replace(case.names)
+    calibration = {
+        "tip_pen_mm": tip.tolist(),
+        "expanded_uncertainty_mm": u.tolist(),
+        "cone_cam_mm": [1.0, 2.0, 3.0],
+        "covariance": [[0.25] * 6] * 6,
+    }
+    earlier = case.records / "earlier"
+    case.archive.store(Result(names, NOON, "pass", earlier, (1, 2), calibration))
 
 
 def test_a_swing_accepted_twice_has_one_result(case: Case) -> None:
@@ -321,6 +488,34 @@ def test_killed_before_any_line_it_leaves_the_old_tip_or_the_new_and_no_doubt(
     assert status == 0
     assert number > 50
     assert met == {(False, False), (True, False), (True, True)}
+
+
+@forks
+def test_killed_while_it_is_taken_back_the_tip_is_in_force_or_the_one_before(
+    swing: Path, solved: Solution, elsewhere: Elsewhere, tmp_path: Path
+) -> None:
+    case = Case(swing, solved, tmp_path / "accepted")
+    case.accept()
+    met = set[bool]()
+    status, number = -signal.SIGKILL, 0
+    while status == -signal.SIGKILL:
+        number += 1
+        data = tmp_path / str(number)
+        shutil.copytree(case.data / "results", data / "results")
+        shutil.copytree(case.folder, data / RECORDS / "swing")
+        status = elsewhere("die taking back", number, data)
+        found = FolderArchive(data).in_force(case.names.pen, case.names.tip)
+        assert found is not None
+        is_back = found.accepted == NOON
+        met.add(is_back)
+
+        assert is_back or found.accepted == LATER
+        assert len(list((data / "results").glob("*.json"))) == 2 + is_back
+        shutil.rmtree(data)
+
+    assert status == 0
+    assert number > 10
+    assert met == {False, True}
 
 
 @forks

@@ -2,17 +2,22 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from lightpen.estimation.report import json_bytes
+from lightpen.formats.own_json import with_checksum
+from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.results import (
     CALIBRATION,
     OLD,
     Result,
+    Since,
+    Why,
     has_head,
     parse_heading,
     parse_result,
@@ -34,6 +39,11 @@ RESULT = Result(
         "covariance": [[0.25] * 6] * 6,
         "frames": [{"file": "1.png"}, {"file": "2.png"}],
     },
+    origin=Origin.LIVE,
+    reason="The tip was exchanged.",
+    why=Why("verdict.tip-changed", "The tip lies elsewhere."),
+    doubts=(Why("warning.drift", "The cone moved."),),
+    change=Since(NOON - timedelta(days=1), (0.1, 0.2, 0.3), (0.01, 0.01, 0.01)),
 )
 
 
@@ -49,7 +59,7 @@ def test_the_head_tells_whose_it_is_and_needs_no_more_of_the_file() -> None:
     assert has_head(written[:length])
     assert not has_head(written[: length - 1])
     heading = parse_heading(written[:length], FILE)
-    assert (heading.format, heading.pen, heading.tip) == (3, "LP-04", "T-10")
+    assert (heading.format, heading.pen, heading.tip) == (4, "LP-04", "T-10")
     assert heading.record == "records/1"
     assert list(json.loads(written))[-2:] == ["checksum", "calibration"]
 
@@ -77,6 +87,20 @@ def test_what_is_written_is_read_back() -> None:
 
     assert found.record == Path("there")
     assert found.calibration == RESULT.calibration
-    assert (found.names, found.accepted, found.grade, found.images) == (
-        *(RESULT.names, RESULT.accepted, RESULT.grade, RESULT.images),
-    )
+    for each in fields(RESULT):
+        if each.name not in ("record", "calibration"):
+            assert getattr(found, each.name) == getattr(RESULT, each.name), each.name
+
+
+def test_a_result_of_format_3_does_not_say_what_its_images_are_of() -> None:
+    data = result_bytes(RESULT, "records/1")
+    head, calibration, rest = data.partition(CALIBRATION)
+    entries = json.loads(head + b"}")
+    for name in ("checksum", "origin", "reason", "why", "doubts", "change"):
+        del entries[name]
+    old = with_checksum(json_bytes({**entries, "format": 3})).removesuffix(b"}")
+
+    found = parse_result(old + calibration + rest, FILE, Path)
+
+    assert (found.origin, found.reason, found.why) == (None, "", None)
+    assert found.tip_pen.tolist() == RESULT.tip_pen.tolist()

@@ -275,3 +275,19 @@ def test_a_long_pause_costs_no_time() -> None:
 
     assert scene.doing() is Doing.SEATED
     np.testing.assert_array_equal(held.offsets, 0)
+
+
+def test_a_tip_rests_where_it_is_told_to_touch() -> None:
+    place = np.array([40.0, -10.0, 5.0])
+
+    seen = seen_after(lambda operator: operator.touch(place), 4.0)
+
+    np.testing.assert_array_equal(offsets(seen[-10:]), np.tile(place, (10, 1)))
+
+
+def test_a_tip_that_touches_elsewhere_comes_from_above() -> None:
+    place = np.array([40.0, 0.0, 0.0])
+
+    heights = offsets(seen_after(lambda operator: operator.touch(place), 4.0))[:, 1]
+
+    assert heights.min() < -30  # v points down

@@ -9,6 +9,7 @@ import pytest
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.reading import Record, open_record, recorded_names
 from lightpen.record.writing import RecordWriter
@@ -206,3 +207,52 @@ def test_what_a_program_adds_is_kept_beside_the_choices(whole: Preparation) -> N
     assert header.settings["exposure_us"] == 3000.0
     assert header.settings["pen"] == "LP-04"
     assert header.created.tzinfo is not None
+
+
+# What images are of, and what belongs to a tip
+
+
+def test_nothing_is_real_that_needs_a_simulated_file(prepared: Preparation) -> None:
+    assert prepared.origin is Origin.SIMULATED
+    recorded = SourceChoice(SourceKind.RECORDED, "swing")
+    assert replace(prepared, source=recorded).origin is Origin.SIMULATED
+
+    bare = replace(prepared, source=recorded, camera_file=None, pen_file=None)
+    assert bare.origin is Origin.RECORDED
+
+
+def test_another_source_has_neither_the_simulated_files_nor_the_stray_light(
+    prepared: Preparation,
+) -> None:
+    masked = replace(prepared, mask=np.ones((1, 3)))
+    recorded = SourceChoice(SourceKind.RECORDED, "swing")
+    chosen = masked.with_source(recorded)
+
+    assert (chosen.camera_file, chosen.pen_file) == (None, None)
+    assert len(chosen.mask) == 0
+    assert masked.with_source(masked.source) is masked
+
+
+def test_files_of_a_real_pen_stay_with_other_recordings_and_go_with_the_simulated(
+    prepared: Preparation,
+) -> None:
+    assert prepared.camera_file is not None
+    camera_file = replace(prepared.camera_file, is_simulated=False)
+    first = SourceChoice(SourceKind.RECORDED, "one")
+    real = replace(prepared, source=first, camera_file=camera_file)
+
+    other = real.with_source(SourceChoice(SourceKind.RECORDED, "other"))
+    assert other.camera_file is camera_file
+    assert real.with_source(SourceChoice()).camera_file is None
+
+
+def test_another_tip_forgets_ball_and_nominal_centre(prepared: Preparation) -> None:
+    before = replace(prepared, nominal_tip=np.ones(3))
+    same = before.renamed(replace(before.names, cone="C-2"))
+    assert (same.names.ball_diameter, same.nominal_tip) == (10.0, before.nominal_tip)
+
+    other = before.renamed(replace(before.names, tip="T-2"))
+    assert (other.names.ball_diameter, other.nominal_tip) == (None, None)
+
+    given = before.renamed(replace(before.names, tip="T-2", ball_diameter=3.0))
+    assert given.names.ball_diameter == 3.0

@@ -331,8 +331,7 @@ def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
     assert before is not None
     assert before.accepted == first.accepted
 
-    in_force.runner.accept()
-    in_force.wait_until(lambda: in_force.status.result is not None)
+    in_force.accept()
     after, second = in_force.in_force(), in_force.status.result
     assert after is not None
     assert second is not None
@@ -344,8 +343,7 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(
     solved: "Station",
 ) -> None:
     assert solved.interrupted() == [solved.record_folder]
-    solved.runner.accept()
-    solved.wait_until(lambda: solved.status.result is not None)
+    solved.accept()
     result = solved.status.result
     assert result is not None
 
@@ -356,8 +354,8 @@ def test_an_accepted_swing_is_concluded_and_no_longer_offered(
 
 
 def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
-    solved.runner.accept()
-    solved.runner.accept()
+    solved.runner.accept("It is seen to.")
+    solved.runner.accept("It is seen to.")
     solved.see()
 
     assert solved.status.result is not None
@@ -366,11 +364,67 @@ def test_a_tip_that_is_accepted_twice_is_stored_once(solved: "Station") -> None:
 
 def test_a_tip_is_not_accepted_while_another_is_computed(solved: "Station") -> None:
     solved.runner.take_out([3])
-    solved.runner.accept()
+    solved.runner.accept("It is seen to.")
     solved.wait_until_solved()
 
     assert solved.status.result is None
     assert solved.in_force() is None
+
+
+def test_without_a_reason_a_tip_that_is_to_be_checked_is_not_accepted(
+    solved: "Station",
+) -> None:
+    solved.runner.accept()
+    solved.wait_until(lambda: len(solved.witness.troubles) == 1)
+
+    assert solved.status.result is None
+    assert solved.status.activity is Activity.NONE
+    assert "Accept it with a reason" in solved.witness.troubles[0]
+    assert open_record(solved.record_folder).verdict is None
+
+
+def test_what_was_accepted_can_be_taken_back_and_accepted_again(
+    solved: "Station",
+) -> None:
+    solved.accept("First.")
+    first = solved.status.result
+    assert first is not None
+    solved.runner.take_back(first, "Ben")
+    solved.wait_until(lambda: solved.status.taken_back is first)
+
+    assert solved.status.result is None
+    assert solved.in_force() is None
+    solved.accept("Again.")
+    again = solved.in_force()
+    assert again is not None
+    assert again.reason == "Again."
+    assert again.accepted > first.accepted
+
+
+def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
+    in_force: "Station", swung: Callable[..., Path], rewrite_header: Callable[..., None]
+) -> None:
+    first = in_force.status.result
+    assert first is not None
+    other = in_force.records / "other"
+    shutil.copytree(swung(), other)
+    rewrite_header(other, {"max_uncertainty_mm": 1.0})
+    in_force.go_on(other)
+    in_force.runner.take_back(first, "Ben")
+    in_force.wait_until(lambda: in_force.status.taken_back is first)
+
+    assert in_force.status.is_capturing
+    assert in_force.in_force() is None
+
+
+def test_a_result_that_is_not_in_force_is_not_taken_back(in_force: "Station") -> None:
+    first = in_force.status.result
+    assert first is not None
+    for _ in range(2):
+        in_force.runner.take_back(first, "Ben")
+    in_force.wait_until(lambda: len(in_force.witness.troubles) == 1)
+
+    assert "is not the one in force any more" in in_force.witness.troubles[0]
 
 
 def test_a_tip_that_is_to_be_repeated_is_not_accepted(
@@ -383,7 +437,7 @@ def test_a_tip_that_is_to_be_repeated_is_not_accepted(
     assert station.status.verdict.grade is Grade.REPEAT
     assert station.witness.happenings[-1] is Happening.FAILED
 
-    station.runner.accept()
+    station.runner.accept("It is seen to.")
     station.see()
     assert station.status.result is None
     assert station.in_force() is None
@@ -395,7 +449,8 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
     journal = (in_force.record_folder / JOURNAL).read_bytes()
     runner = in_force.runner
     runner.take_out([1])
-    for act in (runner.solve, runner.capture_more, runner.set_aside, runner.accept):
+    runner.accept("It is seen to.")
+    for act in (runner.solve, runner.capture_more, runner.set_aside):
         act()
     in_force.see()
 
@@ -407,16 +462,16 @@ def test_the_swing_of_a_tip_in_force_stays_as_it_is(in_force: "Station") -> None
 
 
 def test_a_result_that_cannot_be_stored_is_not_in_force(solved: "Station") -> None:
+    solved.results.parent.mkdir()
     solved.results.write_text("not a folder")
-    solved.runner.accept()
+    solved.runner.accept("It is seen to.")
     solved.wait_until(lambda: len(solved.witness.troubles) == 1)
     assert solved.status.result is None
     assert solved.status.activity is Activity.NONE
     assert open_record(solved.record_folder).verdict is None
 
     solved.results.unlink()
-    solved.runner.accept()
-    solved.wait_until(lambda: solved.status.result is not None)
+    solved.accept()
     solved.see()
     assert solved.witness.reliefs == solved.witness.troubles
 
@@ -432,7 +487,7 @@ def test_a_result_bears_the_time_that_the_runner_goes_by(
     runner.go_on(read_resumable(interrupted))
     runner.finish()
     station.witness.wait_until(lambda: runner.status.verdict is not None)
-    runner.accept()
+    runner.accept("It is seen to.")
     runner.shut_down()
     assert runner.await_end(TIMEOUT)
     result = station.in_force()

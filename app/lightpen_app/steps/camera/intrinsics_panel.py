@@ -15,6 +15,7 @@ from lightpen.formats.opened_files import CameraFile
 from lightpen.model.camera import Camera
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
@@ -69,6 +70,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
 
         # Connections
         self._path.value_changed.connect(self._on_path_changed)
+        FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
 
         self._retranslate()
@@ -155,7 +157,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             return Remark(words.format(made_for), Sign.CHECK, Tone.GOOD)
         words = self.tr(
             "The camera sends {0}, the calibration file was made for {1}. Choose the "
-            "file for this camera or switch off binning."
+            "file for this camera, set the region to the whole sensor, or switch off "
+            "binning."
         )
         sent = self._size_text(*self._image_size)
         return Remark(words.format(sent, made_for), Sign.WARNING, Tone.BAD)

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from lightpen.formats.pen_files import UNITS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -79,6 +80,7 @@ class LedFilePanel(Translated, QWidget):
 
         # Connections
         self._path.value_changed.connect(self._on_path_changed)
+        FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
         self._save.clicked.connect(self._on_save_clicked)
         self._samples.clicked.connect(self.samples_requested)

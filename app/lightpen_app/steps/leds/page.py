@@ -195,7 +195,7 @@ class LedsPage(Rearranged, Page):
             self._open_in_use()
             if changed is not None:
                 self._set_draft(changed)
-        self._file.set_has_samples(preparation.source.kind is SourceKind.SIMULATED)
+        self._file.set_has_samples(preparation.source.kind == SourceKind.SIMULATED)
         self._refresh()
         self._aim()
 

@@ -1,6 +1,6 @@
 """The images of a solved swing: a list, the image itself, and its misfit among all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -112,6 +112,10 @@ class ImagesPanel(Translated, QWidget):
         self._shortcut(Qt.Key.Key_Insert, self._put_back.click)
 
         self._retranslate()
+
+    def cards(self) -> Sequence[PlotCard]:
+        """Return the plot with its menu."""
+        return (self._card,)
 
     def value(self) -> Solution | None:
         """Return the solution whose images are shown."""

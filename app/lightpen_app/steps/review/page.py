@@ -1,35 +1,42 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
-from PySide6.QtCore import QTimer, Slot
+from PySide6.QtCore import Qt, QTimer, QUrl, Slot
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QApplication,
+    QFileDialog,
     QHBoxLayout,
     QProgressBar,
-    QPushButton,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 from typing_extensions import override
 
-from lightpen.estimation.verdict import (
-    NextStep,
-    Verdict,
-)
+from lightpen.errors import FileError
+from lightpen.estimation.verdict import Grade, NextStep
 from lightpen.local_time import local_time
+from lightpen.record.assessment import Assessment
+from lightpen.record.exports import export_json, export_tables, tip_text
+from lightpen.record.next_tips import next_tips
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
+from lightpen.sentences import Sentence
 from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import grade_text, phrase
+from lightpen_app.look.phrases import accepted_phrase, grade_text, phrase
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
+from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.review.doubts import ReviewDoubts
 from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.next_tips_row import NextTipsRow
+from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import (
     MethodsPanel,
     PlotsPanel,
@@ -38,18 +45,23 @@ from lightpen_app.steps.review.plots_panel import (
 )
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
+from lightpen_app.steps.review.result_tools import Export, ResultTools
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State, StateBanner
-from lightpen_app.work.job import Job
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
 TAB_WIDTH = 64 * GRID  # of the result in a tab
+# What the sentence of a verdict has in it whose cause is the intrinsics file.
+OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
 
 
 class ReviewPage(Rearranged, Page):
@@ -61,18 +73,21 @@ class ReviewPage(Rearranged, Page):
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workbench = workbench
-        self._doubts = ReviewDoubts(self)
         self._run = workbench.run
-        self._solution: Solution | None = None
-        self._lookup: Job | None = None
+        self._assessed: Assessment | None = None
         self._told: tuple[object, ...] = ()
         self._result_shown: Result | None = None
-        self._wants_more = self._repeats = False
+        self._wants_more = self._repeats = self._to_next_tip = False
+        self._place = SavePlace(workbench)
+        self._search: Job | None = None
+        self._saving: Job | None = None
+        self._on_yes: Callable[[], object] = self._repeat_swing
 
         # Widgets
         self._banner = StateBanner(TextSize.TITLE)
         self._banner.setMinimumHeight(self._banner.sizeHint().height())
         self._question = QuestionBar()
+        self._reason = ReasonBar()
         self._progress = QProgressBar()
         self._cancel = PushButton()
         self._solving = QWidget()
@@ -86,6 +101,10 @@ class ReviewPage(Rearranged, Page):
         self._scroll = PageScroll()
         self._repeat = PushButton()
         self._capture_more = PushButton()
+        self._accept = PushButton()
+        self._take_back = PushButton()
+        self._tools = ResultTools()
+        self._next_tips = NextTipsRow()
         self._images = ImagesPanel()
         self._panels: tuple[ImagesPanel | PlotsPanel, ...] = (
             self._images,
@@ -111,12 +130,22 @@ class ReviewPage(Rearranged, Page):
         self._patience.timeout.connect(self._solving.show)
         self._acceptance.timeout.connect(self.changed)
         self._capture_more.clicked.connect(self._on_capture_more_clicked)
-        self._repeat.clicked.connect(self._question.ask)
-        self._question.agreed.connect(self._on_repeat_agreed)
-        self._question.declined.connect(self._repeat.setFocus)
+        self._repeat.clicked.connect(self._ask_to_repeat)
+        self._take_back.clicked.connect(self._ask_to_take_back)
+        self._accept.clicked.connect(self._reason.ask)
+        self._reason.given.connect(self._run.runner.accept)
+        self._reason.declined.connect(self._tabs.setFocus)
+        self._question.agreed.connect(self._on_question_agreed)
+        self._question.declined.connect(self._tabs.setFocus)
         self._images.take_out_requested.connect(self._run.runner.take_out)
         self._images.put_back_requested.connect(self._run.runner.put_back)
         self._tabs.currentChanged.connect(self._fill_tab)
+        self._tools.folder_requested.connect(self._open_folder)
+        self._tools.copy_requested.connect(self._copy_tip)
+        self._tools.save_requested.connect(self._ask_folder)
+        self._next_tips.chosen.connect(self._on_next_tip_chosen)
+        for card in self._cards():
+            card.set_place(self._place)
         for panel in self._panels:
             panel.saved.connect(self.status_changed)
             panel.failed.connect(self.notice_raised)
@@ -135,6 +164,8 @@ class ReviewPage(Rearranged, Page):
             return self.tr("Nothing is in force until it is accepted.")
         next_step = self._run.status.verdict.next_step
         text = worded(next_step.sentence)
+        if next_step is NextStep.CAPTURE_MORE and self._is_recording:
+            text = self.tr("Next: record more images, and read them all again.")
         if next_step is NextStep.ACCEPT:
             text = self.tr("{0} The old one stays in force until then.").format(text)
         return text
@@ -144,28 +175,57 @@ class ReviewPage(Rearranged, Page):
         return self._run.status.result is not None
 
     @override
+    def is_doubtful(self) -> bool:
+        result = self._run.status.result
+        return result is not None and result.grade != Grade.PASS
+
+    @override
     def why_closed(self) -> str:
         has_tip = self._run.status.solution is not None
         return "" if has_tip else self.tr("Swing the pen first.")
 
     @override
     def main_action(self) -> MainAction:
-        if self._run.status.result is not None:
+        status = self._run.status
+        if status.result is not None:
             # The second click of a double one must not go on at once.
             is_new = self._acceptance.isActive()
-            why_not = self.tr("The tip is in force.") if is_new else ""
+            why_not = self.tr("The tip is accepted.") if is_new else ""
             return MainAction(self.tr("Start the next calibration"), why_not)
-        return MainAction(self.tr("Accept"), self._why_not_accepted(), at_screen=True)
+        verdict, why_not = status.verdict, self._why_not_now()
+        match None if verdict is None else verdict.next_step:
+            case None | NextStep.ACCEPT:
+                return MainAction(self.tr("Accept"), why_not, at_screen=True)
+            case NextStep.CAPTURE_MORE if not self._is_recording:
+                return MainAction(self.tr("Capture more"), why_not)
+            case NextStep.CHECK_FILES:
+                return MainAction(self.tr("Check the files"), why_not)
+        return MainAction(self.tr("Repeat"), why_not)
 
     @override
     def run_main_action(self) -> None:
-        if self._run.status.result is not None:
+        status = self._run.status
+        if status.result is not None:
             self._run.runner.abandon()
             self.step_requested.emit("start")
             return
-        if self._why_not_accepted():
+        if status.verdict is None or self._why_not_now():
             return
-        self._run.runner.accept()
+        match status.verdict.next_step:
+            case NextStep.ACCEPT:
+                self._run.runner.accept()
+            case NextStep.CAPTURE_MORE if not self._is_recording:
+                self._on_capture_more_clicked()
+            case NextStep.CHECK_FILES:
+                self.step_requested.emit(_step_of_file(status.verdict.reason))
+            case _:
+                self._ask_to_repeat()
+
+    @property
+    def _is_recording(self) -> bool:
+        """Whether no more images can be captured: all were recorded before."""
+        setup = self._run.status.setup
+        return setup is not None and setup.is_recording
 
     @override
     def first_control(self) -> QWidget:
@@ -186,7 +246,9 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
-        self._cancel_lookup()
+        for job in (self._search, self._saving):
+            if job is not None:
+                job.cancel()
         self._images.shut_down()
 
     @override
@@ -208,10 +270,20 @@ class ReviewPage(Rearranged, Page):
         self._cancel.setToolTip(self.tr("Keep the last solution"))
         self._capture_more.setText(self.tr("Capture more"))
         self._repeat.setText(self.tr("Repeat"))
-        self._question.set_words(
-            self.tr("Repeat the swing from the start? These images stay on the disk."),
-            self.tr("Repeat"),
-            self.tr("Go on with these"),
+        self._accept.setText(self.tr("Accept..."))
+        self._take_back.setText(self.tr("Take back..."))
+        self._take_back.setToolTip(
+            self.tr("Put the result before in force again; both are kept.")
+        )
+        self._question.hide()
+        self._reason.set_words(
+            self.tr(
+                "The tip is to be checked. Why is it accepted nevertheless? The reason "
+                "is stored with it."
+            ),
+            self.tr("Reason"),
+            self.tr("Accept with this reason"),
+            self.tr("Do not accept"),
         )
         self._refresh_words()
 
@@ -229,11 +301,15 @@ class ReviewPage(Rearranged, Page):
         buttons.setSpacing(GRID)
         buttons.addWidget(self._repeat, 1)
         buttons.addWidget(self._capture_more, 1)
+        buttons.addWidget(self._accept, 1)
+        buttons.addWidget(self._take_back, 1)
         column = QVBoxLayout(self._result_side)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(GRID)
         column.addWidget(self._scroll, 1)
+        column.addWidget(self._tools)
         column.addLayout(buttons)
+        column.addWidget(self._next_tips)
 
         self._columns = columns = QHBoxLayout()
         columns.setSpacing(2 * GRID)
@@ -244,6 +320,7 @@ class ReviewPage(Rearranged, Page):
         layout.setSpacing(GRID)
         layout.addWidget(self._banner)
         layout.addWidget(self._question)
+        layout.addWidget(self._reason)
         layout.addWidget(self._solving)
         layout.addWidget(self._remarks)
         layout.addLayout(columns, 1)
@@ -262,24 +339,31 @@ class ReviewPage(Rearranged, Page):
             if side.parentWidget() is not None:  # else it would be a window
                 side.show()  # a tab that is not the current one is hidden
 
-    def _why_not_accepted(self) -> str:
-        if self._run.status.solution is None or self._run.status.verdict is None:
+    def _why_not_now(self) -> str:
+        """Return why nothing can be done with the tip at this moment."""
+        status = self._run.status
+        if status.solution is None or status.verdict is None:
             return self.tr("Swing the pen first.")
-        if self._run.status.is_solving or self._lookup is not None:
+        if status.is_solving:
             return self.tr("The tip is being computed.")
-        if self._run.status.is_reading:
+        if status.is_reading:
             return self.tr("The swing goes on.")
-        if self._run.status.activity is Activity.ACCEPTING:
+        if status.activity is Activity.ACCEPTING:
             return self.tr("The result is being stored.")
-        if not self._run.status.verdict.can_be_accepted:
-            return self.tr("Not good enough: capture more images, or repeat the swing.")
         return ""
+
+    def _why_not_accepted(self) -> str:
+        """Return why the tip cannot be accepted with a reason."""
+        verdict, why_not = self._run.status.verdict, self._why_not_now()
+        if why_not or verdict is None or verdict.can_be_accepted:
+            return why_not
+        return self.tr("Not good enough: capture more images, or repeat the swing.")
 
     @Slot()
     def _on_run_changed(self) -> None:
         status = self._run.status
         told = (
-            *(status.solution, status.verdict, status.result),
+            *(status.solution, status.assessment, status.result),
             *(status.activity, status.is_capturing),
         )
         if told == self._told:
@@ -287,6 +371,7 @@ class ReviewPage(Rearranged, Page):
         self._told = told
         if status.result is not self._result_shown:
             self._result_shown = status.result
+            self._search_next_tips(status.result)
             self._acceptance.start(2 * QApplication.doubleClickInterval())
         if status.is_solving:
             self._progress.setValue(0)
@@ -302,6 +387,9 @@ class ReviewPage(Rearranged, Page):
             self._wants_more = False
             if status.is_capturing:
                 self.step_requested.emit("swing")
+        if self._to_next_tip and status.result is None:
+            self._to_next_tip = False
+            self.step_requested.emit("swing")
         if self._repeats and status.solution is None:
             self._repeats = False
             self.step_requested.emit("swing")
@@ -313,53 +401,26 @@ class ReviewPage(Rearranged, Page):
         self._refresh_words()
 
     def _take_solution(self) -> None:
-        solution = self._run.status.solution
-        if solution is not self._solution:
-            self._solution = solution
-            self._question.hide()
-            self._look_up_last(solution)
+        status = self._run.status
+        assessment = status.assessment
+        if assessment is self._assessed:
+            return
+        self._assessed = assessment
+        self._question.hide()
+        self._reason.hide()
+        if status.solution is None or assessment is None:
+            self._result.set_value(None)
+        else:
+            outcome = Outcome(status.solution, status.names, assessment)
+            self._result.set_value(outcome)
 
     def _fill_tab(self) -> None:
         """Show the solution in the tab that is seen; the others wait until they are."""
         for panel, tab in self._tab_of.items():
             is_seen = tab is self._tabs.currentWidget()
-            if is_seen and panel.value() is not self._solution:
-                panel.set_value(self._solution)
-
-    def _look_up_last(self, solution: Solution | None) -> None:
-        """Show a solution as soon as the result before it is known."""
-        self._cancel_lookup()
-        shown = self._result.value()
-        if solution is None:
-            self._result.set_value(None)
-            return
-        if shown is not None and shown.solution.source.folder == solution.source.folder:
-            self._result.set_value(replace(shown, solution=solution))
-            return
-        archive, names = self._run.archive, self._run.status.names
-        self._lookup = job = Job(lambda _: archive.in_force(names.pen, names.tip), self)
-
-        # Connections
-        job.succeeded.connect(self._on_looked_up)
-        job.failed.connect(self._on_lookup_failed)
-        job.crashed.connect(self._on_looked_up)
-        job.start()
-
-    def _on_looked_up(self, last: Result | None = None) -> None:
-        assert self._solution is not None
-        self._lookup = None
-        self._result.set_value(Outcome(self._solution, self._run.status.names, last))
-        self._refresh_words()
-        self.changed.emit()
-
-    def _on_lookup_failed(self, sentence: str) -> None:
-        self.notice_raised.emit(sentence)
-        self._on_looked_up()
-
-    def _cancel_lookup(self) -> None:
-        if self._lookup is not None:
-            self._lookup.cancel()
-            self._lookup = None
+            solution = self._run.status.solution
+            if is_seen and panel.value() is not solution:
+                panel.set_value(solution)
 
     def _refresh_words(self) -> None:
         status = self._run.status
@@ -372,27 +433,32 @@ class ReviewPage(Rearranged, Page):
             why_locked = self.tr("Swing the pen first.")
         goes_on = self.tr("The swing goes on.") if status.is_reading else ""
         self._images.set_locked(why_locked or goes_on)
-        for button, step, what in (
-            (
-                self._capture_more,
-                NextStep.CAPTURE_MORE,
-                self.tr("Add images to this swing"),
-            ),
-            (
-                self._repeat,
-                NextStep.REPEAT,
-                self.tr("Swing anew without these images"),
-            ),
-        ):
-            button.set_why_not(why_locked, what)
-            _recommend(button, not why_locked and _is_next(status.verdict, step))
+        all_read = ""
+        if self._is_recording:
+            all_read = self.tr("All recorded images are read.")
+        self._capture_more.set_why_not(
+            why_locked or all_read, self.tr("Add images to this swing")
+        )
+        self._repeat.set_why_not(why_locked, self.tr("Swing anew without these images"))
+        is_doubted = status.verdict is not None and (
+            status.verdict.grade is not Grade.PASS
+        )
+        self._accept.setVisible(is_doubted and status.result is None)
+        self._accept.set_why_not(
+            self._why_not_accepted(), self.tr("Put it in force with a reason")
+        )
+        self._tools.set_why_not(
+            self.tr("Swing the pen first.") if status.solution is None else ""
+        )
+        is_accepted, main = status.result is not None, self.main_action().text
+        for button in (self._repeat, self._capture_more):
+            button.setVisible(not is_accepted and button.text() != main)
+        self._take_back.setVisible(is_accepted)
 
     def _state(self) -> State:
         status = self._run.status
         if status.result is not None:
-            since = f"{local_time(status.result.accepted):%Y-%m-%d %H:%M:%S}"
-            text = self.tr("Since {0}. Earlier results are kept.").format(since)
-            return State(self.tr("IN FORCE"), text, Sign.CHECK, Tone.GOOD)
+            return self._accepted_state(status.result)
         if status.verdict is None:
             text = self.tr("The tip shows here once the pen is swung.")
             return State(self.tr("NO TIP YET"), text, Sign.WAIT, Tone.QUIET)
@@ -402,12 +468,37 @@ class ReviewPage(Rearranged, Page):
         word = self.tr("{0}: {1}").format(grade_text(status.verdict.grade), said.short)
         return State(word, said.hint, sign, tone)
 
+    def _accepted_state(self, result: Result) -> State:
+        since = f"{local_time(result.accepted):%Y-%m-%d %H:%M:%S}"
+        told = accepted_phrase(result.origin)
+        text = self.tr("Since {0}. Earlier results are kept.").format(since)
+        if result.reason:
+            text = self.tr("Since {0}, to be checked; accepted with the reason: {1}")
+            text = text.format(since, result.reason)
+        sign, tone = GRADE_MARKS[Grade(result.grade)]
+        return State(told.short, " ".join(filter(None, (told.hint, text))), sign, tone)
+
     def _warnings(self) -> tuple[Remark, ...]:
-        outcome = self._result.value()
-        if outcome is None:
+        status = self._run.status
+        if status.assessment is None:
             return ()
-        texts = self._doubts.sentences(outcome, self._workbench.preparation.names)
-        return tuple(Remark(text, Sign.WARNING, Tone.WARN) for text in texts)
+        texts = [
+            self._other_names(),
+            *map(worded, status.assessment.doubts),
+        ]
+        return tuple(Remark(text, Sign.WARNING, Tone.WARN) for text in texts if text)
+
+    def _other_names(self) -> str:
+        """Return that the step Start names another pen or tip by now."""
+        swung, named = self._run.status.names, self._workbench.preparation.names
+        if (swung.pen, swung.tip) == (named.pen, named.tip):
+            return ""
+        text = self.tr(
+            "This swing is of tip {0}, pen {1}, whatever the step Start names now: tip "
+            "{2}, pen {3}."
+        )
+        names = (swung.tip, swung.pen, named.tip, named.pen)
+        return text.format(*map(shortened, names))
 
     def _on_progressed(self, fraction: float) -> None:
         self._progress.setValue(round(100 * fraction))
@@ -416,21 +507,133 @@ class ReviewPage(Rearranged, Page):
         self._wants_more = True
         self._run.runner.capture_more()
 
-    def _on_repeat_agreed(self) -> None:
+    def _ask_to_repeat(self) -> None:
+        self._ask(
+            self.tr("Repeat the swing from the start? These images stay on the disk."),
+            self.tr("Repeat"),
+            self.tr("Go on with these"),
+            self._repeat_swing,
+        )
+
+    def _ask_to_take_back(self) -> None:
+        self._ask(
+            self.tr(
+                "Take this acceptance back? The result before is in force again; both "
+                "are kept."
+            ),
+            self.tr("Take back"),
+            self.tr("Leave it in force"),
+            self._withdraw,
+        )
+
+    def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
+        self._on_yes = on_yes
+        self._question.set_words(text, yes, no)
+        self._question.ask()
+
+    def _on_question_agreed(self) -> None:
+        self._on_yes()
+
+    def _repeat_swing(self) -> None:
         self._repeats = True
         self._run.runner.set_aside()
+
+    def _withdraw(self) -> None:
+        result = self._run.status.result
+        if result is not None:
+            operator = self._workbench.preparation.names.operator
+            self._run.runner.take_back(result, operator)
+
+    # What comes next, and what is taken along
+
+    def _search_next_tips(self, result: Result | None) -> None:
+        """Look for the other tips of the pen whose tip was accepted."""
+        if self._search is not None:
+            self._search.cancel()
+        self._next_tips.set_value(())
+        if result is None:
+            return
+        archive = self._run.archive
+        self._search = job = Job(lambda _: next_tips(archive, result), self)
+
+        # Connections
+        job.succeeded.connect(self._next_tips.set_value)
+        job.start()
+
+    def _on_next_tip_chosen(self, last: Result) -> None:
+        workbench = self._workbench
+        self._run.runner.abandon()
+        chosen = workbench.preparation.with_last(last)
+        names = replace(chosen.names, pen=last.names.pen)
+        workbench.set_preparation(replace(chosen, names=names))
+        self._to_next_tip = True
+
+    def _cards(self) -> Iterator[PlotCard]:
+        for panel in self._panels:
+            yield from panel.cards()
+
+    def _open_folder(self) -> None:
+        folder = self._run.status.record_folder
+        if folder is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
+
+    def _copy_tip(self) -> None:
+        solution = self._run.status.solution
+        if solution is not None:
+            QApplication.clipboard().setText(tip_text(solution))
+            self.status_changed.emit(self.tr("The tip is copied: x, y, z in mm."))
+
+    def _ask_folder(self, export: Export) -> None:
+        dialog = QFileDialog(self, self.tr("Folder to save in"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(str(self._place.folder()))
+        dialog.fileSelected.connect(lambda path: self._save(export, Path(path)))
+        dialog.open()
+
+    def _save(self, export: Export, folder: Path) -> None:
+        """Save what is wanted; plots at once, as only the GUI can draw them."""
+        status, stem = self._run.status, self._place.stem()
+        solution, names = status.solution, status.names
+        if solution is None:
+            return
+        self._place.remember(folder)
+        if export in (Export.PLOTS, Export.ALL):
+            try:
+                self._save_plots(solution, folder, stem)
+            except FileError as error:
+                self.notice_raised.emit(worded(error.sentence))
+                return
+
+        def write(_: Report) -> None:
+            if export in (Export.JSON, Export.ALL):
+                export_json(solution, folder, stem)
+            if export in (Export.CSV, Export.ALL):
+                export_tables(solution, names, folder, stem)
+
+        self._saving = job = Job(write, self)
+
+        # Connections
+        job.succeeded.connect(lambda _: self._tell_saved(folder))
+        job.failed.connect(self.notice_raised)
+        job.start()
+
+    def _save_plots(self, solution: Solution, folder: Path, stem: str) -> None:
+        for panel in self._panels:
+            if panel.value() is not solution:
+                panel.set_value(solution)
+            for card in panel.cards():
+                card.save_beside(folder, stem)
+
+    def _tell_saved(self, folder: Path) -> None:
+        self.status_changed.emit(self.tr("Saved in {0}").format(folder))
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
 
 
-def _is_next(verdict: Verdict | None, step: NextStep) -> bool:
-    return verdict is not None and verdict.next_step is step
-
-
-def _recommend(button: QPushButton, recommended: bool) -> None:
-    """Mark a button as the one to press next."""
-    if button.property("recommended") != recommended:
-        button.setProperty("recommended", recommended)
-        button.style().unpolish(button)
-        button.style().polish(button)
+def _step_of_file(reason: Sentence) -> str:
+    """Return the key of the step at which the file is opened that a reason names."""
+    codes = {part.code for part in reason.parts()}
+    return "camera" if codes & OF_CAMERA else "leds"

@@ -16,10 +16,12 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.errors import FileError
+from lightpen.record.exports import save_new
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.plots import Plot
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.save_place import SavePlace
 
 
 class PlotCard(Translated, QFrame):
@@ -50,6 +52,7 @@ class PlotCard(Translated, QFrame):
         super().__init__(parent)
         self._plot = plot
         self._file_stem = file_stem
+        self._place: SavePlace | None = None
         self.setProperty("area", "panel")
 
         # Widgets
@@ -84,6 +87,20 @@ class PlotCard(Translated, QFrame):
         """Return the plot."""
         return self._plot
 
+    def set_place(self, place: SavePlace) -> None:
+        """Offer this place for what is saved."""
+        self._place = place
+
+    def save_beside(self, folder: Path, stem: str) -> None:
+        """Save a picture in a folder, under a name that none has yet.
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+        """
+        save_new(folder, f"{stem}_{self._file_stem}.png", self._plot.png())
+
     def actions_offered(self) -> Sequence[QAction]:
         """Return what the menu offers: enlarge, save as PNG, save as CSV."""
         return self._enlarge, self._save_png, self._save_csv
@@ -110,9 +127,18 @@ class PlotCard(Translated, QFrame):
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setNameFilter(f"{suffix[1:].upper()} (*{suffix})")
         dialog.setDefaultSuffix(suffix[1:])
-        dialog.selectFile(self._file_stem + suffix)
-        dialog.fileSelected.connect(lambda path: self.save(Path(path)))
+        name = self._file_stem + suffix
+        if self._place is not None:
+            name = f"{self._place.stem()}_{name}"
+            dialog.setDirectory(str(self._place.folder()))
+        dialog.selectFile(name)
+        dialog.fileSelected.connect(self._on_place_chosen)
         dialog.open()
+
+    def _on_place_chosen(self, path: str) -> None:
+        if self._place is not None:
+            self._place.remember(Path(path).parent)
+        self.save(Path(path))
 
     def _retranslate(self) -> None:
         self._enlarge.setText(self.tr("Enlarge"))

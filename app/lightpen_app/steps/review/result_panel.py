@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.verdict import Change, change_since, halves_agree
+from lightpen.estimation.verdict import halves_agree
 from lightpen.local_time import local_time
+from lightpen.record.assessment import Assessment
 from lightpen.record.names import Names
-from lightpen.record.results import Result
 from lightpen.record.solving import Solution
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
@@ -30,13 +30,11 @@ class Outcome:
     ----------
     names : Names
         Of what was swung.
-    last : Result or None
-        The last accepted result of this pen and tip.
     """
 
     solution: Solution
     names: Names
-    last: Result | None = None
+    assessment: Assessment
 
     @property
     def tip_pen(self) -> FloatArray:
@@ -47,15 +45,6 @@ class Outcome:
     def uncertainty(self) -> FloatArray:
         """U (k = 2) along x, y and z, (3,), mm."""
         return self.solution.calibration.budget.expanded_uncertainty[:3]
-
-    @property
-    def change(self) -> Change | None:
-        """How far the tip lies from the last accepted one."""
-        if self.last is None:
-            return None
-        return change_since(
-            self.tip_pen, self.uncertainty, self.last.tip_pen, self.last.uncertainty
-        )
 
 
 class ResultPanel(Translated, QFrame):
@@ -136,12 +125,12 @@ class ResultPanel(Translated, QFrame):
 
     def _differences(self, outcome: Outcome) -> Figures:
         rows: list[tuple[str, tuple[str, ...]]] = []
-        change = outcome.change
+        change, last = outcome.assessment.change, outcome.assessment.last
         within = self.tr("its U (k = 2)")
-        if change is None or outcome.last is None:
+        if change is None or last is None:
             rows.append((self.tr("no earlier result"), BLANK))
         else:
-            date = f"{local_time(outcome.last.accepted):%Y-%m-%d}"
+            date = f"{local_time(last.accepted):%Y-%m-%d}"
             since = self.tr("since {0}").format(date)
             u = change.expanded_uncertainty
             rows += [(since, _texts(change.difference, u)), (within, _texts(u, u))]

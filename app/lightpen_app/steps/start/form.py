@@ -119,6 +119,12 @@ class NamesForm(Translated, QWidget):
         """List the stations that are known."""
         self._station.set_known(names)
 
+    def set_ball(self, diameter: float | None) -> None:
+        """Show another diameter of the ball, mm; None where it is not known."""
+        blocked = self.blockSignals(True)
+        self._ball.setValue(diameter or 0.0)
+        self.blockSignals(blocked)
+
     def nominal_tip(self) -> FloatArray | None:
         """Return the nominal centre of the tip (3,), mm; None for the LED file's."""
         return self._nominal_tip.value()

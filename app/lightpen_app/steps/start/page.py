@@ -10,6 +10,7 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
+from lightpen.model.origin import Origin
 from lightpen.record.acceptance import conclude_accepted
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result
@@ -26,8 +27,8 @@ from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
-from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
@@ -54,7 +55,9 @@ class StartPage(Rearranged, Page):
         super().__init__(parent)
         self._workbench = workbench
         self._shown = workbench.preparation
-        self._looked_up = ("", "")
+        self._looked_up = ("", "", False)
+        self._wants_last = False  # of a tip that was just named
+        self._taken_back: Result | None = None
         self._lookup: Job | None = None
         self._search: Job | None = None
         self._work: Job | None = None
@@ -66,6 +69,7 @@ class StartPage(Rearranged, Page):
         self._interrupted = InterruptedPanel()
         self._last = LastResultPanel(workbench.around.now)
         self._sound_test = SoundTest(sounds)
+        self._folder = DataFolderPanel(workbench.folder)
         self._typing = QTimer(self)
         self._typing.setSingleShot(True)
         self._typing.setInterval(TYPING_PAUSE_MS)
@@ -82,6 +86,7 @@ class StartPage(Rearranged, Page):
         right.setSpacing(2 * GRID)
         right.addWidget(self._last)
         right.addWidget(self._sound_test)
+        right.addWidget(self._folder)
         right.addStretch(1)
         content = QWidget()
         self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
@@ -107,6 +112,8 @@ class StartPage(Rearranged, Page):
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
         self._interrupted.search_requested.connect(self._search_interrupted)
+        self._last.take_back_requested.connect(self._on_take_back_requested)
+        workbench.others_counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.troubled.connect(self._on_run_troubled)
@@ -142,7 +149,6 @@ class StartPage(Rearranged, Page):
     @override
     def entered(self) -> None:
         self._names.set_stations(self._workbench.stations())
-        self._tell_subject()
         self._look_up_last()
 
     @override
@@ -176,7 +182,6 @@ class StartPage(Rearranged, Page):
 
     @override
     def _retranslate(self) -> None:
-        self._tell_subject()
         self.changed.emit()
 
     # What is typed
@@ -187,7 +192,6 @@ class StartPage(Rearranged, Page):
 
     def _on_edited(self) -> None:
         self._typing.start()
-        self._tell_subject()
         self.changed.emit()
 
     def _take_names(self) -> None:
@@ -195,8 +199,10 @@ class StartPage(Rearranged, Page):
         self._typing.stop()
         now = self._workbench.preparation
         names = replace(self._names.value(), station=now.names.station)
-        if names != now.names:
-            self._choose(replace(now, names=names))
+        if names == now.names:
+            return
+        self._wants_last = self._wants_last or names.tip != now.names.tip
+        self._choose_tip(now.renamed(names))
 
     def _on_station_changed(self, name: str) -> None:
         """Bring back a known station; a new one takes over the present choices."""
@@ -214,6 +220,12 @@ class StartPage(Rearranged, Page):
 
     def _on_limits_changed(self) -> None:
         self._choose(replace(self._workbench.preparation, limits=self._limits.value()))
+
+    def _choose_tip(self, preparation: Preparation) -> None:
+        """Choose names with what belongs to their tip; they may be being typed in."""
+        self._names.set_ball(preparation.names.ball_diameter)
+        self._names.set_nominal_tip(preparation.nominal_tip)
+        self._choose(preparation)
 
     def _choose(self, preparation: Preparation) -> None:
         self._shown = preparation  # the fields show it already
@@ -234,9 +246,8 @@ class StartPage(Rearranged, Page):
         before, now = self._shown, self._workbench.preparation
         self._shown = now
         self._show_changes(before, now)
-        if (now.names.pen, now.names.tip) != self._looked_up:
+        if _key(now) != self._looked_up:
             self._look_up_last()
-        self._tell_subject()
         self.changed.emit()
 
     def _show_changes(self, before: Preparation | None, now: Preparation) -> None:
@@ -252,30 +263,30 @@ class StartPage(Rearranged, Page):
             pen = None if now.pen_file is None else now.pen_file.pen
             self._names.set_tip_of_file(None if pen is None else pen.nominal_tip)
 
-    def _tell_subject(self) -> None:
-        names = self._names.value()
-        pen = self.tr("Pen {0}").format(shortened(names.pen)) if names.pen else ""
-        cone = self.tr("Cone {0}").format(shortened(names.cone)) if names.cone else ""
-        self.subject_changed.emit(PARTED.join(filter(None, (pen, cone))))
-
     def _look_up_last(self) -> None:
         """Look for the result in force, for the pen and tip that are named."""
         if self._lookup is not None:
             self._lookup.cancel()
-        names = self._workbench.preparation.names
-        self._looked_up = pen, tip = names.pen, names.tip
+        self._looked_up = pen, tip, is_simulated = _key(self._workbench.preparation)
         if not (pen and tip):
             self._last.set_value(LastResult(is_named=False))
             return
         archive = self._workbench.run.archive
         self._lookup = self._started(
-            lambda _: archive.in_force(pen, tip), self._on_looked_up
+            lambda _: archive.in_force(pen, tip, is_simulated=is_simulated),
+            self._on_looked_up,
         )
         self._lookup.failed.connect(self._on_lookup_failed)
         self._lookup.crashed.connect(self._on_lookup_crashed)
 
     def _on_looked_up(self, result: Result | None) -> None:
-        self._last.set_value(LastResult(result))
+        is_simulated = self._looked_up[2]
+        self._last.set_value(LastResult(result, is_simulated=is_simulated))
+        now = self._workbench.preparation
+        wants_last, self._wants_last = self._wants_last, False
+        is_bare = now.names.ball_diameter is None and now.nominal_tip is None
+        if wants_last and is_bare and result is not None:
+            self._choose_tip(now.with_last(result))
 
     def _on_lookup_failed(self, sentence: str) -> None:
         self._last.set_value(LastResult(trouble=sentence))
@@ -327,6 +338,13 @@ class StartPage(Rearranged, Page):
                     "Camera, then resume the swing here."
                 )
             )
+        elif not swing.is_of(self._workbench.preparation.source):
+            self.notice_raised.emit(
+                self.tr(
+                    "The swing was captured with another source of images. Choose that "
+                    "source at the step Camera, then resume the swing here."
+                )
+            )
         elif size is not None and not swing.fits(size):
             camera = swing.setup.camera
             self.notice_raised.emit(
@@ -356,8 +374,15 @@ class StartPage(Rearranged, Page):
         self._resumed = swing.record.folder
         self._workbench.run.runner.go_on(swing)
 
+    def _on_take_back_requested(self, result: Result) -> None:
+        operator = self._workbench.preparation.names.operator
+        self._workbench.run.runner.take_back(result, operator)
+
     def _on_run_changed(self) -> None:
         status = self._workbench.run.status
+        if status.taken_back is not self._taken_back:
+            self._taken_back = status.taken_back
+            self._look_up_last()
         if self._resumed is not None and status.record_folder == self._resumed:
             self._resumed = None
             self.step_requested.emit("swing")
@@ -398,3 +423,9 @@ class StartPage(Rearranged, Page):
         job.succeeded.connect(on_succeeded)
         job.start()
         return job
+
+
+def _key(preparation: Preparation) -> tuple[str, str, bool]:
+    """Return what the result that is shown is looked for by."""
+    names = preparation.names
+    return names.pen, names.tip, preparation.origin is Origin.SIMULATED

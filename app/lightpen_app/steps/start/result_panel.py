@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QGridLayout,
     QGroupBox,
@@ -23,6 +23,9 @@ from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.widgets.origin_mark import origin_remark
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 
@@ -41,11 +44,14 @@ class LastResult:
         Whether pen and tip are named at all.
     trouble : str
         Why it cannot be told; else empty.
+    is_simulated : bool
+        Whether it is asked for a simulated pen.
     """
 
     result: Result | None = None
     is_named: bool = True
     trouble: str = ""
+    is_simulated: bool = False
 
 
 class LastResultPanel(Translated, QGroupBox):
@@ -55,7 +61,14 @@ class LastResultPanel(Translated, QGroupBox):
     ----------
     now : callable
         Returns the date and time that ages are told by.
+
+    Signals
+    -------
+    take_back_requested(Result)
+        The result that is shown shall not be in force any more.
     """
+
+    take_back_requested = Signal(object)
 
     def __init__(
         self, now: Callable[[], datetime], parent: QWidget | None = None
@@ -73,7 +86,11 @@ class LastResultPanel(Translated, QGroupBox):
         self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
         self._tip = [_cell() for _ in AXES]
         self._uncertainty = [_cell(tone=Tone.QUIET) for _ in AXES]
+        self._origin = SignLabel()
+        self._reason = SignLabel()
         self._warning = SignLabel()
+        self._take_back = PushButton()
+        self._question = QuestionBar()
 
         # Layout
         table = QGridLayout(self._table)
@@ -98,7 +115,16 @@ class LastResultPanel(Translated, QGroupBox):
         layout.addLayout(first)
         layout.addWidget(self._when)
         layout.addWidget(self._table)
+        layout.addWidget(self._origin)
+        layout.addWidget(self._reason)
         layout.addWidget(self._warning)
+        layout.addWidget(self._take_back, 0, Qt.AlignmentFlag.AlignLeft)
+        layout.addWidget(self._question)
+
+        # Connections
+        self._take_back.clicked.connect(self._question.ask)
+        self._question.agreed.connect(self._on_agreed)
+        self._question.declined.connect(self._take_back.setFocus)
 
         self._retranslate()
 
@@ -109,6 +135,7 @@ class LastResultPanel(Translated, QGroupBox):
     def set_value(self, value: LastResult) -> None:
         """Show another result, or that there is none."""
         self._value = value
+        self._question.hide()
         self._retranslate()
 
     def words(self) -> tuple[str, ...]:
@@ -121,11 +148,27 @@ class LastResultPanel(Translated, QGroupBox):
                     AXES, self._tip, self._uncertainty, strict=True
                 )
             ]
-        return tuple(filter(None, [*lines, self._warning.value().text]))
+        remarks = (self._origin, self._reason, self._warning)
+        lines += [remark.value().text for remark in remarks]
+        return tuple(filter(None, lines))
 
     def _retranslate(self) -> None:
-        self.setTitle(self.tr("Last calibration of this pen and tip"))
         value = self._value
+        self.setTitle(
+            self.tr("Last practice with this pen and tip")
+            if value.is_simulated
+            else self.tr("Last calibration of this pen and tip")
+        )
+        self._take_back.setText(self.tr("Take back..."))
+        self._take_back.setToolTip(
+            self.tr("Put the result before in force again; both are kept.")
+        )
+        self._question.set_words(
+            self.tr("Take this acceptance back? The result before is in force again."),
+            self.tr("Take back"),
+            self.tr("Leave it in force"),
+        )
+        self._take_back.setVisible(value.result is not None)
         if value.result is not None:
             self._show(value.result)
         elif value.trouble:
@@ -133,7 +176,9 @@ class LastResultPanel(Translated, QGroupBox):
         elif value.is_named:
             self._say(
                 self.tr("None yet"),
-                self.tr("The tip that you accept will be the first in force."),
+                self.tr("What you accept is kept apart from the tips of real pens.")
+                if value.is_simulated
+                else self.tr("The tip that you accept will be the first in force."),
             )
         else:
             self._say(hint=self.tr("It is shown when the pen and its tip are named."))
@@ -146,6 +191,8 @@ class LastResultPanel(Translated, QGroupBox):
         self._when.setText(hint)
         self._when.setVisible(bool(hint))
         self._table.hide()
+        for remark in (self._origin, self._reason):
+            remark.set_value(Remark())
         self._warning.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
 
     def _show(self, result: Result) -> None:
@@ -166,7 +213,19 @@ class LastResultPanel(Translated, QGroupBox):
             tip = number_text(float(result.tip_pen[axis]), decimals)
             self._tip[axis].setText(tip)
             self._uncertainty[axis].setText(number_text(uncertainty, decimals))
+        self._origin.set_value(origin_remark(result.origin))
+        self._reason.set_value(self._reason_of(result))
         self._warning.set_value(self._warning_of(result, now))
+
+    def _reason_of(self, result: Result) -> Remark:
+        """Return why it was accepted though it was to be checked."""
+        if not result.reason:
+            return Remark()
+        text = self.tr("Accepted with the reason: {0}").format(result.reason)
+        return Remark(text, Sign.WARNING, Tone.WARN)
+
+    def _on_agreed(self) -> None:
+        self.take_back_requested.emit(self._value.result)
 
     def _warning_of(self, result: Result, now: datetime) -> Remark:
         if result.accepted > now:

@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
 from lightpen.messages import SHOW_PEN, Code
+from lightpen.model.origin import Origin
 from lightpen.model.posture import Posture, posture_of
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
@@ -18,6 +19,7 @@ from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
     Phrase,
+    accepted_phrase,
     grade_text,
     lean_phrase,
     n_images_text,
@@ -72,10 +74,10 @@ class Moment:
         Whether the tip is in force.
     stillness : float
         How long the pen has been upright and still after the verdict: 1 is enough.
+    origin : Origin or None
+        What the images are of.
     is_simulated : bool
         Whether the pen is led by the mouse, so that it leans as the camera sees it.
-    is_recorded : bool
-        Whether the images were taken before, so that nobody holds a pen.
     is_away : bool
         Whether another step is shown.
     """
@@ -90,15 +92,15 @@ class Moment:
     verdict: Verdict | None = None
     is_accepted: bool = False
     stillness: float = 0.0
+    origin: Origin | None = None
     is_simulated: bool = False
-    is_recorded: bool = False
     is_away: bool = False
 
     @property
     def asks_upright(self) -> bool:
         """Whether the pen held upright and still leads to the review."""
         asks = self.verdict is not None and not self.is_accepted
-        return asks and not (self.is_recorded or self.is_away)
+        return asks and not (self.setup.is_recording or self.is_away)
 
     @property
     def lacks_images(self) -> bool:
@@ -168,6 +170,8 @@ class SwingWords(QObject):
         """Return what the count leaves out: time, limit, and what was of no use."""
         limit = moment.setup.limits.max_images
         text = self.tr("at most {0} images").format(limit)
+        if moment.setup.is_recording:
+            text = self.tr("recorded images")
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
@@ -219,7 +223,7 @@ class SwingWords(QObject):
                 "it, then press Space."
             )
             return Phrase(told.short, hint)
-        if message.code == Code.SOLVING and moment.is_recorded:
+        if message.code == Code.SOLVING and moment.setup.is_recording:
             return Phrase(told.short, self.tr("The tip is being computed."))
         if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
@@ -237,14 +241,15 @@ class SwingWords(QObject):
             Grade.CHECK: self.tr("Look at it"),
             Grade.REPEAT: self.tr("Repeat the swing"),
         }
-        step = steps[verdict.grade]
-        if not verdict.can_be_accepted and verdict.next_step is NextStep.CAPTURE_MORE:
+        step, is_recording = steps[verdict.grade], moment.setup.is_recording
+        can_go_on = verdict.next_step is NextStep.CAPTURE_MORE and not is_recording
+        if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
-        if moment.is_away and moment.is_recorded:
+        if moment.is_away and is_recording:
             hint = self.tr("The review is open at the screen.")
         elif moment.is_away:
             hint = self.tr("Put the pen down. The review is open at the screen.")
-        elif moment.is_recorded:
+        elif is_recording:
             hint = self.tr("Go on to the review.")
         else:
             hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
@@ -271,6 +276,8 @@ class SwingWords(QObject):
             fraction = moment.solving
         elif state.phase is Phase.COUNTDOWN:
             fraction = min((state.time - state.since) / COUNTDOWN, 1.0)
+        elif state.phase is Phase.CAPTURING and moment.setup.is_recording:
+            word, tone = self.tr("READING"), Tone.ACTIVE
         elif state.phase is Phase.CAPTURING and has_just_slipped(state):
             word, sign, tone = self.tr("TIP SLIPPED"), Sign.WARNING, Tone.BAD
         elif state.phase is Phase.CAPTURING and state.message.code in FLAWS:
@@ -289,8 +296,9 @@ class SwingWords(QObject):
                 *_LOOKS[Phase.VERDICT],
             )
         if moment.is_accepted:
-            words = self.tr("The tip is used from now on.")
-            return State(self.tr("IN FORCE"), words, Sign.CHECK, Tone.GOOD)
+            told = accepted_phrase(moment.origin)
+            words = told.hint or self.tr("The tip is used from now on.")
+            return State(told.short, words, *GRADE_MARKS[moment.verdict.grade])
         told = phrase(moment.verdict.reason, moment.state.heading)
         grade = moment.verdict.grade
         sign, tone = GRADE_MARKS[grade]
@@ -304,6 +312,12 @@ class SwingWords(QObject):
             return str(state.message.values["seconds"])
         if state.phase in ENDED:
             return n_images_text(n_kept)
+        if moment.setup.is_recording:
+            progress = state.progress
+            if not progress.n_images:
+                return ""
+            words = self.tr("{0} of {1} read")
+            return words.format(progress.n_read, progress.n_images)
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)
@@ -312,8 +326,9 @@ class SwingWords(QObject):
 
     def _time_left(self, moment: Moment) -> str:
         """Return how long the swing goes on at the pace of the last images."""
-        state = moment.state
-        if state.phase is not Phase.CAPTURING or not isfinite(state.kept.uncertainty):
+        state, is_recording = moment.state, moment.setup.is_recording
+        is_on = state.phase is Phase.CAPTURING and not is_recording
+        if not is_on or not isfinite(state.kept.uncertainty):
             return ""
         times = state.kept.times
         period = images_period(times[times > state.time - PACE_S])
@@ -357,12 +372,14 @@ def images_period(times: FloatArray) -> float | None:
 
 
 def _fraction(moment: Moment) -> float | None:
-    n_kept = moment.state.n_kept
+    n_kept, progress = moment.state.n_kept, moment.state.progress
     match moment.state.phase:
         case Phase.VERDICT:
             return None
         case Phase.SOLVING:
             return moment.solving or 0.0
+    if moment.setup.is_recording:
+        return progress.n_read / max(progress.n_images, 1)
     return n_kept / max(n_kept + moment.short.n_more, 1)
 
 
@@ -383,7 +400,7 @@ def _dial(moment: Moment) -> DialValue:
         target = replace(UPRIGHT, turn=turn)
     elif state.phase in ENDED or moment.lacks_images:
         posture = None
-    if state.heading is None:
+    if state.heading is None and not moment.setup.is_recording:
         # Nobody knows yet how the operator sees the pen lean; right is his own right.
         if posture is not None and not moment.is_simulated:
             posture = UPRIGHT

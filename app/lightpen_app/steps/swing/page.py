@@ -154,6 +154,9 @@ class SwingPage(Page):
     @override
     def entered(self) -> None:
         self._is_entered = True
+        is_recording = self._workbench.preparation.source.kind == SourceKind.RECORDED
+        if is_recording and self._run.status.state is None:
+            self._workbench.open_camera()  # it begins with its first image
         self._runner.come()
         self._ask_about_choices()
         self._show()
@@ -228,14 +231,10 @@ class SwingPage(Page):
             verdict=status.verdict,
             is_accepted=status.result is not None,
             stillness=stillness(state) if state.phase is Phase.VERDICT else 0.0,
+            origin=status.origin,
             is_simulated=self._live.operator is not None,
-            is_recorded=self._is_recorded,
             is_away=not self._is_entered,
         )
-
-    @property
-    def _is_recorded(self) -> bool:
-        return self._workbench.preparation.source.kind is SourceKind.RECORDED
 
     def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
         self._on_yes = on_yes
@@ -284,6 +283,7 @@ class SwingPage(Page):
         self._face.dial.set_interactive(self._live.operator is not None)
         text, self._press_act = self._offered()
         self._act.setText(text)
+        self._act.set_why_not(self._why_not_offered())
         if self._run.status.is_capturing is not self._was_capturing:
             self._was_capturing = self._run.status.is_capturing
             self._question.hide()
@@ -308,6 +308,14 @@ class SwingPage(Page):
         if state.phase is Phase.SOLVING:
             return self.tr("Compute again"), self._runner.solve
         return self.tr("Capture more"), self._runner.capture_more
+
+    def _why_not_offered(self) -> str:
+        status = self._run.status
+        is_recording = status.setup is not None and status.setup.is_recording
+        state = status.state
+        if is_recording and state is not None and state.phase is Phase.VERDICT:
+            return self.tr("All recorded images are read.")
+        return ""
 
     def _plot(self) -> None:
         state, setup = self._run.status.state, self._run.status.setup

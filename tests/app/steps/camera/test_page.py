@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -38,12 +39,14 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import FocusMeter
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.page import CameraPage
+from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.image_view import Marker
@@ -79,7 +82,7 @@ def exposure(seen: "Seen") -> str:
 
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
-    page = CameraPage(workbench)
+    page = CameraPage(workbench, Silence())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -304,7 +307,8 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
 
     live.wait(
         "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
-        "Choose the file for this camera or switch off binning."
+        "Choose the file for this camera, set the region to the whole sensor, or "
+        "switch off binning."
     )
     assert not live.page.is_complete()
     assert "another size" in live.page.main_action().why_not
@@ -432,9 +436,50 @@ def test_a_recorded_swing_is_played(
     live.choose("Recorded images")
 
     live.enter("Folder, record or video", str(tmp_path / "swing"))
+    live.wait("Beside the images: camera.yaml and leds.csv")
+    why_not = "Open the intrinsics file."
+    live.until(lambda: live.page.main_action().why_not == why_not)
+    live.click("Use both")
 
     live.wait("10 of 10 LEDs")
     assert live.page.is_complete()
+
+
+def test_files_of_the_simulated_pen_are_not_combined_with_a_recording(
+    live: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    live.choose("Recorded images")
+    live.enter("Folder, record or video", str(recording(tmp_path / "swing")))
+    assert workbench.preparation.camera_file is None
+    assert workbench.preparation.pen_file is None
+
+    live.choose("Simulated pen")
+    live.wait("Fits the live images")
+    assert workbench.preparation.pen_file is not None
+
+
+def test_a_folder_and_an_intrinsics_file_are_dropped_on_their_places(
+    live: "Seen", workbench: Workbench, small_scene: Scene, tmp_path: Path
+) -> None:
+    write_scene(replace(small_scene, n_images=2), tmp_path / "swing")
+    drop_on(live.child(SourcePanel), tmp_path / "swing")
+    live.until(lambda: workbench.preparation.source.place == str(tmp_path / "swing"))
+    drop_on(live.child(IntrinsicsPanel), tmp_path / "swing" / "camera.yaml")
+
+    live.wait("Fits the live images")
+
+
+def drop_on(panel: QWidget, path: Path) -> None:
+    """Drop a file or a folder of this machine."""
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    QApplication.sendEvent(
+        panel,
+        QDropEvent(
+            *(QPointF(5, 5), Qt.DropAction.CopyAction, data),
+            *(Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier),
+        ),
+    )
 
 
 def test_a_folder_is_picked_in_the_dialog(
@@ -894,6 +939,9 @@ def test_every_control_is_named_and_reached_by_tab(
         "Live image",
         "Exposure",
         "Gain",
+        "Set by the LEDs",
+        "Frame rate",
+        "Pixel format",
     }
 
 

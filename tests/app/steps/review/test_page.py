@@ -1,8 +1,9 @@
 """The step Review: from the verdict to the accepted tip, and every way back."""
 
+import json
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -18,6 +19,8 @@ from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
     QLabel,
+    QLineEdit,
+    QMenu,
     QPushButton,
     QTabBar,
     QTabWidget,
@@ -31,7 +34,7 @@ from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
-from lightpen.record.folder_archive import FolderArchive
+from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.results import Result
@@ -45,9 +48,11 @@ from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.shortfall import N_MORE
+from lightpen_app.look.theme import Tone
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.next_tips_row import NextTipsRow
 from lightpen_app.steps.review.number_table import NumberTable
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_card import PlotCard
@@ -58,12 +63,14 @@ from lightpen_app.steps.review.residual_view import ResidualView
 from lightpen_app.steps.review.result_panel import ResultPanel
 from lightpen_app.steps.review.tip_readout import TipReadout
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.work.workbench import Workbench
 
 W = TypeVar("W", bound=QWidget)
 
 N_IMAGES = 20
+N_PLOTS = 9
 DAMAGED = 7
 SLIPPED = 9
 THEN = datetime.now().astimezone() - timedelta(days=99)
@@ -105,16 +112,27 @@ class Bed:
     swing: Path
     pages: list[ReviewPage]
     rewrite_header: Callable[..., None]
+    origin: Origin = Origin.LIVE
 
     def solve(self, limit: float = 0.05) -> Workbench:
         """Solve the swing, with a limit of U, mm."""
         workbench = self.workbench
         folder = workbench.run.records_folder / "swing"
-        self.rewrite_header(folder, {"max_uncertainty_mm": limit})
+        settings = {"max_uncertainty_mm": limit, "origin": self.origin}
+        self.rewrite_header(folder, settings)
+        before = workbench.run.status.assessment
         workbench.run.runner.go_on(read_resumable(folder))
         workbench.run.runner.finish()
-        self.qtbot.waitUntil(lambda: workbench.run.status.verdict is not None)
+        self.qtbot.waitUntil(
+            lambda: workbench.run.status.assessment not in (None, before)
+        )
         return workbench
+
+    def solve_after(self, difference: Sequence[float], pen: str = "LP-04") -> Workbench:
+        """Solve the swing after another tip, so far away, was put in force, mm."""
+        tip_then = tip(self.solve()) - difference
+        put_in_force(self.workbench, tip_then, pen)
+        return self.solve()
 
     def show(self) -> ReviewPage:
         """Show the page."""
@@ -171,12 +189,12 @@ def remarks(page: ReviewPage) -> str:
 
 
 def button(page: ReviewPage, text: str) -> QPushButton:
-    """Return a button of the page, but for those that answer its question."""
-    asks = the(page, QuestionBar)
+    """Return a button of the page, but for those that answer its questions."""
+    asks = the(page, QuestionBar), the(page, ReasonBar)
     return next(
         each
         for each in page.findChildren(QPushButton)
-        if each.text() == text and not asks.isAncestorOf(each)
+        if each.text() == text and not any(bar.isAncestorOf(each) for bar in asks)
     )
 
 
@@ -184,6 +202,14 @@ def answer(page: ReviewPage, text: str) -> None:
     found = the(page, QuestionBar).findChildren(QPushButton)
     (chosen,) = [each for each in found if each.text() == text]
     QTest.mouseClick(chosen, Qt.MouseButton.LeftButton)
+
+
+def give_reason(page: ReviewPage, reason: str) -> None:
+    """Click to accept a tip that is to be checked, type why, and press Enter."""
+    click(page, "Accept...")
+    edit = the(the(page, ReasonBar), QLineEdit)
+    QTest.keyClicks(edit, reason)
+    QTest.keyClick(edit, Qt.Key.Key_Return)
 
 
 def click(page: ReviewPage, text: str) -> None:
@@ -218,6 +244,13 @@ def tip(workbench: Workbench) -> FloatArray:
     return workbench.run.status.solution.calibration.joint.tip_pen
 
 
+def u_x(workbench: Workbench) -> float:
+    """U (k = 2) of the tip along x, mm."""
+    assert workbench.run.status.solution is not None
+    budget = workbench.run.status.solution.calibration.budget
+    return float(budget.expanded_uncertainty[0])
+
+
 def await_count(qtbot: QtBot, page: ReviewPage, words: str) -> None:
     """Wait until the tip is solved from other images than before."""
     qtbot.waitUntil(lambda: count(page) == words and not page.main_action().why_not)
@@ -228,14 +261,21 @@ def in_force(workbench: Workbench) -> Result | None:
     return workbench.run.archive.in_force(names.pen, names.tip)
 
 
-def put_in_force(workbench: Workbench, tip_pen: FloatArray, pen: str = "LP-04") -> None:
+def put_in_force(
+    workbench: Workbench,
+    tip_pen: FloatArray,
+    pen: str = "LP-04",
+    names: Names | None = None,
+    **entries: object,
+) -> None:
     """Store a result of some time ago."""
-    names = replace(workbench.run.status.names, pen=pen)
+    names = names or replace(workbench.run.status.names, pen=pen)
     calibration = {
         "tip_pen_mm": tip_pen.tolist(),
         "expanded_uncertainty_mm": [0.002, 0.002, 0.002],
         "cone_cam_mm": [0.0, 0.0, 1000.0],
         "covariance": np.diag(6 * [0.001**2]).tolist(),
+        **entries,
     }
     record = workbench.run.records_folder / "elsewhere"
     workbench.run.archive.store(
@@ -302,9 +342,9 @@ def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
 
     assert banner(page).word == "CHECK: Not certain enough"
     assert page.lead().startswith("Next: capture more images")
-    assert button(page, "Capture more").property("recommended")
-    assert not button(page, "Repeat").property("recommended")
-    assert page.main_action().why_not == ""
+    assert page.main_action() == MainAction("Capture more")
+    page.run_main_action()
+    bed.qtbot.waitUntil(lambda: workbench.run.status.is_capturing)
 
 
 def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
@@ -312,8 +352,13 @@ def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:
     page = bed.show()
 
     assert banner(page).word == "REPEAT: Not certain enough"
-    assert page.main_action().why_not.startswith("Not good enough")
-    page.run_main_action()
+    assert page.main_action() == MainAction("Capture more")
+    assert not button(page, "Accept...").isEnabled()
+    assert button(page, "Accept...").toolTip().startswith("Not good enough")
+    workbench.run.runner.accept("whatever")
+    with bed.qtbot.waitSignal(workbench.troubled) as told:
+        pass
+    assert told.args[0].startswith("The tip cannot be accepted.")
     assert not page.is_complete()
     assert in_force(workbench) is None
 
@@ -330,25 +375,26 @@ def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
 def test_a_small_change_since_the_last_result_is_told_in_micrometres(
     bed: Bed,
 ) -> None:
-    workbench = bed.solve()
-    put_in_force(workbench, tip(workbench) - [0.010, 0.0, -0.005])
-    put_in_force(workbench, tip(workbench) + 1.0, pen="another")
+    u = u_x(bed.solve())
+    bed.solve_after([1.0, 1.0, 1.0], pen="another")
+    bed.solve_after([0.5 * u, 0.0, 0.0])
     page = bed.show()
 
     x, y, z = map(float, differences(page)[f"since {THEN:%Y-%m-%d}"])
-    assert (x, y, z) == pytest.approx((10.0, 0.0, -5.0), abs=0.5)
-    assert remarks(page) == ""
+    assert (x, y, z) == pytest.approx((500 * u, 0.0, 0.0), abs=0.5)
+    assert banner(page).word == "PASS: Good"
 
 
-def test_a_large_change_asks_whether_the_tip_was_exchanged(bed: Bed) -> None:
-    workbench = bed.solve()
-    put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
+def test_a_change_that_u_does_not_explain_is_to_be_checked(bed: Bed) -> None:
+    bed.solve_after([0.42, 0.0, 0.0])
     page = bed.show()
 
-    assert remarks(page) == (
-        f"The tip lies 0.420 mm from the calibration of {THEN:%Y-%m-%d} (usual "
-        "change: 0.02 mm). Was the tip exchanged?"
+    assert banner(page).word == "CHECK: Tip has changed"
+    assert banner(page).detail.startswith(
+        f"The tip lies 0.4200 mm from that of {THEN:%Y-%m-%d}: along x 0.4200 mm"
     )
+    assert page.lead().startswith("Next: see that it is the tip that is named")
+    assert page.main_action() == MainAction("Repeat")
 
 
 def test_the_result_says_which_tip_it_is_of(bed: Bed, workbench: Workbench) -> None:
@@ -377,63 +423,186 @@ def test_a_tip_far_from_its_nominal_place_is_asked_about(bed: Bed) -> None:
     assert re.search(r"The tip lies \d\.\d mm from its nominal place", said)
 
 
-def test_a_damaged_last_result_is_told_and_does_not_hinder(bed: Bed) -> None:
+def test_a_tip_that_cannot_be_compared_is_to_be_checked(bed: Bed) -> None:
     workbench = bed.solve()
     put_in_force(workbench, tip(workbench))
     (file,) = workbench.run.archive.folder.glob("*.json")
     file.write_text("{")
-    page = ReviewPage(bed.workbench)
-    bed.pages.append(page)
-    bed.qtbot.addWidget(page)
-    with bed.qtbot.waitSignal(page.notice_raised) as told:
-        page.entered()
-
-    assert "is damaged" in told.args[0]
-    assert page.main_action().why_not == ""
-    assert "no earlier result" in differences(page)
-
-
-def test_a_tip_is_accepted_only_when_its_change_is_shown(
-    bed: Bed, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    workbench = bed.solve()
-    put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
-    answer_it = Event()
-    in_force_at_last = FolderArchive.in_force
-
-    def wait(archive: FolderArchive, pen: str, tip: str) -> Result | None:
-        assert answer_it.wait(PATIENCE_MS / 1000)
-        return in_force_at_last(archive, pen, tip)
-
-    with monkeypatch.context() as slow:
-        slow.setattr(FolderArchive, "in_force", wait)
-        page = ReviewPage(bed.workbench)
-        bed.pages.append(page)
-        bed.qtbot.addWidget(page)
-        page.show()
-        page.entered()
-        assert page.main_action().why_not == "The tip is being computed."
-        page.run_main_action()
-        assert not page.is_complete()
-        with bed.qtbot.waitSignal(page.changed):
-            answer_it.set()
-
-    assert page.main_action().why_not == ""
-    assert "Was the tip exchanged?" in remarks(page)
-
-
-def test_a_bug_in_the_lookup_of_the_last_result_leaves_the_tip(
-    bed: Bed, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    caught: list[BaseException] = []
-    monkeypatch.setattr("sys.excepthook", lambda _, error, __: caught.append(error))
-    monkeypatch.setattr(FolderArchive, "in_force", lambda *_: 1 / 0)
     bed.solve()
     page = bed.show()
 
-    assert len(caught) == 1
+    assert banner(page).word == "CHECK: Nothing to compare with"
+    assert "is damaged" in banner(page).detail
     assert "no earlier result" in differences(page)
-    assert page.main_action().why_not == ""
+
+
+def test_what_comes_into_force_meanwhile_is_compared_before_it_is_replaced(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve()
+    page = bed.show()
+    put_in_force(workbench, tip(workbench) - [0.42, 0.0, 0.0])
+    with bed.qtbot.waitSignal(workbench.troubled) as told:
+        page.run_main_action()
+
+    assert "Accept it with a reason" in told.args[0]
+    bed.qtbot.waitUntil(lambda: banner(page).word == "CHECK: Tip has changed")
+    assert not page.is_complete()
+    assert button(page, "Accept...").isVisibleTo(page)
+
+
+# Accepting with a reason, and taking back
+
+
+def test_a_tip_to_be_checked_is_accepted_with_a_reason_and_stays_amber(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve_after([0.42, 0.0, 0.0])
+    page = bed.show()
+    give_reason(page, "New ball mounted.")
+    bed.qtbot.waitUntil(page.is_complete)
+
+    result = in_force(workbench)
+    assert result is not None
+    assert (result.grade, result.reason) == (Grade.CHECK, "New ball mounted.")
+    assert result.change is not None
+    assert result.change.difference_mm[0] == pytest.approx(0.42)
+    state = banner(page)
+    assert (state.word, state.tone) == ("IN FORCE", Tone.WARN)
+    assert "accepted with the reason: New ball mounted." in state.detail
+    assert page.is_doubtful()
+
+
+def test_without_a_reason_a_tip_to_be_checked_is_not_accepted(bed: Bed) -> None:
+    workbench = bed.solve_after([0.42, 0.0, 0.0])
+    page = bed.show()
+    give_reason(page, "  ")
+
+    bar = the(page, ReasonBar)
+    (give,) = [
+        each
+        for each in bar.findChildren(QPushButton)
+        if each.text() == "Accept with this reason"
+    ]
+    assert bar.isVisibleTo(page)
+    assert not give.isEnabled()
+    (decline,) = [
+        each for each in bar.findChildren(QPushButton) if each.text() == "Do not accept"
+    ]
+    QTest.mouseClick(decline, Qt.MouseButton.LeftButton)
+    assert not bar.isVisibleTo(page)
+    found = in_force(workbench)
+    assert found is not None
+    assert found.accepted == THEN
+
+
+def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve_after([0.42, 0.0, 0.0])
+    page = bed.show()
+    give_reason(page, "New ball mounted.")
+    bed.qtbot.waitUntil(page.is_complete)
+    click(page, "Take back...")
+    answer(page, "Take back")
+    bed.qtbot.waitUntil(lambda: not page.is_complete())
+
+    found = in_force(workbench)
+    assert found is not None
+    assert found.accepted == THEN
+    assert banner(page).word == "CHECK: Tip has changed"
+    assert len(list(workbench.run.archive.folder.glob("*.json"))) == 3
+
+
+def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
+    bed = replace(bed, origin=Origin.SIMULATED)
+    workbench = bed.solve()
+    page = bed.show()
+    page.run_main_action()
+    bed.qtbot.waitUntil(page.is_complete)
+
+    assert banner(page).word == "PRACTICE KEPT"
+    assert in_force(workbench) is None
+    names = workbench.preparation.names
+    archive = workbench.run.archive
+    assert archive.in_force(names.pen, names.tip, is_simulated=True) is not None
+
+
+def test_the_next_tip_is_one_click_away_with_its_ball_and_nominal_centre(
+    bed: Bed,
+) -> None:
+    workbench = bed.solve()
+    last = replace(workbench.run.status.names, tip="T-11", ball_diameter=5.0)
+    nominal = [1.0, -80.0, -20.0]
+    put_in_force(workbench, tip(workbench), names=last, nominal_tip_mm=nominal)
+    page = bed.show()
+    page.run_main_action()
+    bed.qtbot.waitUntil(page.is_complete)
+    row = the(page, NextTipsRow)
+    bed.qtbot.waitUntil(lambda: bool(row.value()))
+    with bed.qtbot.waitSignal(page.step_requested) as asked:
+        click(page, "T-11")
+
+    now = workbench.preparation
+    assert asked.args == ["swing"]
+    assert (now.names.tip, now.names.ball_diameter) == ("T-11", 5.0)
+    assert now.nominal_tip is not None
+    assert now.nominal_tip.tolist() == [1.0, -80.0, -20.0]
+
+
+# What is taken along
+
+
+def test_the_tip_is_copied_in_millimetres(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    click(page, "Copy the tip")
+
+    copied = QApplication.clipboard().text().split("\t")
+    assert list(map(float, copied)) == tip(workbench).tolist()
+
+
+def test_the_folder_of_the_swing_is_opened(
+    bed: Bed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(
+        "PySide6.QtGui.QDesktopServices.openUrl",
+        lambda url: opened.append(url.toLocalFile()),
+    )
+    bed.solve()
+    click(bed.show(), "Open folder")
+
+    assert opened == [str(bed.swing)]
+
+
+def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
+    bed: Bed, tmp_path: Path
+) -> None:
+    workbench = bed.solve()
+    page = bed.show()
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    for _ in range(2):
+        (menu,) = button(page, "Save...").findChildren(QMenu)
+        menu.actions()[0].trigger()
+        (dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
+        with bed.qtbot.waitSignal(page.status_changed):
+            dialog.fileSelected.emit(str(folder))
+        dialog.close()
+
+    stem = f"LP-04_T-10_{workbench.around.now():%Y-%m-%d}"
+    names = {path.name for path in folder.iterdir()}
+    assert all(name.startswith(stem) for name in names)
+    for end in ("calibration", "calibration-2"):
+        written = json.loads((folder / f"{stem}_{end}.json").read_bytes())
+        assert written["tip_pen_mm"] == tip(workbench).tolist()
+        assert written["origin"] == "live camera"
+    rows = (folder / f"{stem}_images.csv").read_text().splitlines()
+    assert len(rows) == N_IMAGES + 1
+    assert "live camera" in (folder / f"{stem}_tip.csv").read_text()
+    assert len([name for name in names if name.endswith(".png")]) == 2 * N_PLOTS
+    assert workbench.export_folder() == str(folder)
 
 
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
@@ -826,7 +995,7 @@ def test_after_acceptance_the_next_calibration_starts(
     accept(page, qtbot)
     # The second click of a double one must not go on.
     assert page.main_action() == MainAction(
-        "Start the next calibration", "The tip is in force."
+        "Start the next calibration", "The tip is accepted."
     )
     qtbot.waitUntil(lambda: not page.main_action().why_not)
 

@@ -28,6 +28,7 @@ from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
 from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
@@ -39,12 +40,15 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.sounds import Mute, Silence, Sound, Sounds
+from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -60,11 +64,9 @@ class Opened:
 
     def __init__(self, qtbot: QtBot, workbench: Workbench, sounds: Sounds) -> None:
         self.page = StartPage(workbench, sounds)
-        self.subjects: list[str] = []
         self.notices: list[str] = []
         self.statuses: list[str] = []
         self.steps: list[str] = []
-        self.page.subject_changed.connect(self.subjects.append)
         self.page.notice_raised.connect(self.notices.append)
         self.page.status_changed.connect(self.statuses.append)
         self.page.step_requested.connect(self.steps.append)
@@ -121,9 +123,9 @@ class Opened:
         QApplication.processEvents()
 
     def last(self) -> tuple[str, ...]:
-        """Return what is said of the last calibration."""
+        """Return what is said of the last calibration, but for its origin."""
         (panel,) = self.page.findChildren(LastResultPanel)
-        return panel.words()
+        return tuple(word for word in panel.words() if word != "SIMULATED")
 
     def rows(self) -> tuple[InterruptedRow, ...]:
         (panel,) = self.page.findChildren(InterruptedPanel)
@@ -184,11 +186,14 @@ def accepted(
     pen: str | None = None,
     tip: str | None = None,
     grade: str = "pass",
+    reason: str = "",
+    ball: float | None = None,
 ) -> None:
     """Put a tip in force that was accepted some time ago."""
-    names = workbench.preparation.names
+    named = workbench.preparation.names
+    names = replace(named, pen=pen or named.pen, tip=tip or named.tip)
     result = Result(
-        names=replace(names, pen=pen or names.pen, tip=tip or names.tip),
+        names=replace(names, ball_diameter=ball or named.ball_diameter),
         accepted=datetime.now().astimezone() - age,
         grade=grade,
         record=workbench.run.records_folder / "elsewhere",
@@ -198,7 +203,10 @@ def accepted(
             "expanded_uncertainty_mm": [0.0031, 0.0121, 0.0998],
             "cone_cam_mm": [0.0, 0.0, 1000.0],
             "covariance": np.diag(6 * [0.001**2]).tolist(),
+            "nominal_tip_mm": [-1.3, -90.4, -23.9],
         },
+        origin=workbench.preparation.origin,
+        reason=reason,
     )
     workbench.run.archive.store(result)
 
@@ -326,7 +334,7 @@ def test_any_name_will_do(
         QTest.keyClick(line, Key.Key_V, Qt.KeyboardModifier.ControlModifier)
         QTest.keyClick(line, Key.Key_Tab)
 
-    names = Names(name, name, name, name, name, 10.0)
+    names = Names(name, name, name, name, name)  # the ball was of another tip
     assert workbench.preparation.names == names
     assert settings.await_saved(120.0)
     again = Workbench(Settings(settings.file), workbench.run.records_folder.parent)
@@ -338,17 +346,41 @@ def test_any_name_will_do(
     qtbot.waitUntil(lambda: again.run.status.record_folder is not None)
     again.shut_down()
     accepted(workbench, timedelta(0))
-    assert again.run.archive.in_force(name, name) is not None
+    assert again.run.archive.in_force(name, name, is_simulated=True) is not None
 
 
-def test_the_subject_is_pen_and_cone_as_they_are_typed(start: Opened) -> None:
-    assert start.subjects[-1] == "Pen LP-04  \u00b7  Cone C-1"
+def test_another_tip_has_another_ball_and_nominal_centre(
+    start: Opened, workbench: Workbench
+) -> None:
+    point = np.array([1.0, -90.0, -20.0])
+    workbench.set_preparation(replace(workbench.preparation, nominal_tip=point))
+    start.type_into("Probe tip", "T-99")
 
-    start.type_into("Pen, serial number", "", end=None)
-    assert start.subjects[-1] == "Cone C-1"
+    assert workbench.preparation.names.tip == "T-99"
+    assert workbench.preparation.names.ball_diameter is None
+    assert workbench.preparation.nominal_tip is None
 
-    start.type_into("Pen, serial number", 200 * "w", end=None)
-    assert len(start.subjects[-1]) < 60
+
+def test_a_known_tip_brings_its_ball_and_nominal_centre(
+    start: Opened, workbench: Workbench, qtbot: QtBot
+) -> None:
+    accepted(workbench, timedelta(3), tip="T-99", ball=5.0)
+    start.type_into("Probe tip", "T-99")
+
+    qtbot.waitUntil(lambda: workbench.preparation.names.ball_diameter == 5.0)
+    now = workbench.preparation
+    assert now.names.tip == start.text_of("Probe tip") == "T-99"
+    assert now.nominal_tip is not None
+    assert now.nominal_tip.tolist() == [-1.3, -90.4, -23.9]
+
+
+def test_a_ball_that_is_typed_with_another_tip_stays(
+    start: Opened, workbench: Workbench
+) -> None:
+    start.type_into("Probe tip", "T-98")
+    start.type_into("Ball diameter", "4.5")
+
+    assert workbench.preparation.names.ball_diameter == 4.5
 
 
 # Stations
@@ -587,7 +619,8 @@ def test_limits_that_make_no_sense_cannot_be_entered(
 
 def test_a_pen_and_tip_that_were_never_calibrated_have_none_yet(start: Opened) -> None:
     assert start.last() == (
-        *("None yet", "The tip that you accept will be the first in force."),
+        "None yet",
+        "What you accept is kept apart from the tips of real pens.",
     )
 
 
@@ -616,6 +649,47 @@ def test_the_age_is_told_in_words(
     accepted(workbench, timedelta(days=days))
 
     assert show(workbench).last()[0] == age
+
+
+def test_a_tip_that_was_to_be_checked_stays_amber_with_its_reason(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=1), grade="check", reason="New ball.")
+    start = show(workbench)
+
+    assert start.last()[1] == "CHECK"
+    assert start.last()[-1] == "Accepted with the reason: New ball."
+    tones = {
+        each.value().text: each.value().tone
+        for each in start.page.findChildren(SignLabel)
+    }
+    assert tones["CHECK"] is tones["Accepted with the reason: New ball."] is Tone.WARN
+
+
+def test_a_simulated_tip_is_shown_for_no_real_pen(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=1))
+    chosen = workbench.preparation.with_source(SourceChoice(SourceKind.RECORDED))
+    workbench.set_preparation(chosen)
+
+    assert show(workbench).last() == (
+        *("None yet", "The tip that you accept will be the first in force."),
+    )
+
+
+def test_the_last_acceptance_is_taken_back_here_too(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    accepted(workbench, timedelta(days=9))
+    accepted(workbench, timedelta(days=1))
+    start = show(workbench)
+    assert start.last()[0] == "Yesterday"
+
+    start.press("Take back...")
+    start.press("Take back")
+    qtbot.waitUntil(lambda: start.last()[0] == "9 days ago")
+    assert len(list(workbench.folder.rglob("results/*.json"))) == 3
 
 
 def test_an_old_tip_comes_with_a_warning(
@@ -675,7 +749,7 @@ def test_a_damaged_result_is_told_where_the_result_would_be(
     show: Callable[[Workbench], Opened], workbench: Workbench
 ) -> None:
     accepted(workbench, timedelta(days=12))
-    (file,) = workbench.run.archive.folder.iterdir()
+    (file,) = workbench.folder.rglob("results/*.json")
     file.write_text("{")
 
     (sentence,) = show(workbench).last()
@@ -721,7 +795,8 @@ def test_a_swing_whose_program_was_killed_as_it_accepted_is_not_offered(
     folder = interrupted(workbench, "a")
     names = workbench.preparation.names
     accepted(workbench, timedelta(0))
-    stored = workbench.run.archive.in_force(names.pen, names.tip)
+    archive = workbench.run.archive
+    stored = archive.in_force(names.pen, names.tip, is_simulated=True)
     assert stored is not None
     images = tuple(range(1, 13))
     workbench.run.archive.store(replace(stored, record=folder, images=images))
@@ -781,7 +856,8 @@ def test_a_swing_goes_on_with_its_images_at_the_step_swing(
     assert workbench.run.status.state.n_kept == 12
     assert workbench.run.status.names.pen == workbench.preparation.names.pen == "LP-05"
     assert start.text_of("Operator") == "Bea"
-    assert start.subjects[-1].startswith("Pen LP-05")
+    assert workbench.subject.names.pen == "LP-05"
+    assert workbench.subject.origin is Origin.SIMULATED
     assert start.notices == []
 
 
@@ -1436,7 +1512,7 @@ def test_every_word_changes_with_the_language(
         texts += [w.text() for w in start.page.findChildren(QCheckBox)]
         texts += [w.title() for w in start.page.findChildren(QGroupBox)]
         texts += [w.toolTip() for w in start.page.findChildren(QWidget)]
-        data = ("Ann", "x", "y", "z")
+        data = ("Ann", "x", "y", "z", breakable(str(workbench.folder)))
         quiet = [text for text in texts if text != text.upper() and text not in data]
     finally:
         dressed.removeTranslator(translator)

@@ -46,11 +46,16 @@ def test_after_the_verdict_the_dial_shows_how_far_from_upright_the_pen_is(
     assert value.keys == "Enter: see the review"
 
 
-@pytest.mark.parametrize("why", ["is_recorded", "is_away", "is_accepted"])
+RECORDING = replace(SETUP, is_recording=True)
+
+
+@pytest.mark.parametrize(
+    "why", [{"setup": RECORDING}, {"is_away": True}, {"is_accepted": True}]
+)
 def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
-    words: SwingWords, why: str
+    words: SwingWords, why: dict[str, object]
 ) -> None:
-    value = words.operator_value(at_verdict(stillness=0.5, **{why: True}))
+    value = words.operator_value(at_verdict(stillness=0.5, **why))
 
     assert "upright" not in value.hint
     assert value.state.fraction is None

@@ -463,8 +463,8 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
     desk = at_verdict
     folder = desk.run.status.record_folder
     desk.window.go_to(2)
-    desk.run.runner.accept()
-    until(qtbot, lambda: desk.value.state.word == "IN FORCE")
+    desk.run.runner.accept("It is seen to.")
+    until(qtbot, lambda: desk.value.state.word == "PRACTICE KEPT")
     assert desk.value.instruction == "Accepted"
     assert folder is not None
     journal = (folder / JOURNAL).read_bytes()

@@ -1,0 +1,75 @@
+"""Where swings and results are kept, and who else uses that folder."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
+
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import breakable
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+
+class DataFolderPanel(Translated, QGroupBox):
+    """Shows the data folder, opens it, and tells of other windows that use it.
+
+    Parameters
+    ----------
+    folder : Path
+        The data folder.
+    """
+
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._n_others = 0
+
+        # Widgets
+        self._path = text_label(TextSize.SMALL, Tone.QUIET)
+        self._path.setText(breakable(str(folder)))
+        self._open = PushButton()
+        self._others = SignLabel()
+
+        # Layout
+        row = QHBoxLayout()
+        row.setSpacing(2 * GRID)
+        row.addWidget(self._path, 1)
+        row.addWidget(self._open)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addLayout(row)
+        layout.addWidget(self._others)
+
+        # Connections
+        self._open.clicked.connect(self._on_open_clicked)
+
+        self._retranslate()
+
+    def set_others(self, n_others: int) -> None:
+        """Tell how many other windows of the program use the folder."""
+        self._n_others = n_others
+        self._retranslate()
+
+    def _on_open_clicked(self) -> None:
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder)))
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Data folder"))
+        self._open.setText(self.tr("Open folder"))
+        self._open.setAccessibleName(self.tr("Open the data folder"))
+        self._open.setToolTip(
+            self.tr("Swings and results are kept here. Options choose another folder.")
+        )
+        remark = Remark()
+        if self._n_others:
+            text = self.tr(
+                "Other windows of the program that use this folder: {0}. All of them "
+                "put their tips in force here."
+            ).format(self._n_others)
+            remark = Remark(text, Sign.WARNING, Tone.WARN)
+        self._others.set_value(remark)

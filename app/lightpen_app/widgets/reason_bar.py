@@ -1,0 +1,85 @@
+"""A question in the page that takes a reason for an answer."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
+
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.push_button import PushButton
+
+LONGEST_REASON = 200  # characters
+
+
+class ReasonBar(QFrame):
+    """Hidden until it asks; either answer hides it again.
+
+    Signals
+    -------
+    given(str)
+        The reason, which is not empty.
+    declined()
+    """
+
+    given = Signal(str)
+    declined = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("area", "notice")
+        set_tone(self, Tone.WARN)
+
+        # Widgets
+        self._text = text_label(TextSize.BODY)
+        self._edit = EnterEdit()
+        self._edit.setMaxLength(LONGEST_REASON)
+        self._decline = PushButton()
+        self._give = PushButton()
+
+        # Layout
+        layout = QGridLayout(self)
+        layout.setContentsMargins(2 * GRID, GRID, GRID, GRID)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._text, 0, 0, 1, 3)
+        layout.addWidget(self._edit, 1, 0)
+        layout.addWidget(self._decline, 1, 1)
+        layout.addWidget(self._give, 1, 2)
+        layout.setColumnStretch(0, 1)
+
+        # Connections
+        self._edit.textChanged.connect(self._refresh)
+        self._edit.returnPressed.connect(self._on_given)
+        self._give.clicked.connect(self._on_given)
+        self._decline.clicked.connect(self._on_declined)
+
+        self._refresh()
+        self.hide()
+
+    def set_words(self, question: str, field: str, yes: str, no: str) -> None:
+        """Change the question, the name of its field, and its answers."""
+        self._text.setText(question)
+        self.setAccessibleName(question)
+        self._edit.setAccessibleName(field)
+        self._edit.setPlaceholderText(field)
+        self._give.setText(yes)
+        self._decline.setText(no)
+
+    def ask(self) -> None:
+        """Show the question and wait for what is typed."""
+        self._edit.clear()
+        self.show()
+        self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def _reason(self) -> str:
+        return self._edit.text().strip()
+
+    def _refresh(self) -> None:
+        self._give.setEnabled(bool(self._reason()))
+
+    def _on_given(self) -> None:
+        if self._reason():
+            self.hide()
+            self.given.emit(self._reason())
+
+    def _on_declined(self) -> None:
+        self.hide()
+        self.declined.emit()

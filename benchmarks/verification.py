@@ -1,0 +1,110 @@
+"""Verifications: the paper's tables on the image sets, and touches by Monte Carlo."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from benchmarks.rows import Row, numbers, without_data
+from benchmarks.touches import covered_share
+from benchmarks.workers import Workers
+
+from lightpen.detection.observations import observe_images
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.instrument import Instrument
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.images import find_images
+from lightpen.formats.pen_files import read_pen
+from lightpen.verification.circle import measure_circle
+from lightpen.verification.fixed_point import measure_fixed_point
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.sources import touch_run
+from lightpen.verification.touching import TouchRules
+
+UM = 1000.0  # in a millimetre
+ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
+NOMINAL_TIP = np.array([0.0, -90.0, -25.0])  # mm, the paper's
+POINT_LIMITS = np.array([2.0, 2.0, 10.0])  # um
+RADIUS, ERROR_LIMIT, SCATTER_LIMIT, N_RUNS = 31.751, 1.5, 1.0, 8  # mm, um
+N_PARTS, N_CALIBRATIONS, N_TOUCHES = 10, 10, 10
+SHARE_LIMITS = 0.93, 0.97
+FIGURES = (
+    "`fixed-point`: std of u v w by the tip of `swing-full`",
+    "`circle`: mean radius error, std of 8 runs",
+)
+
+
+def verification_rows(workers: Workers, data: Path | None) -> list[Row]:
+    """Return the figures of fixed point, circle and touches."""
+    rows = without_data(*FIGURES) if data is None else _of_sets(data)
+    count = partial(_covered, N_CALIBRATIONS, N_TOUCHES)
+    share = float(np.mean(workers.map(count, list(range(N_PARTS)))))
+    low, high = SHARE_LIMITS
+    return [
+        *rows,
+        Row(
+            f"{N_PARTS * N_CALIBRATIONS * N_TOUCHES} touches: in their 95 % ellipsoid",
+            f"{100 * share:.1f} %",
+            f"{100 * low:.0f} to {100 * high:.0f} %",
+            met=low <= share <= high,
+        ),
+    ]
+
+
+def _covered(n_calibrations: int, n_touches: int, seed: int) -> float:
+    return covered_share(n_calibrations, n_touches, seed)
+
+
+def _of_sets(data: Path) -> list[Row]:
+    instrument = _instrument(data / "swing-full")
+    limits = VerificationLimits()
+
+    point = measure_fixed_point(
+        touch_run(
+            "fixed-point",
+            find_images(str(data / "fixed-point" / "images")),
+            instrument,
+            ONE_IMAGE,
+        ).touches,
+        instrument,
+        limits,
+        NOMINAL_TIP,
+    )
+    runs = [
+        touch_run(
+            f"run {i}",
+            find_images(str(data / "circle" / f"run_{i:02d}")),
+            instrument,
+            ONE_IMAGE,
+        )
+        for i in range(1, N_RUNS + 1)
+    ]
+    circle = measure_circle(
+        [(run.name, run.touches) for run in runs], instrument, RADIUS, limits
+    )
+    deviation = UM * point.calibrated.deviation
+    assert point.nominal is not None
+    assert circle.deviation is not None
+    error, scatter = UM * circle.errors.mean(), UM * circle.deviation
+    return [
+        Row(
+            FIGURES[0],
+            f"{numbers(deviation, 1)} um",
+            f"{numbers(POINT_LIMITS, 0)} um",
+            f"nominal tip {numbers(UM * point.nominal.deviation, 0)} um",
+            met=bool((deviation <= POINT_LIMITS).all()),
+        ),
+        Row(
+            FIGURES[1],
+            f"{error:+.1f}, {scatter:.1f} um",
+            f"{ERROR_LIMIT:g}, {SCATTER_LIMIT:g} um",
+            "paper 17, 8 um",
+            met=abs(error) <= ERROR_LIMIT and scatter <= SCATTER_LIMIT,
+        ),
+    ]
+
+
+def _instrument(folder: Path) -> Instrument:
+    camera = read_camera(folder / "camera.yaml")
+    pen = read_pen(folder / "leds.csv")
+    images = find_images(str(folder / "images"))
+    return calibrate(camera, pen, observe_images(images, camera, pen)).instrument

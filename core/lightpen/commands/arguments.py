@@ -1,0 +1,59 @@
+"""Words of the command line as values, and options that several commands share."""
+
+import argparse
+import math
+from pathlib import Path
+
+from lightpen.formats.pen_files import UNITS
+
+
+def whole_number(text: str) -> int:
+    """Return a whole number of 0 or more."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number of 0 or more.")
+    return int(text)
+
+
+def finite(text: str) -> float:
+    """Return a number."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text} is not a number.")
+    return number
+
+
+def above_zero(text: str) -> float:
+    """Return a number above 0."""
+    number = finite(text)
+    if number <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0.")
+    return number
+
+
+def not_negative(text: str) -> float:
+    """Return a number of 0 or more."""
+    number = finite(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of 0 or more.")
+    return number
+
+
+def add_pen_options(parser: argparse.ArgumentParser) -> None:
+    """Add what a pen file may leave out."""
+    parser.add_argument(
+        "--units", choices=sorted(UNITS), help="of a pen file that does not say"
+    )
+    parser.add_argument(
+        "--led-diameter",
+        type=finite,
+        metavar="MM",
+        help="of the LED discs, where the pen file does not say (10)",
+    )
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add where the record is written."""
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")

@@ -1,0 +1,112 @@
+"""What every command does with its console: print, show progress, fail to print."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import wraps
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from lightpen.errors import UsageError
+from lightpen.estimation.report import json_bytes
+from lightpen.formats.files import printable, write_whole
+from lightpen.formats.own_json import with_checksum
+from lightpen.sentences import sentence
+
+DONE, NO_TIP, BAD_INPUT = 0, 1, 2
+BAR_WIDTH = 72  # characters
+
+Command: TypeAlias = Callable[[argparse.Namespace], int]
+
+
+def shown(text: str) -> str:
+    """Return a text in which names of files say nothing to the terminal."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def printing(command: Callable[[argparse.Namespace], None]) -> Command:
+    """Give a command an exit status also where its output cannot be written."""
+
+    @wraps(command)
+    def run(options: argparse.Namespace) -> int:
+        try:
+            command(options)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        except BrokenPipeError:  # its reader has seen enough
+            _drop_output()
+        except OSError as error:  # files have errors of their own: this is our output
+            _drop_output()
+            print(
+                f"lightpen: The result cannot be printed: {error.strerror}. Free some "
+                "space, or print it elsewhere.",
+                file=sys.stderr,
+            )
+            return BAD_INPUT
+        return DONE
+
+    return run
+
+
+def require_other_file(record: Path | None, *inputs: Path | None) -> None:
+    """Refuse to write the record over one of the files that it is made from."""
+    if record is None:
+        return
+    for path in inputs:
+        if path is not None and are_same(path, record):
+            raise UsageError(
+                sentence(
+                    "cli.json-over-input",
+                    "--json {record} would replace the input file of that name. "
+                    "Give the record another name.",
+                    record=str(record),
+                )
+            )
+
+
+def write_record(path: Path, record: Mapping[str, Any]) -> None:
+    """Write a record as JSON that tells when it was changed."""
+    write_whole(path, with_checksum(json_bytes(record)) + b"\n")
+
+
+def lacking(option: str) -> UsageError:
+    """Return that an option is missing which only a record can do without."""
+    return UsageError(
+        sentence(
+            "cli.option-missing",
+            "{option} FILE is missing. Only a record needs none.",
+            option=option,
+        )
+    )
+
+
+def are_same(one: Path, other: Path) -> bool:
+    """Return whether two paths lead to one file."""
+    if one.exists() and other.exists():
+        return one.samefile(other)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar on a terminal, and nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda fraction: None
+        return
+    from tqdm import tqdm
+
+    layout = "{desc} {bar} {percentage:3.0f}%"
+    with tqdm(total=1.0, desc=title, bar_format=layout, ncols=BAR_WIDTH) as bar:
+
+        def report(fraction: float) -> None:
+            bar.update(fraction - bar.n)
+
+        yield report
+
+
+def _drop_output() -> None:
+    """Keep what is not printed yet from failing again as the program ends."""
+    if sys.stdout is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

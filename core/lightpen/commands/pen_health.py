@@ -1,0 +1,125 @@
+"""``lightpen verify pen`` and ``lightpen improve-pen``: LEDs over several swings."""
+
+import argparse
+from pathlib import Path
+
+from lightpen.commands.arguments import add_json, add_pen_options
+from lightpen.commands.console import (
+    are_same,
+    printing,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.commands.verifications import read_scale
+from lightpen.errors import UsageError
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import sha256
+from lightpen.formats.hashes import all_hashed
+from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.sentences import sentence
+from lightpen.verification.led_file import improve_pen
+from lightpen.verification.pen_health import GROWN, MOVED, examine_pen
+from lightpen.verification.records import pen_health_entries, verification_record
+from lightpen.verification.texts import improved_pen_text, pen_health_text
+
+
+def add_verify_pen(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen verify pen``."""
+    parser.set_defaults(run=_verify_pen)
+    _add_swings(parser)
+    add_json(parser)
+
+
+def add_improve_pen(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen improve-pen``."""
+    parser.set_defaults(run=_improve_pen)
+    _add_swings(parser)
+    parser.add_argument(
+        "--length",
+        type=Path,
+        metavar="FILE.json",
+        help="a certified length verified with this pen, for its scale",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="NEW.json", help="the new LED file"
+    )
+
+
+def _add_swings(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "results",
+        nargs="+",
+        type=Path,
+        metavar="RESULT.json",
+        help="calibrations with this pen, in any order",
+    )
+    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    add_pen_options(parser)
+
+
+@printing
+def _verify_pen(options: argparse.Namespace) -> None:
+    files = [*options.results, options.camera, options.pen]
+    require_other_file(options.json, *files)
+    swings = _swings(options)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    found = examine_pen(swings, read_camera(options.camera), pen.leds)
+    print(shown(pen_health_text(found)))
+    if options.json is not None:
+        record = verification_record(
+            "pen",
+            pen_health_entries(found),
+            found.assessment,
+            {"led_moved": MOVED, "relative_growth": GROWN},
+            {
+                "files": [
+                    {"file": file.path.name, "sha256": file.sha256}
+                    for file in all_hashed(files)
+                ]
+            },
+        )
+        write_record(options.json, record)
+
+
+@printing
+def _improve_pen(options: argparse.Namespace) -> None:
+    for path in (*options.results, options.camera, options.pen, options.length):
+        if path is not None and are_same(path, options.out):
+            raise UsageError(
+                sentence(
+                    "cli.out-over-input",
+                    "--out {out} would replace the input file of that name. Give the "
+                    "new LED file another name.",
+                    out=str(options.out),
+                )
+            )
+    swings = _swings(options)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    camera = read_camera(options.camera)
+    scale = None if options.length is None else read_scale(options.length)
+    found = improve_pen(swings, camera, pen, scale)
+    write_pen(found.pen, options.out, sha256(options.pen))
+    print(shown(improved_pen_text(found)))
+    print(shown(f"The new LED file is {options.out}."))
+
+
+def _swings(options: argparse.Namespace) -> list[CalibrationFile]:
+    """Read the calibrations, the oldest first; all must be with the given pen file."""
+    swings = sorted(map(read_calibration, options.results), key=lambda one: one.when)
+    pen_sha256 = sha256(options.pen)
+    for each in swings:
+        if each.pen_sha256 != pen_sha256:
+            raise UsageError(
+                sentence(
+                    "cli.swing-of-another-pen",
+                    "{result} was made with the pen file {its_pen}, which --pen {pen} "
+                    "is not. Give that file, and calibrations with it only.",
+                    result=str(each.path),
+                    its_pen=each.pen_file,
+                    pen=str(options.pen),
+                )
+            )
+    return swings

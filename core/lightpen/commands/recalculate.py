@@ -1,0 +1,211 @@
+"""``lightpen recalculate``: solve calibrations again, and check their uncertainty."""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.commands.arguments import add_json, add_pen_options, whole_number
+from lightpen.commands.console import (
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
+from lightpen.estimation.report import plain
+from lightpen.estimation.workers import Map, cluster_workers, local_workers
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import printable, sha256
+from lightpen.formats.pen_files import read_pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.sentences import sentence
+from lightpen.verification.led_file import calibrate_again
+
+TITLE, COLUMN = 30, 13  # characters
+
+
+@dataclass(frozen=True, eq=False)
+class Recalculated:
+    """A calibration solved again from the LED centres that it keeps.
+
+    Attributes
+    ----------
+    tip_pen : (3,) array or None
+        mm; None where there is no tip any more.
+    trouble : str
+        Why not.
+    """
+
+    name: str
+    tip_pen: FloatArray | None
+    change: FloatArray | None
+    trouble: str = ""
+
+
+def add_recalculate(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen recalculate``."""
+    parser.set_defaults(run=_recalculate)
+    parser.add_argument(
+        "results", nargs="+", type=Path, metavar="RESULT.json", help="calibrations"
+    )
+    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--monte-carlo",
+        type=_n_trials,
+        metavar="N",
+        help="check the uncertainty of each by so many simulated calibrations",
+    )
+    parser.add_argument(
+        "--workers",
+        type=whole_number,
+        metavar="N",
+        help="processes on this machine; one a core unless said",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="compute on a Dask cluster, such as tcp://10.0.0.5:8786",
+    )
+    add_json(parser)
+
+
+def _n_trials(text: str) -> int:
+    number = whole_number(text)
+    if number < MIN_TRIALS:
+        raise argparse.ArgumentTypeError(f"at least {MIN_TRIALS} trials are needed.")
+    return number
+
+
+@printing
+def _recalculate(options: argparse.Namespace) -> None:
+    require_other_file(options.json, *options.results, options.camera, options.pen)
+    camera = read_camera(options.camera)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    files = [read_calibration(path) for path in options.results]
+    _require_files(files, options)
+    with _workers(options) as in_workers, progress("Calculating") as report:
+        solved = in_workers(_Solve(camera, pen), files, report)
+        trials = {}
+        if options.monte_carlo is not None:
+            for file in files:
+                trials[file.path.name] = run_monte_carlo(
+                    calibrate_again(file, camera, pen),
+                    options.monte_carlo,
+                    in_workers,
+                    report,
+                )
+    print(shown(_text(solved, trials)))
+    if options.json is not None:
+        write_record(options.json, _record(solved, trials))
+
+
+@dataclass(frozen=True, eq=False)
+class _Solve:
+    """Solves calibrations with the same files, in another process."""
+
+    camera: Camera
+    pen: Pen
+
+    def __call__(self, file: CalibrationFile) -> Recalculated:
+        name = file.path.name
+        try:
+            tip = calibrate_again(file, self.camera, self.pen).joint.tip_pen
+        except CalibrationError as error:
+            return Recalculated(name, None, None, str(error.sentence))
+        return Recalculated(name, tip, tip - file.tip_pen)
+
+
+@contextmanager
+def _workers(options: argparse.Namespace) -> Iterator[Map]:
+    opened = (
+        local_workers(options.workers)
+        if options.scheduler is None
+        else cluster_workers(options.scheduler)
+    )
+    with opened as in_workers:
+        yield in_workers
+
+
+def _require_files(files: list[CalibrationFile], options: argparse.Namespace) -> None:
+    """Refuse calibrations that were made with other files than those given."""
+    given = sha256(options.camera), sha256(options.pen)
+    for file in files:
+        if (file.camera_sha256, file.pen_sha256) != given:
+            raise UsageError(
+                sentence(
+                    "cli.result-of-other-files",
+                    "{result} was made with other files than --camera {camera} and "
+                    "--pen {pen}. Give those that it was made with.",
+                    result=printable(str(file.path)),
+                    camera=str(options.camera),
+                    pen=str(options.pen),
+                )
+            )
+
+
+def _text(solved: list[Recalculated], trials: dict[str, MonteCarlo]) -> str:
+    lines = [
+        f"{'Tip in the pen frame, mm':<{TITLE}}"
+        + "".join(f"{axis:>{COLUMN}}" for axis in "xyz")
+    ]
+    for each in solved:
+        if each.tip_pen is None or each.change is None:
+            lines.append(f"{each.name}: {each.trouble}")
+            continue
+        lines.append(_row(each.name, each.tip_pen))
+        lines.append(_row("  change", each.change))
+        found = trials.get(each.name)
+        if found is not None:
+            lines += [
+                _row("  U (k = 2), linear", 2 * found.linear),
+                _row("  U (k = 2), Monte Carlo", 2 * found.deviation),
+                _row("    known to", 2 * found.precision),
+                _row("    difference / that", found.difference),
+                f"  {len(found.errors)} trials, {found.n_failed} without a tip",
+            ]
+    return "\n".join(lines)
+
+
+def _row(title: str, values: FloatArray) -> str:
+    return f"{title[:TITLE]:<{TITLE}}" + "".join(f"{x:{COLUMN}.4f}" for x in values)
+
+
+def _record(
+    solved: list[Recalculated], trials: dict[str, MonteCarlo]
+) -> dict[str, object]:
+    entries = []
+    for each in solved:
+        found = trials.get(each.name)
+        entries.append(
+            {
+                "name": each.name,
+                "tip_pen_mm": each.tip_pen,
+                "change_mm": each.change,
+                "trouble": each.trouble,
+                "monte_carlo": (
+                    None
+                    if found is None
+                    else {
+                        "trials": len(found.errors),
+                        "failed": found.n_failed,
+                        "linear_standard_uncertainty_mm": found.linear,
+                        "standard_uncertainty_mm": found.deviation,
+                        "precision_mm": found.precision,
+                        "difference_in_precisions": found.difference,
+                        "interval_95_mm": np.asarray(found.interval),
+                    }
+                ),
+            }
+        )
+    return {"calibrations": plain(entries)}

@@ -1,0 +1,190 @@
+"""``lightpen repeatability``: one tip calibrated several times."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.commands.arguments import (
+    above_zero,
+    add_json,
+    add_pen_options,
+    finite,
+)
+from lightpen.commands.console import (
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.commands.verifications import read_fixed_point
+from lightpen.detection.observations import observe_centers
+from lightpen.errors import UsageError
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.report import result_of
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import printable
+from lightpen.formats.hashes import all_hashed
+from lightpen.formats.observation_files import read_centers
+from lightpen.formats.pen_files import read_pen
+from lightpen.record.calibrations import read_calibration
+from lightpen.sentences import sentence
+from lightpen.verification.charts import write_chart
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.pen_health import require_one_pen
+from lightpen.verification.records import repeatability_entries, verification_record
+from lightpen.verification.repeatability import TipEstimate, measure_repeatability
+from lightpen.verification.texts import repeatability_text
+
+
+def add_repeatability(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen repeatability``."""
+    parser.set_defaults(run=_repeatability)
+    parser.add_argument(
+        "results",
+        nargs="+",
+        type=Path,
+        metavar="RESULT",
+        help="calibrations of one tip: RESULT.json, or LED centres as FILE.csv, which "
+        "are calibrated first",
+    )
+    parser.add_argument("--camera", type=Path, metavar="FILE", help="of LED centres")
+    parser.add_argument("--pen", type=Path, metavar="FILE", help="likewise")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--method",
+        choices=("joint", "two-stage"),
+        default="joint",
+        help="which estimator gives the tips of LED centres",
+    )
+    parser.add_argument(
+        "--fixed-point",
+        type=Path,
+        metavar="FILE.json",
+        help="a fixed point verified with this tip, to compare its scatter",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=above_zero,
+        metavar="MM",
+        help="width of the tolerance of a coordinate, for Cg and Cgk",
+    )
+    parser.add_argument(
+        "--reference",
+        type=finite,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="the tip by a better instrument, mm, for Cgk",
+    )
+    usual = VerificationLimits().repeatability
+    parser.add_argument(
+        "--limit",
+        type=above_zero,
+        default=usual,
+        metavar="MM",
+        help=f"of the standard deviation of a coordinate; {usual:g} unless said",
+    )
+    parser.add_argument(
+        "--chart", type=Path, metavar="FILE", help="control chart, .csv or .svg"
+    )
+    add_json(parser)
+
+
+@printing
+def _repeatability(options: argparse.Namespace) -> None:
+    inputs = [*options.results, options.fixed_point, options.camera, options.pen]
+    require_other_file(options.json, *inputs)
+    require_other_file(options.chart, *inputs)
+    tips = _tips(options)
+    limits = VerificationLimits(repeatability=options.limit)
+    found = measure_repeatability(
+        tips,
+        limits,
+        tolerance=options.tolerance,
+        reference=None if options.reference is None else np.array(options.reference),
+        fixed_point=(
+            None
+            if options.fixed_point is None
+            else read_fixed_point(options.fixed_point)
+        ),
+    )
+    print(shown(repeatability_text(found)))
+    if options.chart is not None:
+        write_chart(found, options.chart)
+    if options.json is not None:
+        files = [each for each in inputs if each is not None]
+        record = verification_record(
+            "repeatability",
+            repeatability_entries(found),
+            found.assessment,
+            {"repeatability": limits.repeatability},
+            {
+                "files": [
+                    {"file": file.path.name, "sha256": file.sha256}
+                    for file in all_hashed(files)
+                ]
+            },
+        )
+        write_record(options.json, record)
+
+
+def _tips(options: argparse.Namespace) -> list[TipEstimate]:
+    tables = [path for path in options.results if path.suffix.lower() == ".csv"]
+    if tables and len(tables) < len(options.results):
+        raise UsageError(
+            sentence(
+                "cli.results-mixed",
+                "Give either results or files of LED centres: {one} is a result, "
+                "{other} is not.",
+                one=str(next(each for each in options.results if each not in tables)),
+                other=str(tables[0]),
+            )
+        )
+    return _from_centers(options, tables) if tables else _from_results(options)
+
+
+def _from_results(options: argparse.Namespace) -> list[TipEstimate]:
+    calibrations = [read_calibration(path) for path in options.results]
+    require_one_pen(calibrations)
+    for each in calibrations[1:]:
+        if each.tip != calibrations[0].tip:
+            raise UsageError(
+                sentence(
+                    "cli.another-tip",
+                    "{other} is of the tip {its}, {first} of the tip {tip}. Give "
+                    "calibrations of one tip.",
+                    other=str(each.path),
+                    its=printable(each.tip),
+                    first=str(calibrations[0].path),
+                    tip=printable(calibrations[0].tip),
+                )
+            )
+    return [
+        TipEstimate(each.path.name, each.tip_pen, each.uncertainty, each.when)
+        for each in calibrations
+    ]
+
+
+def _from_centers(options: argparse.Namespace, tables: list[Path]) -> list[TipEstimate]:
+    for option, file in (("--camera", options.camera), ("--pen", options.pen)):
+        if file is None:
+            raise UsageError(
+                sentence(
+                    "cli.centers-need",
+                    "{option} FILE is missing: LED centres are calibrated with it.",
+                    option=option,
+                )
+            )
+    camera = read_camera(options.camera)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    tips = []
+    with progress("Calibrating") as report:
+        for path in tables:
+            seen = observe_centers(read_centers(path, pen.n_leds), camera, pen)
+            result = result_of(calibrate(camera, pen, seen), options.method)
+            tips.append(
+                TipEstimate(path.name, result.tip_pen, result.expanded_uncertainty[:3])
+            )
+            report(len(tips) / len(tables))
+    return tips

@@ -1,0 +1,418 @@
+"""``lightpen verify``: prove a tip by touching what is known."""
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.commands.arguments import (
+    above_zero,
+    add_json,
+    add_pen_options,
+    finite,
+    not_negative,
+)
+from lightpen.commands.console import (
+    lacking,
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.commands.pen_health import add_verify_pen
+from lightpen.estimation.instrument import Instrument
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.hashes import all_hashed, hashed
+from lightpen.formats.images import ImageSource, find_images
+from lightpen.formats.pen_files import read_pen
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.record.reading import is_record, open_record, source
+from lightpen.verification.articulation import (
+    N_POSTURES,
+    N_TOUCHES,
+    measure_articulation,
+)
+from lightpen.verification.assessment import Assessment
+from lightpen.verification.circle import measure_circle
+from lightpen.verification.drift import measure_drift
+from lightpen.verification.fixed_point import measure_fixed_point
+from lightpen.verification.length import measure_length
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.records import (
+    articulation_entries,
+    circle_entries,
+    drift_entries,
+    fixed_point_entries,
+    length_entries,
+    rejected_entries,
+    verification_record,
+)
+from lightpen.verification.sources import TouchRun, instrument_of, touch_run
+from lightpen.verification.texts import (
+    articulation_text,
+    circle_text,
+    drift_text,
+    fixed_point_text,
+    length_text,
+)
+from lightpen.verification.touch import Touch
+from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
+
+
+def add_verify(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen verify`` and what it verifies."""
+    kinds = parser.add_subparsers(required=True, metavar="WHAT")
+    _add_fixed_point(
+        kinds.add_parser("fixed-point", help="the cone again, in new postures")
+    )
+    _add_circle(kinds.add_parser("circle", help="a ring of certified radius"))
+    _add_length(kinds.add_parser("length", help="a certified length"))
+    _add_articulation(
+        kinds.add_parser("articulation", help="one point, in the form of ISO 10360-12")
+    )
+    _add_drift(kinds.add_parser("drift", help="whether the camera moved meanwhile"))
+    add_verify_pen(kinds.add_parser("pen", help="the LEDs over several swings"))
+
+
+def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_fixed_point)
+    parser.add_argument(
+        "images",
+        nargs="+",
+        metavar="IMAGES",
+        help="a folder, a pattern, a video, or the record of a swing",
+    )
+    parser.add_argument(
+        "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
+    )
+    _add_common(parser, "across", "along")
+
+
+def _add_circle(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_circle)
+    _add_runs(parser, "once round the ring")
+    parser.add_argument(
+        "--radius", type=above_zero, required=True, metavar="MM", help="certified"
+    )
+    _add_certified_uncertainty(parser)
+    parser.add_argument(
+        "--ball-diameter",
+        type=above_zero,
+        metavar="MM",
+        help="of the probe, where it touched a bore or a boss and not a groove",
+    )
+    parser.add_argument("--surface", choices=("bore", "boss"), default="bore")
+    _add_common(parser, "radius", "form")
+
+
+def _add_length(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_length)
+    _add_runs(parser, "both ends of the length at one place")
+    parser.add_argument(
+        "--length", type=above_zero, required=True, metavar="MM", help="certified"
+    )
+    _add_certified_uncertainty(parser)
+    _add_common(parser, "length")
+
+
+def _add_articulation(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_articulation)
+    _add_runs(
+        parser, "one posture; a single run holds five postures, one after the other"
+    )
+    _add_common(parser, "location")
+
+
+def _add_drift(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_drift)
+    _add_runs(parser, "one visit of a cone that stands still, in order of time")
+    _add_common(parser, "drift")
+
+
+def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument(
+        "runs",
+        nargs="+",
+        metavar="RUN",
+        help=f"a folder, a pattern, a video or a record: {what}",
+    )
+
+
+def _add_certified_uncertainty(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--certified-uncertainty",
+        type=not_negative,
+        default=0.0,
+        metavar="MM",
+        help="U (k = 2) of what is certified",
+    )
+
+
+def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
+    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument("--pen", type=Path, metavar="FILE")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--tip",
+        type=Path,
+        required=True,
+        metavar="RESULT.json",
+        help="the calibration to verify",
+    )
+    parser.add_argument(
+        "--frames",
+        type=int,
+        choices=range(1, 101),
+        default=1,
+        metavar="N",
+        help="images of a touch, through which the pen is held still, such as "
+        f"{FAST} or for a precise one {PRECISE}; 1 unless said: each image is a touch",
+    )
+    usual = VerificationLimits()
+    for name in limits:
+        parser.add_argument(
+            f"--limit-{name}",
+            type=above_zero,
+            default=getattr(usual, name),
+            metavar="MM",
+            help=f"{getattr(usual, name):g} unless said",
+        )
+    add_json(parser)
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """The touches of all runs, and what they were measured with.
+
+    Attributes
+    ----------
+    cone_cam : (3,) array or None
+        Of the calibration; None before another camera.
+    """
+
+    calibration: CalibrationFile
+    instrument: Instrument
+    runs: tuple[TouchRun, ...]
+    files: tuple[Path, ...]
+    camera_file: Path
+    pen_file: Path
+    nominal_tip: FloatArray | None
+    cone_cam: FloatArray | None
+
+    @property
+    def touches(self) -> list[tuple[str, Sequence[Touch]]]:
+        return [(run.name, run.touches) for run in self.runs]
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Images, and the files that they bring if they are the record of a swing."""
+
+    name: str
+    images: ImageSource
+    camera: Camera | None = None
+    camera_file: Path | None = None
+    pen: Pen | None = None
+    pen_file: Path | None = None
+    mask: FloatArray | None = None
+
+
+@printing
+def _fixed_point(options: argparse.Namespace) -> None:
+    measured = _measure(options, [tuple(options.images)])
+    found = measure_fixed_point(
+        measured.runs[0].touches,
+        measured.instrument,
+        _limits(options),
+        measured.nominal_tip,
+        measured.cone_cam,
+    )
+    _tell(
+        *(options, measured, fixed_point_text, found, "fixed point"),
+        fixed_point_entries(found, measured.instrument),
+    )
+
+
+@printing
+def _circle(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    inwards = 1.0 if options.surface == "bore" else -1.0
+    found = measure_circle(
+        measured.touches,
+        measured.instrument,
+        options.radius,
+        _limits(options),
+        certified_uncertainty=options.certified_uncertainty,
+        ball_offset=inwards * (options.ball_diameter or 0.0) / 2,
+    )
+    _tell(
+        *(options, measured, circle_text, found, "circle"),
+        circle_entries(found, measured.instrument),
+    )
+
+
+@printing
+def _length(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    found = measure_length(
+        measured.touches,
+        measured.instrument,
+        options.length,
+        _limits(options),
+        certified_uncertainty=options.certified_uncertainty,
+    )
+    _tell(
+        *(options, measured, length_text, found, "length"),
+        length_entries(found, measured.instrument),
+    )
+
+
+@printing
+def _articulation(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    postures = measured.touches
+    if len(postures) == 1:
+        (_, touches), n = postures[0], N_TOUCHES
+        postures = [
+            (str(i + 1), touches[n * i : n * i + n])
+            for i in range(max(len(touches) // n, N_POSTURES))
+        ]
+    found = measure_articulation(postures, measured.instrument, _limits(options))
+    _tell(
+        *(options, measured, articulation_text, found, "articulation"),
+        articulation_entries(found),
+    )
+
+
+@printing
+def _drift(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    found = measure_drift(measured.touches, measured.instrument, _limits(options))
+    _tell(*(options, measured, drift_text, found, "drift"), drift_entries(found))
+
+
+def _measure(
+    options: argparse.Namespace, places: Sequence[tuple[str, ...]]
+) -> _Measured:
+    require_other_file(options.json, options.camera, options.pen, options.tip)
+    calibration = read_calibration(options.tip)
+    found = [_place(each) for each in places]
+    camera, camera_file = _camera(options, found[0])
+    pen, pen_file = _pen(options, found[0])
+    for place in found:
+        require_other_file(options.json, *place.images.files)
+    instrument = instrument_of(calibration, camera, camera_file, pen, pen_file)
+    settling = 0 if options.frames == 1 else SETTLING
+    rules = TouchRules(options.frames, settling)
+    runs = []
+    with progress("Finding LEDs") as report:
+        for place in found:
+            images = place.name, place.images
+            runs.append(touch_run(*images, instrument, rules, place.mask))
+            report(len(runs) / len(found))
+    nominal = getattr(options, "nominal_tip", None)
+    for known in (pen.nominal_tip, calibration.nominal_tip):
+        nominal = known if nominal is None else nominal
+    is_same_camera = hashed(camera_file).sha256 == calibration.camera_sha256
+    return _Measured(
+        calibration=calibration,
+        instrument=instrument,
+        runs=tuple(runs),
+        files=tuple(file for place in found for file in place.images.files),
+        camera_file=camera_file,
+        pen_file=pen_file,
+        nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
+        cone_cam=calibration.cone_cam if is_same_camera else None,
+    )
+
+
+def _place(where: tuple[str, ...]) -> _Place:
+    folder = Path(where[0])
+    if len(where) == 1 and is_record(folder):
+        own = source(open_record(folder))
+        return _Place(
+            name=where[0],
+            images=own.images,
+            camera=own.camera,
+            camera_file=own.camera_file,
+            pen=own.pen,
+            pen_file=own.pen_file,
+            mask=own.mask,
+        )
+    return _Place(where[0], find_images(*where))
+
+
+def _camera(options: argparse.Namespace, place: _Place) -> tuple[Camera, Path]:
+    if options.camera is not None:
+        return read_camera(options.camera), options.camera
+    if place.camera is None or place.camera_file is None:
+        raise lacking("--camera")
+    return place.camera, place.camera_file
+
+
+def _pen(options: argparse.Namespace, place: _Place) -> tuple[Pen, Path]:
+    if options.pen is not None:
+        pen = read_pen(options.pen, options.units, options.led_diameter, None)
+        return pen, options.pen
+    if place.pen is None or place.pen_file is None:
+        raise lacking("--pen")
+    return place.pen, place.pen_file
+
+
+def _limits(options: argparse.Namespace) -> VerificationLimits:
+    given = {
+        item.name: getattr(options, f"limit_{item.name}")
+        for item in fields(VerificationLimits)
+        if hasattr(options, f"limit_{item.name}")
+    }
+    return replace(VerificationLimits(), **given)
+
+
+def _tell(
+    options: argparse.Namespace,
+    measured: _Measured,
+    text: Callable[[Any, Any], str],
+    found: Any,
+    kind: str,
+    entries: Mapping[str, Any],
+) -> None:
+    """Print a verification, and write its record if that is wanted."""
+    rejected = [each for run in measured.runs for each in run.rejected]
+    print(shown(text(found, rejected)))
+    if not measured.calibration.has_checksum:
+        print(
+            "The calibration was written by a version that kept no checksum: whether "
+            "it was changed since is not known."
+        )
+    if options.json is None:
+        return
+    assessment: Assessment = found.assessment
+    limits = asdict(_limits(options))
+    record = verification_record(
+        kind,
+        {**entries, "rejected": rejected_entries(rejected)},
+        assessment,
+        {name: limits[name] for name in limits if hasattr(options, f"limit_{name}")},
+        {
+            "tip": file_entry(options.tip),
+            "camera": file_entry(measured.camera_file),
+            "pen": file_entry(measured.pen_file),
+            "images": [
+                {"file": file.path.name, "sha256": file.sha256}
+                for file in all_hashed(measured.files)
+            ],
+        },
+    )
+    write_record(options.json, record)
+
+
+def file_entry(path: Path) -> dict[str, str]:
+    """Return a file with its hash."""
+    return {"file": path.name, "sha256": hashed(path).sha256}

@@ -1,0 +1,127 @@
+"""A second swing in another cone at a certified distance: a length for the pen's scale.
+
+One camera sees how the LEDs stand to each other, not how large the pen is. Two cones at
+a known distance tell it: both swings are adjusted together, with one tip, one camera
+and one pen, and the distance of the cones as one more observation.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations
+from lightpen.estimation.adjustment import Adjustment
+from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
+from lightpen.estimation.linearised import BundleState
+from lightpen.estimation.priors import Separation
+from lightpen.estimation.single_images import pose_images, require_fit
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR, Budget
+from lightpen.estimation.unknowns import inverse
+from lightpen.model.camera import Camera
+from lightpen.model.pen import Pen
+
+
+@dataclass(frozen=True, eq=False)
+class SecondSwing:
+    """What images of a swing in a second cone show."""
+
+    observations: Observations
+    separation: Separation
+
+
+@dataclass(frozen=True, eq=False)
+class SecondImages:
+    """The images of a second swing that agree on a tip, (M, L, 2), and their fit."""
+
+    pixels: FloatArray
+    joint: JointFit
+
+    def joined(
+        self, first: BundleState, pixels: FloatArray
+    ) -> tuple[BundleState, FloatArray]:
+        """Return where the adjustment of both swings begins, and the images of both.
+
+        Parameters
+        ----------
+        first : BundleState
+            Of the first swing.
+        pixels : (N, 1, L, 2) array
+            Its images, px.
+        """
+        numbers = [len(pixels), len(self.pixels)]
+        state = replace(
+            first,
+            rotations=np.concatenate([first.rotations, self.joint.rotations]),
+            at_second=np.repeat([False, True], numbers),
+            between_rig=self.joint.cone_cam - first.cone_rig,
+        )
+        return state, np.concatenate([pixels, self.pixels[:, None]])
+
+
+def second_images(camera: Camera, pen: Pen, observations: Observations) -> SecondImages:
+    """Return the images of a second swing that agree on a tip.
+
+    Raises
+    ------
+    CalibrationError
+        They do not; the text says what is missing.
+    """
+    part = pose_images(camera, pen, observations)
+    pixels = observations.pixels[part.chosen]
+    joint = fit_contact(
+        ContactModel.of(camera, pen, pixels),
+        part.poses.of(part.kept).rotations,
+        *(part.pivot.tip_pen, part.pivot.pivot_cam),
+    )
+    require_fit(joint.sigma)
+    return SecondImages(pixels, joint)
+
+
+@dataclass(frozen=True, eq=False)
+class SecondCone:
+    """What a second swing made of a tip.
+
+    Attributes
+    ----------
+    cone_cam : (3,) array
+        Cone point in the camera frame, mm.
+    n_used : int
+        Images of the second swing that take part.
+    distance : float
+        Of the cones as they were adjusted, mm.
+    uncertainty_without, uncertainty_with : (3,) array
+        U (k = 2) of the tip by both swings without the distance, and with it, mm.
+    """
+
+    cone_cam: FloatArray
+    n_used: int
+    separation: Separation
+    distance: float
+    uncertainty_without: FloatArray
+    uncertainty_with: FloatArray
+
+
+def second_cone(adjusted: Adjustment, budget: Budget, n_first: int) -> SecondCone:
+    """Return what a second swing made of a tip; ``n_first`` images are of the first.
+
+    The adjustment holds a separation.
+    """
+    bundle, allowed = adjusted.bundle, adjusted.allowed
+    separation = adjusted.priors.separation
+    if separation is None:
+        raise ValueError("`adjusted` must hold the separation of two cones.")
+    at = allowed.columns.between
+    measured = allowed.measured_information.copy()
+    measured[at, at] = 0.0
+    without = inverse(allowed.information + allowed.prior_information + measured)
+    grown = budget.covariance + (without - allowed.covariance)[:6, :6]
+    state = bundle.state
+    return SecondCone(
+        cone_cam=state.cone_rig + state.between_rig,
+        n_used=int(bundle.used[n_first:].any(axis=(1, 2)).sum()),
+        separation=separation,
+        distance=float(np.linalg.norm(state.between_rig)),
+        uncertainty_without=COVERAGE_FACTOR * np.sqrt(np.diag(grown)[:3]),
+        uncertainty_with=budget.expanded_uncertainty[:3],
+    )

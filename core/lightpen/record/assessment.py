@@ -1,0 +1,126 @@
+"""A solved swing beside what is in force: its verdict, and what to look into."""
+
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from lightpen.errors import FileError
+from lightpen.estimation.report import warnings_of
+from lightpen.estimation.verdict import (
+    Change,
+    Verdict,
+    change_since,
+    distance_from_nominal,
+    judge,
+    judge_change,
+    judge_unknown,
+)
+from lightpen.local_time import local_time
+from lightpen.messages import last_unknown, too_little_tilt
+from lightpen.model.coverage import dial_counts
+from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.record.archive import Archive
+from lightpen.record.names import Names
+from lightpen.record.reading import (
+    Record,
+    is_of_recording,
+    recorded_limits,
+    recorded_names,
+    recorded_origin,
+)
+from lightpen.record.results import Result
+from lightpen.record.solving import Solution
+from lightpen.sentences import Sentence, sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """What a solved swing is worth.
+
+    Attributes
+    ----------
+    last : Result or None
+        In force for this pen and tip; None if there is none, or it cannot be read.
+    change : Change or None
+        Since that.
+    doubts : tuple of Sentence
+        What to look into besides the reason of the verdict, what matters most first.
+    """
+
+    verdict: Verdict
+    last: Result | None
+    change: Change | None
+    doubts: tuple[Sentence, ...]
+
+
+def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
+    """Judge a solved swing by itself, and beside what is in force.
+
+    Parameters
+    ----------
+    record : Record
+        Of the solution.
+    """
+    names, origin = recorded_names(record), recorded_origin(record)
+    limits = recorded_limits(record)
+    verdict = judge(solution.calibration, limits)
+    try:
+        last, unknown = _last(archive, names, origin), None
+    except FileError as error:
+        last, unknown = None, error.sentence
+        verdict = judge_unknown(verdict, unknown)
+    change, date = None, ""
+    if last is not None:
+        date = f"{local_time(last.accepted):%Y-%m-%d}"
+        change = _change(solution, last)
+        verdict = judge_change(verdict, change, date)
+    all_doubts = chain(
+        [] if unknown is None else [last_unknown(unknown)],
+        [] if change is None or not change.is_unexplained else [change.told(date)],
+        _far_from_nominal(solution),
+        _bare_sides(solution, limits) if is_of_recording(record) else [],
+        warnings_of(solution.calibration),
+    )
+    doubts = tuple(each for each in all_doubts if each.code != verdict.reason.code)
+    return Assessment(verdict, last, change, doubts)
+
+
+def _last(archive: Archive, names: Names, origin: Origin | None) -> Result | None:
+    is_simulated = origin is Origin.SIMULATED
+    return archive.in_force(names.pen, names.tip, is_simulated=is_simulated)
+
+
+def _change(solution: Solution, last: Result) -> Change:
+    calibration = solution.calibration
+    return change_since(
+        calibration.joint.tip_pen,
+        calibration.budget.expanded_uncertainty[:3],
+        last.tip_pen,
+        last.uncertainty,
+    )
+
+
+def _far_from_nominal(solution: Solution) -> list[Sentence]:
+    nominal = solution.source.pen.nominal_tip
+    distance = distance_from_nominal(solution.calibration.joint.tip_pen, nominal)
+    if distance is None:
+        return []
+    return [
+        sentence(
+            "doubt.far-from-nominal",
+            "The tip lies {distance:.1f} mm from its nominal place. Is it the tip that "
+            "is named?",
+            distance=distance,
+        )
+    ]
+
+
+def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Sentence]:
+    """Name the postures that recorded images lack: nobody was asked to lean there."""
+    counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
+    bare = np.flatnonzero(counts == 0)
+    if not len(bare):
+        return []
+    return [too_little_tilt(limits.min_per_field * len(bare), map(int, bare))]

@@ -1,0 +1,292 @@
+"""A calibration read back from its file: what `lightpen calibrate` wrote, or a result.
+
+Both hold the same record of the calibration, and tell when they were changed since.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from msgspec import Meta, Struct
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Digest,
+    Length,
+    Moment,
+    Vector,
+    has_checksum,
+    in_shape,
+    parse_json,
+)
+from lightpen.record.results import Row, has_head, parse_result
+from lightpen.sentences import sentence
+
+WHAT = sentence("file.calibration", "calibration")
+LIMIT = 64 * MEGABYTE
+
+
+class _File(Struct):
+    file: str
+    sha256: Digest
+
+
+class _Inputs(Struct):
+    camera: _File
+    pen: _File
+
+
+class _Instrument(Struct):
+    intrinsics: list[float]
+    disc_diameter_mm: Annotated[float, Meta(gt=0, le=1000)]
+    leds_mm: list[Vector]
+    covariance: list[list[float]]
+
+
+class _Led(Struct):
+    led: int
+    seen: int
+    used: int
+    displacement_mm: tuple[float | None, float | None, float | None]
+
+
+class _SeenLed(Struct):
+    led: Annotated[int, Meta(ge=1)]
+    x_px: Length
+    y_px: Length
+
+
+class _Frame(Struct):
+    file: str
+    used: bool
+    leds: list[_SeenLed]
+
+
+class _Record(Struct):
+    created: Moment
+    method: str
+    tip_pen_mm: Vector
+    cone_cam_mm: Vector
+    covariance: tuple[Row, Row, Row, Row, Row, Row]
+    expanded_uncertainty_mm: Vector
+    sigma_px: Annotated[float, Meta(ge=0)]
+    inputs: _Inputs
+    leds: list[_Led]
+    frames: list[_Frame]
+    nominal_tip_mm: Vector | None = None
+    instrument: _Instrument | None = None
+    rig: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class FittedInstrument:
+    """What a swing left to measure with; see `lightpen.estimation.instrument`.
+
+    Attributes
+    ----------
+    intrinsics : (k,) array
+        ``fx fy cx cy`` and the distortion coefficients.
+    leds : (L, 3) array
+        mm.
+    covariance : (q, q) array
+        Of tip, intrinsics, diameter and LEDs.
+    """
+
+    intrinsics: FloatArray
+    diameter: float
+    leds: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationFile:
+    """A calibration as its file has it.
+
+    Attributes
+    ----------
+    pen, tip : str
+        Names of a result; empty of a record that nobody accepted.
+    when : datetime
+        When it was accepted, or made.
+    method : str
+        Which estimator the tip is by.
+    tip_pen, cone_cam : (3,) array
+        mm.
+    covariance : (6, 6) array
+        Of both, mm^2.
+    uncertainty : (3,) array
+        U (k = 2) of the tip, mm.
+    sigma : float
+        Noise of one image coordinate, px.
+    nominal_tip : (3,) array or None
+        mm.
+    camera_sha256, pen_sha256 : str
+        Of the files that it was made with.
+    pen_file : str
+        Name of the pen file.
+    displacements : (L, 3) array
+        How far each LED sits off its place in the pen file, mm; NaN if not known.
+    instrument : FittedInstrument or None
+        None of a version that did not keep it.
+    frames : tuple of str
+        Names of all images.
+    used : (N,) array of bool
+    pixels : (N, L, 2) array
+        LED centres in the images, px; NaN where not seen.
+    is_of_rig : bool
+        Whether several cameras looked; the frames are then of all of them.
+    has_checksum : bool
+        Whether a change of the file would have been noticed.
+    """
+
+    path: Path
+    pen: str
+    tip: str
+    when: datetime
+    method: str
+    tip_pen: FloatArray
+    cone_cam: FloatArray
+    covariance: FloatArray
+    uncertainty: FloatArray
+    sigma: float
+    nominal_tip: FloatArray | None
+    camera_sha256: str
+    pen_sha256: str
+    pen_file: str
+    displacements: FloatArray
+    instrument: FittedInstrument | None
+    frames: tuple[str, ...]
+    used: BoolArray
+    pixels: FloatArray
+    is_of_rig: bool
+    has_checksum: bool
+
+    @property
+    def n_leds(self) -> int:
+        """Number of LEDs of the pen."""
+        return len(self.displacements)
+
+
+def read_calibration(path: Path) -> CalibrationFile:
+    """Read a calibration.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is not as it was written.
+    """
+    data = read_bytes(path, WHAT, LIMIT)
+    if has_head(data):
+        result = parse_result(data, path, Path)
+        names, when = result.names, result.accepted
+        return _calibration(
+            path, result.calibration, names.pen, names.tip, when, is_checked=True
+        )
+    try:
+        is_checked = has_checksum(data)
+    except DamagedError as error:
+        raise _changed(path) from error
+    try:
+        tree = parse_json(data, dict[str, Any])
+    except DamagedError as error:
+        raise _changed(path) if is_checked else _other(path) from error
+    return _calibration(path, tree, "", "", None, is_checked=is_checked)
+
+
+def _calibration(
+    path: Path,
+    tree: Any,
+    pen: str,
+    tip: str,
+    when: datetime | None,
+    *,
+    is_checked: bool,
+) -> CalibrationFile:
+    try:
+        record = in_shape(tree, _Record)
+        instrument = _instrument(record)
+        pixels = _pixels(record)
+    except DamagedError as error:
+        raise _other(path) from error
+    return CalibrationFile(
+        path=path,
+        pen=pen,
+        tip=tip,
+        when=when or record.created,
+        method=record.method,
+        tip_pen=np.array(record.tip_pen_mm),
+        cone_cam=np.array(record.cone_cam_mm),
+        covariance=np.array(record.covariance),
+        uncertainty=np.array(record.expanded_uncertainty_mm),
+        sigma=record.sigma_px,
+        nominal_tip=(
+            None if record.nominal_tip_mm is None else np.array(record.nominal_tip_mm)
+        ),
+        camera_sha256=record.inputs.camera.sha256,
+        pen_sha256=record.inputs.pen.sha256,
+        pen_file=record.inputs.pen.file,
+        displacements=np.array(
+            [each.displacement_mm for each in record.leds], dtype=np.float64
+        ).reshape(-1, 3),
+        instrument=instrument,
+        frames=tuple(frame.file for frame in record.frames),
+        used=np.array([frame.used for frame in record.frames], dtype=bool),
+        pixels=pixels,
+        is_of_rig=record.rig is not None,
+        has_checksum=is_checked,
+    )
+
+
+def _instrument(record: _Record) -> FittedInstrument | None:
+    entry = record.instrument
+    if entry is None:
+        return None
+    n_parameters = 4 + len(entry.intrinsics) + 3 * len(entry.leds_mm)
+    n_leds, n_rows = len(entry.leds_mm), len(entry.covariance)
+    if (n_leds, n_rows) != (len(record.leds), n_parameters) or any(
+        len(row) != n_parameters for row in entry.covariance
+    ):
+        raise DamagedError("The covariance is of another instrument.")
+    return FittedInstrument(
+        intrinsics=np.array(entry.intrinsics),
+        diameter=entry.disc_diameter_mm,
+        leds=np.array(entry.leds_mm),
+        covariance=np.array(entry.covariance),
+    )
+
+
+def _pixels(record: _Record) -> FloatArray:
+    pixels = np.full((len(record.frames), len(record.leds), 2), np.nan)
+    for i, frame in enumerate(record.frames):
+        for led in frame.leds:
+            if led.led > len(record.leds):
+                raise DamagedError("An LED is seen that the pen does not have.")
+            pixels[i, led.led - 1] = led.x_px, led.y_px
+    return pixels
+
+
+def _other(path: Path) -> UsageError:
+    return UsageError(
+        sentence(
+            "calibration-file.other",
+            "{path} is no record of a calibration. Give what the command calibrate "
+            "wrote, or an accepted result.",
+            path=printable(str(path)),
+        )
+    )
+
+
+def _changed(path: Path) -> FileError:
+    return FileError(
+        sentence(
+            "calibration-file.changed",
+            "The calibration {path} is not as it was written: it was changed or "
+            "damaged since. Restore it from a copy, or calibrate again.",
+            path=printable(str(path)),
+        )
+    )

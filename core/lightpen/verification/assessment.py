@@ -1,0 +1,53 @@
+"""What a verification found: a grade, the reason that counts most, and what to do."""
+
+from dataclasses import dataclass
+
+from lightpen.estimation.verdict import Grade
+from lightpen.sentences import Sentence, sentence
+
+USE_TIP = sentence("verification.use-tip", "Next: use the tip.")
+CALIBRATE_AGAIN = sentence(
+    "verification.calibrate-again",
+    "Next: seat the tip firmly, calibrate it again, and verify the new result.",
+)
+VERIFY_AGAIN = sentence(
+    "verification.verify-again",
+    "Next: clean tip and artefact, clamp artefact and camera, and verify again.",
+)
+CHECK_FILES = sentence(
+    "verification.check-files",
+    "Next: check that camera file and LED file are of this camera and this pen.",
+)
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What a verification found.
+
+    Accepted is what lies within its limit (simple acceptance); U is stated beside it
+    and may itself not be larger than the limit.
+    """
+
+    grade: Grade
+    reason: Sentence
+    next_step: Sentence
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether nothing was found against the tip."""
+        return self.grade is Grade.PASS
+
+
+def accepted(reason: Sentence) -> Assessment:
+    """Return that all is well."""
+    return Assessment(Grade.PASS, reason, USE_TIP)
+
+
+def check(reason: Sentence, next_step: Sentence) -> Assessment:
+    """Return that something is to be looked into."""
+    return Assessment(Grade.CHECK, reason, next_step)
+
+
+def refused(reason: Sentence, next_step: Sentence) -> Assessment:
+    """Return that a limit is not kept."""
+    return Assessment(Grade.REPEAT, reason, next_step)

@@ -1,0 +1,142 @@
+"""Whether the camera moved during a session: a witness touched before and after.
+
+The witness is a cone that stands still, touched at the start, at the end and as often
+in between as one likes. What tip, LEDs and camera have wrong moves all visits alike
+where the pen is held alike, so that it hardly counts in a difference. What the witness
+moved by is counted into points that were measured in between as a rectangular
+distribution of that half-width [1]_.
+
+References
+----------
+.. [1] JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 4.3.7.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.sentences import sentence
+from lightpen.verification.assessment import (
+    VERIFY_AGAIN,
+    Assessment,
+    accepted,
+    refused,
+)
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.touch import Touch
+
+MIN_VISITS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """A witness visited several times.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the visits.
+    moves : (N, 3) array
+        Of the witness since the first visit, camera frame, mm.
+    uncertainties : (N, 3) array
+        U (k = 2) of each, mm.
+    """
+
+    names: tuple[str, ...]
+    moves: FloatArray
+    uncertainties: FloatArray
+    assessment: Assessment
+
+    @property
+    def share(self) -> FloatArray:
+        """Standard uncertainty by it of a point measured meanwhile, (3,), mm."""
+        return np.asarray(np.abs(self.moves).max(axis=0) / np.sqrt(3))
+
+
+def measure_drift(
+    visits: Sequence[tuple[str, Sequence[Touch]]],
+    instrument: Instrument,
+    limits: VerificationLimits,
+) -> Drift:
+    """Measure how a witness moves from visit to visit.
+
+    Parameters
+    ----------
+    visits : sequence of (str, sequence of Touch)
+        Name and touches of each, in the order of time.
+
+    Raises
+    ------
+    CalibrationError
+        There are fewer than two visits.
+    """
+    if len(visits) < MIN_VISITS:
+        raise CalibrationError(
+            sentence(
+                "drift.too-few",
+                "The witness was visited once, which tells nothing of a drift. Touch "
+                "it before, during and after the session.",
+            )
+        )
+    points, rows, noises = [], [], []
+    for _, touches in visits:
+        points.append(np.mean([touch.point_cam for touch in touches], axis=0))
+        rows.append(np.mean([touch.sensitivity for touch in touches], axis=0))
+        noises.append(sum(touch.noise for touch in touches) / len(touches) ** 2)
+    moves = np.array(points) - points[0]
+    variances = np.zeros_like(moves)
+    for i in range(1, len(visits)):
+        row = rows[i] - rows[0]
+        covariance = row @ instrument.covariance @ row.T + noises[i] + noises[0]
+        variances[i] = np.diag(covariance)
+    uncertainties = COVERAGE_FACTOR * np.sqrt(variances)
+    names = tuple(name for name, _ in visits)
+    return Drift(
+        names=names,
+        moves=moves,
+        uncertainties=uncertainties,
+        assessment=_assessment(names, moves, uncertainties, limits),
+    )
+
+
+def _assessment(
+    names: tuple[str, ...],
+    moves: FloatArray,
+    uncertainties: FloatArray,
+    limits: VerificationLimits,
+) -> Assessment:
+    lengths = np.linalg.norm(moves, axis=1)
+    worst = int(np.argmax(lengths))
+    axis = int(np.argmax(np.abs(moves[worst])))
+    distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
+    if distance > limits.drift:
+        return refused(
+            sentence(
+                "drift.moved",
+                "The witness moved by {distance:.4f} mm between {first} and {visit} (U "
+                "{uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the "
+                "witness is not clamped, or the camera was not warm yet. What was "
+                "measured in between is off by as much.",
+                first=names[0],
+                visit=names[worst],
+                distance=distance,
+                uncertainty=uncertainty,
+                limit=limits.drift,
+            ),
+            VERIFY_AGAIN,
+        )
+    return accepted(
+        sentence(
+            "drift.good",
+            "The witness stays within {distance:.4f} mm (U {uncertainty:.4f} mm, limit "
+            "{limit:.4f} mm).",
+            distance=distance,
+            uncertainty=uncertainty,
+            limit=limits.drift,
+        )
+    )

@@ -1,0 +1,287 @@
+"""Taking touches by themselves: a point is taken when the pen is held still on it.
+
+`advance` takes the state and what the next image shows, and returns the new state and
+what happened. It has no clock and no threads: live images and recorded ones go through
+the same steps. The pen is still while its tip stays within the noise of its images and
+its posture hardly turns. One image that disagrees is left out and named; a second one
+means that the pen has moved, and what was held so far counts no more. After a touch the
+pen must move on before the next one begins.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.pivot import GATE, in_deviations, tip_covariances
+from lightpen.model.posture import angles_between
+from lightpen.verification.touch import RejectedFrame, StillFrames, TouchFrame
+
+FAST, PRECISE = 5, 30  # images of a touch
+SETTLING = 3  # images, after which a hand that stops has stopped
+RESTING = 0.01  # mm, by which a tip at rest may move
+STILL_TURN = np.radians(1.0)
+MAX_LOST = 5  # images in a row without the pen; more end a touch
+HELD_ENOUGH = 3  # images, from which on it is told that a touch was broken off
+MAX_PATH = 20  # images
+FAR_ENOUGH = 2.0  # mm, that tell where the tip came from
+
+
+class TouchPhase(StrEnum):
+    """Where a touch stands."""
+
+    MOVING = "moving"  # or not seen
+    HOLDING = "holding"
+    TAKEN = "taken"  # the pen has to move on
+    KNOWN = "known"  # likewise: this point was touched before
+
+
+class TouchHappening(StrEnum):
+    """What can happen."""
+
+    TAKEN = "taken"
+    BROKEN_OFF = "broken off"
+
+
+@dataclass(frozen=True)
+class TouchRules:
+    """When a touch is taken.
+
+    Attributes
+    ----------
+    n_frames : int
+        Images of a touch.
+    n_settling : int
+        Images before them through which the pen is still already.
+    min_turn : float
+        Angle by which its posture differs from that of touches before, rad, and
+    min_distance : float
+        distance by which its place does, mm: one of the two is enough.
+    """
+
+    n_frames: int = FAST
+    n_settling: int = SETTLING
+    min_turn: float = 0.0
+    min_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.n_frames < 1 or self.n_settling < 0:
+            raise ValueError(f"Nothing can be touched by {self}.")
+
+
+@dataclass(frozen=True, eq=False)
+class SeenTip:
+    """The tip by one image: place (3,), mm, and its covariance by noise, (3, 3)."""
+
+    frame: TouchFrame
+    tip_cam: FloatArray
+    noise: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TouchState:
+    """The touches so far.
+
+    Attributes
+    ----------
+    held : tuple of SeenTip
+        Through which the pen is still.
+    doubted : SeenTip or None
+        The last one, if it disagrees.
+    rejected : tuple of RejectedFrame
+        Between those that are held.
+    n_lost : int
+        Images in a row without the pen.
+    path : tuple of array
+        Where the tip was before, (3,) each, mm.
+    taken : tuple of StillFrames
+        What was touched.
+    places : tuple of SeenTip
+        One image of each.
+    """
+
+    phase: TouchPhase = TouchPhase.MOVING
+    held: tuple[SeenTip, ...] = ()
+    doubted: SeenTip | None = None
+    rejected: tuple[RejectedFrame, ...] = ()
+    n_lost: int = 0
+    path: tuple[FloatArray, ...] = ()
+    taken: tuple[StillFrames, ...] = ()
+    places: tuple[SeenTip, ...] = ()
+
+    def progress(self, rules: TouchRules) -> float:
+        """Return how much of a touch is taken, 0 to 1."""
+        if self.phase is not TouchPhase.HOLDING:
+            return 0.0
+        return len(self.held) / (rules.n_frames + rules.n_settling)
+
+
+@dataclass(frozen=True)
+class TouchEvent:
+    """Something that happened, and the images that it is about."""
+
+    what: TouchHappening
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class TouchTransition:
+    """The touches after one more image."""
+
+    state: TouchState
+    events: tuple[TouchEvent, ...] = ()
+
+
+def advance(
+    instrument: Instrument,
+    rules: TouchRules,
+    state: TouchState,
+    name: str,
+    sighting: Sighting,
+) -> TouchTransition:
+    """Take one more image."""
+    if not sighting.has_pose or sighting.is_blurred:
+        reason = sighting.reason or Reason.BLURRED
+        return _without_pose(state, RejectedFrame(name, reason))
+    seen = _seen(instrument, name, sighting)
+    state = replace(state, n_lost=0)
+    if not state.held:
+        return _moved_to(rules, state, (seen,))
+    if _agrees(state.held, seen):
+        rejected = state.rejected
+        if state.doubted is not None:
+            rejected = (*rejected, RejectedFrame(_name(state.doubted), Reason.SLIPPED))
+        state = replace(state, doubted=None, rejected=rejected)
+        if state.phase is not TouchPhase.HOLDING:
+            return TouchTransition(state)
+        return _held(rules, replace(state, held=(*state.held, seen)))
+    if state.doubted is None:
+        return TouchTransition(replace(state, doubted=seen))
+    both_elsewhere = _agrees((state.doubted,), seen)
+    return _moved_to(rules, state, (state.doubted, seen) if both_elsewhere else (seen,))
+
+
+def take_all(
+    instrument: Instrument,
+    rules: TouchRules,
+    images: Iterable[tuple[str, Sighting]],
+) -> TouchState:
+    """Take recorded images (name, sighting), one after the other."""
+    state = TouchState()
+    for name, sighting in images:
+        state = advance(instrument, rules, state, name, sighting).state
+    return state
+
+
+def _seen(instrument: Instrument, name: str, sighting: Sighting) -> SeenTip:
+    frame = TouchFrame(name, sighting.pixels, sighting.rotation, sighting.translation)
+    R = sighting.rotation
+    sigma = max(sighting.sigma, instrument.sigma)
+    noise = tip_covariances(
+        R[None], sighting.cofactors[None] * sigma**2, instrument.tip_pen
+    )[0]
+    return SeenTip(frame, R @ instrument.tip_pen + sighting.translation, noise)
+
+
+def _name(seen: SeenTip) -> str:
+    return seen.frame.name
+
+
+def _agrees(held: tuple[SeenTip, ...], seen: SeenTip) -> bool:
+    """Return whether the pen is where it was held."""
+    turned = angles_between(seen.frame.rotation[None], held[0].frame.rotation[None])[
+        0, 0
+    ]
+    if turned > STILL_TURN:
+        return False
+    n = len(held)
+    middle = np.mean([each.tip_cam for each in held], axis=0)
+    noise = seen.noise + held[0].noise / n + RESTING**2 * np.eye(3)
+    return bool(in_deviations((seen.tip_cam - middle)[None], noise[None])[0] <= GATE)
+
+
+def _without_pose(state: TouchState, rejected: RejectedFrame) -> TouchTransition:
+    state = replace(state, n_lost=state.n_lost + 1)
+    if state.n_lost > MAX_LOST:
+        return _let_go(state)
+    if state.phase is TouchPhase.HOLDING:
+        state = replace(state, rejected=(*state.rejected, rejected))
+    return TouchTransition(state)
+
+
+def _let_go(state: TouchState) -> TouchTransition:
+    """Return to a pen that moves; say so if a touch was broken off."""
+    events: tuple[TouchEvent, ...] = ()
+    if state.phase is TouchPhase.HOLDING and len(state.held) >= HELD_ENOUGH:
+        names = tuple(map(_name, state.held))
+        events = (TouchEvent(TouchHappening.BROKEN_OFF, names),)
+    path = (*state.path, *(each.tip_cam for each in state.held[-1:]))[-MAX_PATH:]
+    return TouchTransition(
+        replace(
+            state,
+            phase=TouchPhase.MOVING,
+            held=(),
+            doubted=None,
+            rejected=(),
+            path=path,
+        ),
+        events,
+    )
+
+
+def _moved_to(
+    rules: TouchRules, state: TouchState, held: tuple[SeenTip, ...]
+) -> TouchTransition:
+    gone = _let_go(state)
+    again = _held(rules, replace(gone.state, phase=TouchPhase.HOLDING, held=held))
+    return TouchTransition(again.state, (*gone.events, *again.events))
+
+
+def _held(rules: TouchRules, state: TouchState) -> TouchTransition:
+    """Take the touch if it was held long enough."""
+    if len(state.held) < rules.n_settling + rules.n_frames:
+        return TouchTransition(state)
+    used = state.held[rules.n_settling :]
+    if not _is_new(rules, state, used[0]):
+        return TouchTransition(replace(state, phase=TouchPhase.KNOWN))
+    still = StillFrames(
+        frames=tuple(each.frame for each in used),
+        rejected=state.rejected,
+        approach_cam=_approach(state.path, used[0].tip_cam),
+    )
+    taken = replace(
+        state,
+        phase=TouchPhase.TAKEN,
+        rejected=(),
+        path=(),
+        taken=(*state.taken, still),
+        places=(*state.places, used[0]),
+    )
+    event = TouchEvent(TouchHappening.TAKEN, tuple(map(_name, used)))
+    return TouchTransition(taken, (event,))
+
+
+def _is_new(rules: TouchRules, state: TouchState, seen: SeenTip) -> bool:
+    for before in state.places:
+        turned = angles_between(seen.frame.rotation[None], before.frame.rotation[None])[
+            0, 0
+        ]
+        distance = float(np.linalg.norm(seen.tip_cam - before.tip_cam))
+        if turned < rules.min_turn and distance < rules.min_distance:
+            return False
+    return True
+
+
+def _approach(path: tuple[FloatArray, ...], tip_cam: FloatArray) -> FloatArray | None:
+    """Return the direction in which the tip came, if it came from far enough."""
+    for before in reversed(path):
+        way = tip_cam - before
+        distance = float(np.linalg.norm(way))
+        if distance > FAR_ENOUGH:
+            return np.asarray(way / distance)
+    return None

@@ -1,0 +1,57 @@
+"""The data folder is shown and can be chosen, and windows that share it say so."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
+
+from lightpen_app.work.settings import Preferences, Settings, data_folder
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard, Walker
+
+SHARED = "Other windows of the program use the data folder"
+
+
+def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
+    open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen_app.work.workbench.COUNTING_MS", 100)
+    first = open_wizard()
+    assert not first.tells(SHARED)
+    second = open_wizard()
+
+    second.until_tells(SHARED)
+    first.until_tells(SHARED)
+    assert first.tells("Other windows of the program that use this folder: 1.")
+
+    second.window.close_unasked()
+    first.until(lambda: not first.tells(SHARED))
+
+
+@pytest.mark.qt_log_ignore(
+    "^This plugin does not support (raise|grabbing)", extend=True
+)
+def test_the_data_folder_is_shown_and_chosen_in_the_options(
+    walker: "Walker", settings: Settings, tmp_path: Path
+) -> None:
+    shown = [text.replace("\u200b", "") for text in walker.texts()]
+    assert str(walker.workbench.folder) in shown
+
+    walker.press(Qt.Key.Key_F10)
+    walker.choose("Data folder...")
+    (dialog,) = walker.window.findChildren(QFileDialog)
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    dialog.fileSelected.emit(str(other))
+    dialog.close()
+
+    walker.until_tells("from the next start of the program on")
+    assert data_folder(settings.preferences()) == other
+    assert walker.workbench.folder != other
+
+
+def test_without_a_choice_the_data_folder_is_the_usual_one() -> None:
+    assert data_folder(Preferences()).name == "lightpen"

@@ -1,0 +1,93 @@
+"""Tests of `lightpen.estimation.monte_carlo`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from lightpen.detection.observations import observe_centers
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.monte_carlo import run_monte_carlo, run_trial, trials_of
+from lightpen.formats.observation_files import Centers
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+S = TypeVar("S")
+T = TypeVar("T")
+N_TRIALS = 40
+
+
+def in_this_process(
+    function: Callable[[S], T], items: Sequence[S], report: Callable[[float], None]
+) -> list[T]:
+    return [function(item) for item in items]
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    rng = np.random.default_rng(3)
+    camera, pen = paper_camera(), replace(paper_pen(), led_sigma=0.002)
+    swing = swing_poses(25, rng, pen=pen, camera=camera)
+    pixels = simulate_centers(
+        camera, pen, swing.rotations, swing.translations, 0.03, rng
+    )
+    centers = Centers(np.arange(1, 26), pixels, Path("centers.csv"))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+
+
+def test_the_linear_budget_agrees_with_trials(calibration: Calibration) -> None:
+    found = run_monte_carlo(calibration, N_TRIALS, in_this_process)
+
+    assert found.n_failed == 0
+    # Four times the precision of so few trials; the benchmark has more.
+    assert np.abs(found.difference).max() < 4
+    low, high = found.interval
+    assert (low < 0).all()
+    assert (high > 0).all()
+
+
+def test_a_trial_is_the_same_every_time(calibration: Calibration) -> None:
+    trials = trials_of(calibration)
+    first, again, other = (run_trial(trials, number) for number in (1, 1, 2))
+
+    assert first is not None
+    assert other is not None
+    np.testing.assert_array_equal(first, again)
+    assert not np.allclose(first, other)
+
+
+def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
+    trials = trials_of(calibration)
+    camera, pen = trials.camera, replace(trials.pen, led_sigma=1e-7)
+    assert camera.covariance is not None
+    exact = replace(
+        trials,
+        camera=replace(camera, covariance=1e-12 * camera.covariance),
+        pen=pen,
+        sigma=1e-6,
+        led_sigma=0.0,
+        priors=replace(
+            trials.priors,
+            cameras=(replace(trials.priors.cameras[0], covariance=np.zeros((9, 9))),),
+            scale=replace(trials.priors.scale, covariance=np.zeros((1, 1))),
+            temperature=replace(trials.priors.temperature, covariance=np.zeros((1, 1))),
+            diameter=replace(trials.priors.diameter, covariance=np.zeros((1, 1))),
+        ),
+    )
+
+    error = run_trial(exact, 0)
+
+    assert error is not None
+    assert np.abs(error).max() < 1e-5
+
+
+def test_too_few_trials_are_refused(calibration: Calibration) -> None:
+    with pytest.raises(ValueError, match="20 or more"):
+        run_monte_carlo(calibration, 5, in_this_process)

@@ -1,0 +1,194 @@
+"""A swing of recorded images: all are read once, in order, and nothing is asked."""
+
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lightpen.cameras.protocol import Frame, FrameIncomplete
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import look
+from lightpen.messages import Code
+from lightpen.model.origin import Origin
+from lightpen.record.reading import open_record, recorded_origin, source
+from lightpen.record.solving import solve_record
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.resuming import read_resumable
+from lightpen.swing.state import Happening, Phase, Progress
+
+if TYPE_CHECKING:
+    from tests.core.conftest import Station
+
+N_IMAGES = 20
+
+
+class Recording:
+    """Recorded images that are shown over and over to a station's runner."""
+
+    def __init__(self, station: "Station", place: Path) -> None:
+        self.station, self.place = station, place
+        self.camera = ReplayCamera(str(place), loops=True, clock=station.clock)
+        self.camera.open()
+        self.camera.start()
+        station.preparation = replace(
+            station.preparation, source=SourceChoice(SourceKind.RECORDED, str(place))
+        )
+
+    def show(self, n_images: int) -> None:
+        """Show so many of the next images; what cannot be read is not seen."""
+        for _ in range(n_images):
+            with suppress(FrameIncomplete):
+                self.take(self.camera.read(1.0))
+
+    def take(self, frame: Frame) -> None:
+        station = self.station
+        setup = station.status.setup
+        assert setup is not None
+        seen = look(frame.image, setup.camera, setup.pen, setup.mask)
+        n_images = self.camera.caps.n_images
+        station.runner.take(frame, seen, setup, n_images)
+
+
+@pytest.fixture
+def recording(station: "Station", swung: Callable[..., Path]) -> Recording:
+    """The images of a swing, whose state begins when they are shown."""
+    recording = Recording(station, swung() / "images")
+    station.begin()
+    return recording
+
+
+def test_all_images_are_read_once_and_in_order_and_then_the_tip_is_computed(
+    recording: Recording, station: "Station", swung: Callable[..., Path]
+) -> None:
+    recording.show(12)
+    assert station.state.phase is Phase.CAPTURING
+    assert station.state.progress == Progress(12, N_IMAGES)
+    assert station.state.message.code == Code.IMAGES_READ
+    assert station.state.target is None
+    recording.show(8)
+    station.wait_for_phase(Phase.VERDICT)
+
+    images, again = swung() / "images", station.record_folder / "images"
+    shown = [path.read_bytes() for path in sorted(images.iterdir())]
+    assert [path.read_bytes() for path in sorted(again.iterdir())] == shown
+    happenings = station.witness.happenings
+    assert happenings.count(Happening.KEPT) == N_IMAGES
+    assert Happening.SEATED not in happenings
+    tip = solve_record(open_record(swung())).calibration.joint.tip_pen
+    assert station.tip == tip.tolist()
+
+
+def test_it_begins_with_the_first_image_whichever_is_shown(
+    recording: Recording, station: "Station"
+) -> None:
+    frames = [recording.camera.read(1.0) for _ in range(N_IMAGES + 3)]
+    for frame in frames[17:20]:
+        recording.take(frame)
+    assert station.state.progress == Progress()
+    assert station.n_recorded == 0
+
+    for frame in frames[20:]:
+        recording.take(frame)
+    assert station.state.progress.n_read == station.n_recorded == 3
+
+
+@pytest.mark.parametrize("spoiled", [7, N_IMAGES - 1])
+def test_an_image_that_cannot_be_read_is_passed_over(
+    station: "Station", swung: Callable[..., Path], tmp_path: Path, spoiled: int
+) -> None:
+    images = tmp_path / "images"
+    shutil.copytree(swung() / "images", images)
+    sorted(images.iterdir())[spoiled].write_bytes(b"no image")
+    recording = Recording(station, images)
+    station.begin()
+    while station.status.is_capturing:
+        recording.show(1)
+    station.wait_for_phase(Phase.VERDICT)
+
+    assert station.n_recorded == N_IMAGES - 1
+    assert station.state.n_dropped == {Reason.UNREADABLE: 1}
+
+
+def test_the_postures_that_lack_are_named_at_the_end(
+    recording: Recording, station: "Station"
+) -> None:
+    recording.show(N_IMAGES)
+    station.wait_for_phase(Phase.VERDICT)
+
+    assessment = station.status.assessment
+    assert assessment is not None
+    told = [assessment.verdict.reason, *assessment.doubts]
+    (tilt,) = [each for each in told if each.code == Code.TOO_LITTLE_TILT]
+    assert "away from the camera" in str(tilt)
+
+
+def test_an_interrupted_reading_goes_on_and_takes_no_image_twice(
+    recording: Recording, station: "Station"
+) -> None:
+    recording.show(8)
+    folder = station.record_folder
+    station.runner.abandon()
+    station.wait_until(lambda: station.status.state is None)
+    station.go_on(folder)
+    recording.show(N_IMAGES - 8)  # to the end of the pass
+    recording.show(N_IMAGES)
+    station.wait_for_phase(Phase.VERDICT)
+
+    sums = [image.sha256 for image in open_record(folder).images]
+    assert len(sums) == len(set(sums)) == N_IMAGES
+
+
+def test_a_pause_waits_and_goes_on_with_the_next_image(
+    recording: Recording, station: "Station"
+) -> None:
+    recording.show(5)
+    station.runner.pause()
+    recording.show(N_IMAGES)
+    assert station.state.progress.n_read == 5
+    station.runner.resume()
+    recording.show(N_IMAGES)
+
+    station.wait_for_phase(Phase.VERDICT)
+    assert station.n_recorded == N_IMAGES
+
+
+def test_after_the_verdict_nothing_more_can_be_captured_or_confirmed(
+    recording: Recording, station: "Station"
+) -> None:
+    recording.show(N_IMAGES)
+    station.wait_for_phase(Phase.VERDICT)
+    station.runner.capture_more()
+    recording.show(N_IMAGES)
+
+    assert station.state.phase is Phase.VERDICT
+    assert Happening.CONFIRMED not in station.witness.happenings
+    assert station.n_recorded == N_IMAGES
+
+
+def test_the_images_of_a_simulated_swing_stay_simulated(
+    recording: Recording, station: "Station"
+) -> None:
+    recording.show(3)
+
+    assert station.status.origin is Origin.SIMULATED
+    assert recorded_origin(open_record(station.record_folder)) is Origin.SIMULATED
+
+
+def test_a_reading_goes_on_with_its_own_recording_only(
+    recording: Recording, station: "Station", tmp_path: Path
+) -> None:
+    recording.show(3)
+    station.runner.abandon()
+    station.wait_until(lambda: station.status.state is None)
+    (folder,) = station.interrupted()
+    swing = read_resumable(folder)
+
+    assert swing.is_of(SourceChoice(SourceKind.RECORDED, str(recording.place)))
+    assert not swing.is_of(SourceChoice(SourceKind.RECORDED, str(tmp_path)))
+    assert not swing.is_of(SourceChoice(SourceKind.SIMULATED))
+    assert source(swing.record).origin is Origin.SIMULATED

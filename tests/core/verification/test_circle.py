@@ -1,0 +1,131 @@
+"""Tests of `lightpen.verification.circle`."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.verdict import Grade
+from lightpen.verification.circle import Circle, fit_circle, measure_circle
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.touch import Touch
+
+Touching = Callable[..., tuple[Touch, ...]]
+Ring = Callable[..., FloatArray]
+RADIUS = 31.751
+LIMITS = VerificationLimits()
+
+
+@pytest.fixture(scope="module")
+def measured(instrument: Instrument, touching: Touching) -> Callable[..., Circle]:
+    """Return a function that measures points as one run."""
+
+    def measure(points: FloatArray, radius: float = RADIUS, seed: int = 1) -> Circle:
+        run = ("run", touching(points, seed=seed, tilt=0.1))
+        return measure_circle([run], instrument, radius, LIMITS)
+
+    return measure
+
+
+def test_exact_points_give_the_exact_circle(ring: Ring) -> None:
+    fit = fit_circle(ring())
+
+    assert fit.radius == pytest.approx(RADIUS, abs=1e-9)
+    np.testing.assert_allclose(fit.center_cam, [-8, 168, 1050], atol=1e-9)
+    assert fit.roundness < 1e-9
+    assert fit.covered == pytest.approx(342)
+
+
+def test_the_radius_follows_points_as_its_weights_say(ring: Ring) -> None:
+    points = ring(9)
+    fit = fit_circle(points)
+    rng = np.random.default_rng(0)
+    moves = 1e-5 * rng.standard_normal(points.shape)
+
+    changed = fit_circle(points + moves).radius - fit.radius
+
+    assert changed == pytest.approx(float(np.sum(fit.weights * moves)), abs=1e-9)
+
+
+def test_a_ring_is_measured_within_its_uncertainty(
+    measured: Callable[..., Circle], ring: Ring
+) -> None:
+    errors = [measured(ring(), seed=seed) for seed in range(12)]
+
+    within = [abs(each.errors[0]) <= each.uncertainty for each in errors]
+    assert sum(within) >= 10
+    assert all(each.assessment.grade is Grade.PASS for each in errors)
+
+
+def test_less_than_three_quarters_of_a_ring_are_refused(
+    measured: Callable[..., Circle], ring: Ring
+) -> None:
+    with pytest.raises(CalibrationError, match=r"cover 200 degrees .* 270 are needed"):
+        measured(ring(20, degrees=200))
+
+
+def test_points_of_a_square_are_no_circle(measured: Callable[..., Circle]) -> None:
+    side = np.linspace(-30, 30, 5, endpoint=False)
+    square = np.concatenate(
+        [
+            np.column_stack([side, np.full(5, -30.0)]),
+            np.column_stack([np.full(5, 30.0), side]),
+            np.column_stack([-side, np.full(5, 30.0)]),
+            np.column_stack([np.full(5, -30.0), -side]),
+        ]
+    )
+    points = np.column_stack([square, np.zeros(20)]) + np.array([0, 200, 1080])
+
+    with pytest.raises(CalibrationError, match="lie on no circle"):
+        measured(points)
+
+
+def test_points_in_one_place_or_on_a_line_are_no_circle(
+    measured: Callable[..., Circle],
+) -> None:
+    place = np.tile([0.0, 200.0, 1080.0], (12, 1))
+    line = place + np.linspace(-30, 30, 12)[:, None] * [1.0, 0.0, 0.0]
+    for points in (place, line):
+        with pytest.raises(CalibrationError, match="which is no circle"):
+            measured(points)
+
+
+def test_a_lifted_pen_is_left_out_and_named(
+    measured: Callable[..., Circle], ring: Ring
+) -> None:
+    points = ring()
+    points[7] += [0.0, -9.0, 0.0]
+
+    found = measured(points)
+
+    assert [touch.label for touch in found.runs[0].left_out] == ["touch 8 image 1"]
+    assert found.assessment.grade is Grade.CHECK
+    assert abs(found.errors[0]) < 0.01
+
+
+def test_a_diameter_given_for_the_radius_is_told(
+    measured: Callable[..., Circle], ring: Ring
+) -> None:
+    found = measured(ring(), radius=2 * RADIUS)
+
+    assert found.assessment.reason.code == "circle.another"
+
+
+def test_a_wrong_radius_is_refused(measured: Callable[..., Circle], ring: Ring) -> None:
+    found = measured(ring(), radius=RADIUS + 0.05)
+
+    assert found.assessment.grade is Grade.REPEAT
+    assert found.errors[0] == pytest.approx(-0.05, abs=0.01)
+
+
+def test_the_ball_is_added_to_the_circle_of_its_centres(
+    instrument: Instrument, touching: Touching, ring: Ring
+) -> None:
+    run = ("run", touching(ring(radius=RADIUS - 1.5), tilt=0.1))
+
+    found = measure_circle([run], instrument, RADIUS, LIMITS, ball_offset=1.5)
+
+    assert abs(found.errors[0]) < 0.01

@@ -1,0 +1,92 @@
+"""Tests of `lightpen.verification.length`."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lightpen.errors import CalibrationError
+from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.verdict import Grade
+from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
+from lightpen.verification.length import measure_length
+from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.touch import Touch
+
+Touching = Callable[..., tuple[Touch, ...]]
+LENGTH = 150.0
+LIMITS = VerificationLimits()
+START = PAPER_CONE - np.array([LENGTH / 2, 0, 0])
+END = PAPER_CONE + np.array([LENGTH / 2, 0, 0])
+
+
+def test_a_length_is_measured_within_its_uncertainty(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, START, END, END])))
+
+    found = measure_length([run], instrument, LENGTH, LIMITS)
+
+    assert found.assessment.grade is Grade.PASS
+    assert abs(found.errors[0]) < found.uncertainties[0]
+    assert [len(end) for end in found.runs[0].ends] == [2, 2]
+    assert found.runs[0].along_view < 0.1
+
+
+def test_a_pen_that_grew_is_told_by_the_length(
+    instrument: Instrument, touching: Touching
+) -> None:
+    grown, larger = 5e-4, instrument.covariance.copy()
+    leds = instrument.pen.leds - instrument.pen.leds.mean(axis=0)
+    at = instrument.parameters.leds
+    larger[at, at] += 1e-6 * np.outer(leds, leds)  # the scale is known to 0.1 % only
+    unsure = replace(instrument, covariance=larger)
+    # A pen of which the file says too little measures too little.
+    shrunk = PAPER_CONE / (1 + grown)
+    half = np.array([LENGTH / 2 / (1 + grown), 0, 0])
+    runs = [
+        (
+            str(seed),
+            touching(np.array([shrunk - half, shrunk + half]), seed=seed, tilt=0.0),
+        )
+        for seed in range(3)
+    ]
+
+    found = measure_length(runs, unsure, LENGTH, LIMITS)
+
+    assert found.scale.factor - 1 == pytest.approx(grown, rel=0.3)
+    assert found.scale.uncertainty < 0.2 * found.scale.uncertainty_before
+
+
+def test_one_end_touched_twice_is_refused(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, START])))
+
+    with pytest.raises(CalibrationError, match="one end was touched again"):
+        measure_length([run], instrument, LENGTH, LIMITS)
+
+
+def test_a_touch_between_the_ends_is_refused_by_its_name(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, START + np.array([40, 0, 0]), END])))
+
+    with pytest.raises(CalibrationError, match="more than two places: touch"):
+        measure_length([run], instrument, LENGTH, LIMITS)
+
+
+def test_a_single_touch_is_refused(instrument: Instrument, touching: Touching) -> None:
+    with pytest.raises(CalibrationError, match="needs both its ends"):
+        measure_length([("here", touching(START[None]))], instrument, LENGTH, LIMITS)
+
+
+def test_a_length_beyond_its_limit_is_refused(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, END]), tip_pen=PAPER_TIP))
+
+    found = measure_length([run], instrument, LENGTH + 0.2, LIMITS)
+
+    assert found.assessment.grade is Grade.REPEAT

@@ -1,0 +1,173 @@
+"""Tests of `lightpen.verification.pen_health` and `led_file`."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.detection.observations import observe_centers
+from lightpen.errors import CalibrationError, UsageError
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.report import calibration_record, json_bytes
+from lightpen.estimation.verdict import Grade
+from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.observation_files import Centers
+from lightpen.formats.own_json import with_checksum
+from lightpen.formats.pen_files import read_pen, write_pen
+from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
+from lightpen.record.calibrations import CalibrationFile, read_calibration
+from lightpen.simulator.swings import (
+    PAPER_TIP,
+    paper_camera,
+    paper_pen,
+    perturbed_pen,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.verification.led_file import improve_pen
+from lightpen.verification.length import Scale
+from lightpen.verification.pen_health import examine_pen
+
+N_IMAGES, SIGMA = 40, 0.02
+PEN_FILE = replace(paper_pen(), led_sigma=0.01)
+WARMTH = 5 * 23e-6  # 5 K of aluminium
+Swing = Callable[..., CalibrationFile]
+
+
+@pytest.fixture
+def swing(tmp_path: Path) -> Swing:
+    """Return a function that swings a pen and calibrates it with the same files."""
+    when = datetime(2026, 1, 1, tzinfo=UTC)
+
+    def swung(pen: Pen, number: int, growth: float = 0.0) -> CalibrationFile:
+        rng = np.random.default_rng(number)
+        grown = replace(pen, leds=pen.leds * (1 + growth))
+        camera = paper_camera()
+        poses = swing_poses(
+            N_IMAGES, rng, pen=grown, camera=camera, tip_pen=PAPER_TIP * (1 + growth)
+        )
+        pixels = simulate_centers(
+            camera, grown, poses.rotations, poses.translations, SIGMA, rng
+        )
+        centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("centers.csv"))
+        found = calibrate(camera, PEN_FILE, observe_centers(centers, camera, PEN_FILE))
+        file = InputFile(Path("leds.csv"), "0" * 64)
+        record = calibration_record(
+            found, Inputs(file, file, (), None), "joint", SwingLimits()
+        )
+        record["created"] = (when + timedelta(days=number)).isoformat()
+        path = tmp_path / f"swing {number}.json"
+        path.write_bytes(with_checksum(json_bytes(record)))
+        return read_calibration(path)
+
+    return swung
+
+
+def true_pen() -> Pen:
+    return perturbed_pen(paper_pen(), 0.01, np.random.default_rng(9))
+
+
+def with_moved_led(pen: Pen) -> Pen:
+    leds = pen.leds.copy()
+    leds[6] += [0.03, 0.0, 0.04]
+    return replace(pen, leds=leds)
+
+
+def test_one_led_that_moved_is_named(swing: Swing) -> None:
+    pen = true_pen()
+    swings = [swing(pen, 1), swing(pen, 2), swing(with_moved_led(pen), 3)]
+
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert found.moved == (7,)
+    assert found.assessment.grade is Grade.REPEAT
+    assert found.assessment.reason.values["led"] == 7
+    # Of 0.05 mm; the best move of all LEDs takes some of it up.
+    assert found.assessment.reason.values["distance"] == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_warm_pen_is_told_from_a_knocked_one(swing: Swing) -> None:
+    pen = true_pen()
+    swings = [swing(pen, 1), swing(pen, 2), swing(pen, 3, growth=WARMTH)]
+
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert found.moved == ()
+    assert found.growth == pytest.approx(WARMTH, rel=0.25)
+    assert found.assessment.reason.code == "pen-health.grown"
+
+
+def test_a_sound_pen_is_left_alone(swing: Swing) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3)]
+
+    found = examine_pen(swings, paper_camera(), PEN_FILE.leds)
+
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_one_swing_and_swings_of_two_pens_are_refused(swing: Swing) -> None:
+    one, other = swing(true_pen(), 1), swing(true_pen(), 2)
+    with pytest.raises(CalibrationError, match="One swing tells nothing"):
+        examine_pen([one], paper_camera(), PEN_FILE.leds)
+    with pytest.raises(UsageError, match=r"swing 2\.json was made with another"):
+        examine_pen(
+            [one, replace(other, pen_sha256="1" * 64)], paper_camera(), PEN_FILE.leds
+        )
+
+
+def test_pooled_swings_put_the_led_file_right(swing: Swing, tmp_path: Path) -> None:
+    pen = true_pen()
+    swings = [swing(pen, number) for number in (1, 2, 3, 4)]
+
+    found = improve_pen(swings, paper_camera(), PEN_FILE)
+
+    def errors(leds: np.ndarray) -> np.ndarray:
+        """Errors but for those of the frame, by the differences between LEDs."""
+        found = np.linalg.norm(leds[:, None] - leds, axis=2)
+        true = np.linalg.norm(pen.leds[:, None] - pen.leds, axis=2)
+        return np.asarray(found - true)
+
+    before, after = errors(PEN_FILE.leds), errors(found.pen.leds)
+    assert np.sqrt(np.mean(after**2)) < 0.3 * np.sqrt(np.mean(before**2))
+    assert found.sigma_after < found.sigma_before
+    assert found.held_out == "swing 4.json"
+    write_pen(found.pen, tmp_path / "new.json", "a" * 64)
+    read = read_pen(tmp_path / "new.json")
+    np.testing.assert_array_equal(read.leds, found.pen.leds)
+    assert read.led_covariance is not None
+    assert found.pen.led_covariance is not None
+    np.testing.assert_array_equal(read.led_covariance, found.pen.led_covariance)
+    assert '"parent_sha256": "aaaa' in (tmp_path / "new.json").read_text()
+
+
+def test_a_length_gives_the_new_file_its_scale(swing: Swing) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3, 4)]
+    scale = Scale(1.0003, 1e-5, 1e-2)
+
+    found = improve_pen(
+        swings, paper_camera(), replace(PEN_FILE, scale_sigma=5e-3), scale
+    )
+
+    assert found.pen.scale_sigma == pytest.approx(5e-6, rel=0.1)
+    extents = np.ptp(found.pen.leds[:4, 1]) / np.ptp(PEN_FILE.leds[:4, 1])
+    # The LEDs at the ends of the pen are off by 0.01 mm in the file, of 180 mm.
+    assert extents - 1 == pytest.approx(3e-4, abs=1e-4)
+
+
+def test_a_swing_of_another_state_of_the_pen_does_not_confirm(swing: Swing) -> None:
+    pen = true_pen()
+    swings = [swing(with_moved_led(pen), number) for number in (1, 2, 3)]
+
+    with pytest.raises(CalibrationError, match="does not confirm the new LED file"):
+        improve_pen([*swings, swing(paper_pen(), 4)], paper_camera(), PEN_FILE)
+
+
+def test_too_few_swings_are_refused(swing: Swing) -> None:
+    swings = [swing(true_pen(), number) for number in (1, 2, 3)]
+
+    with pytest.raises(CalibrationError, match="3 swings are given"):
+        improve_pen(swings, paper_camera(), PEN_FILE)

@@ -1,0 +1,287 @@
+"""Tests of `lightpen verify`, `repeatability` and `improve-pen`."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import numpy as np
+import pytest
+
+Run = Callable[..., CompletedProcess[str]]
+Once = Callable[[str, Callable[[Path], object]], Path]
+N_RUNS = 8
+
+
+@pytest.fixture(scope="session")
+def tip(shared_data: Path, lightpen: Run, once: Once) -> Path:
+    """Return the calibration of `swing-full`, with the paper's nominal tip."""
+    folder = shared_data / "swing-full"
+
+    def make(place: Path) -> None:
+        outcome = lightpen(
+            *("calibrate", folder / "images"),
+            *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
+            *("--nominal-tip", "0", "-90", "-25", "--json", place / "tip.json"),
+        )
+        assert outcome.returncode == 0, outcome.stderr
+
+    return once("tip of swing-full to verify", make) / "tip.json"
+
+
+@pytest.fixture
+def files(shared_data: Path, tip: Path) -> list[str | Path]:
+    """Return the options that name the files of the sets."""
+    folder = shared_data / "fixed-point"
+    return [
+        *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
+        *("--tip", tip),
+    ]
+
+
+def read(path: Path) -> dict[str, Any]:
+    record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return record
+
+
+def test_the_fixed_point_of_the_paper_is_steady(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    outcome = lightpen(
+        *("verify", "fixed-point", shared_data / "fixed-point", *files),
+        *("--json", tmp_path / "point.json"),
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    assert "Verdict      PASS" in outcome.stdout
+    assert "Calibrated tip                     Nominal tip" in outcome.stdout
+    record = read(tmp_path / "point.json")
+    std = np.array(record["calibrated"]["std_mm"])
+    assert (std <= [0.002, 0.002, 0.010]).all()
+    assert min(record["nominal"]["std_mm"]) > 0.2
+    assert len(record["touches"]) == 10
+    assert np.linalg.eigvalsh(record["touches"][0]["covariance"])[0] > 0
+
+
+def test_the_circle_of_the_paper_has_its_radius(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    runs = [shared_data / "circle" / f"run_{i + 1:02d}" for i in range(N_RUNS)]
+
+    outcome = lightpen(
+        *("verify", "circle", *runs, "--radius", "31.751", *files),
+        *("--json", tmp_path / "circle.json"),
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    for title in ("Computed value", "Absolute error", "Relative error (x 1e-4)"):
+        line = next(x for x in outcome.stdout.splitlines() if x.startswith(title))
+        assert len(line[24:].split()) == N_RUNS + 1  # and the average
+    record = read(tmp_path / "circle.json")
+    assert abs(record["mean_error_mm"]) <= 0.0015
+    assert record["std_mm"] <= 0.001
+    assert abs(record["mean_error_mm"]) <= record["expanded_uncertainty_mm"]
+
+
+def test_table_1_is_reproduced_from_led_centres_by_one_command(
+    shared_data: Path, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = shared_data / "repeat"
+    tables = sorted(folder.glob("calib_*.csv"))[:4]
+
+    outcome = lightpen(
+        *("repeatability", *tables, "--chart", tmp_path / "chart.svg"),
+        *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
+        *("--json", tmp_path / "repeat.json"),
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    lines = outcome.stdout.splitlines()
+    assert lines[1].split() == ["No.", "of", "test", "x-axis", "y-axis", "z-axis"]
+    assert [line.split()[0] for line in lines[2:8]] == [
+        "1",
+        "2",
+        "3",
+        "4",
+        "Ave",
+        "Std",
+    ]
+    assert max(read(tmp_path / "repeat.json")["std_mm"]) < 0.003
+    assert (tmp_path / "chart.svg").read_text().startswith("<svg")
+
+
+def test_a_result_that_was_changed_is_refused(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    tip = files[-1]
+    record = read(Path(tip))
+    record["tip_pen_mm"][0] += 0.1
+    changed = tmp_path / "changed.json"
+    changed.write_text(json.dumps(record), encoding="utf-8")
+
+    outcome = lightpen(
+        *("verify", "fixed-point", shared_data / "fixed-point", *files[:-1], changed)
+    )
+
+    assert outcome.returncode == 2
+    assert "is not as it was written" in outcome.stderr
+
+
+def test_a_result_without_a_checksum_is_taken_with_a_word_on_it(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    record = read(Path(files[-1]))
+    del record["checksum"]
+    older = tmp_path / "older.json"
+    older.write_text(json.dumps(record), encoding="utf-8")
+
+    outcome = lightpen(
+        *("verify", "fixed-point", shared_data / "fixed-point", *files[:-1], older)
+    )
+
+    assert outcome.returncode == 0
+    assert "kept no checksum" in outcome.stdout
+
+
+def test_a_tip_of_another_pen_is_refused(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    other = tmp_path / "lp05_leds.csv"
+    text = (shared_data / "fixed-point" / "leds.csv").read_text()
+    other.write_text(text.replace("-24.89463", "-24.90463"))
+
+    outcome = lightpen(
+        *("verify", "fixed-point", shared_data / "fixed-point", *files, "--pen", other)
+    )
+
+    assert outcome.returncode == 2
+    assert "was calibrated with the pen file leds.csv, which" in outcome.stderr
+    assert "lp05_leds.csv is not" in outcome.stderr
+
+
+def test_part_of_a_ring_and_what_is_no_ring_are_refused(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    part = tmp_path / "part"
+    part.mkdir()
+    for i in range(1, 13):
+        name = f"frame_{i:04d}.png"
+        shutil.copy(shared_data / "circle" / "run_01" / name, part / name)
+    circle = ("verify", "circle")
+
+    open_ring = lightpen(*circle, part, "--radius", "31.751", *files)
+    cone = lightpen(
+        *(*circle, shared_data / "fixed-point", "--radius", "31.751", *files)
+    )
+
+    assert open_ring.returncode == 1
+    assert "at least 270 are needed" in open_ring.stderr
+    assert cone.returncode == 1
+    assert "which is no circle" in cone.stderr
+
+
+def test_a_pen_lifted_in_the_middle_is_named(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    folder = tmp_path / "touches"
+    shutil.copytree(shared_data / "fixed-point" / "images", folder)
+    shutil.copy(
+        shared_data / "circle" / "run_01" / "frame_0001.png",
+        folder / "frame_0005.png",
+    )
+
+    outcome = lightpen("verify", "fixed-point", folder, *files)
+
+    assert outcome.returncode == 0
+    assert "Verdict      CHECK" in outcome.stdout
+    assert "the first frame_0005.png" in outcome.stdout
+
+
+def test_one_end_touched_twice_is_refused(
+    shared_data: Path, lightpen: Run, files: list[str | Path]
+) -> None:
+    outcome = lightpen(
+        *("verify", "length", shared_data / "fixed-point", "--length", "150", *files)
+    )
+
+    assert outcome.returncode == 1
+    assert "one end was touched again" in outcome.stderr
+
+
+def test_files_that_are_missing_or_would_be_lost_are_named(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tip: Path
+) -> None:
+    point = ("verify", "fixed-point", shared_data / "fixed-point")
+
+    without_pen = lightpen(*point, *files[:2], "--tip", tip)
+    over_tip = lightpen(*point, *files, "--json", tip)
+    no_tip = lightpen(*point, *files[:4], "--tip", files[1])
+
+    assert without_pen.returncode == over_tip.returncode == no_tip.returncode == 2
+    assert "--pen FILE is missing" in without_pen.stderr
+    assert "would replace the input file" in over_tip.stderr
+    assert "is no record of a calibration" in no_tip.stderr
+
+
+def test_results_and_led_centres_are_not_mixed(
+    shared_data: Path, lightpen: Run, tip: Path
+) -> None:
+    folder = shared_data / "repeat"
+
+    outcome = lightpen("repeatability", tip, folder / "calib_01.csv")
+
+    assert outcome.returncode == 2
+    assert "Give either results or files of LED centres" in outcome.stderr
+
+
+def test_a_pen_is_examined_and_its_file_improved_only_where_it_helps(
+    shared_data: Path, lightpen: Run, tmp_path: Path
+) -> None:
+    folder = shared_data / "repeat"
+    inputs = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
+    results = []
+    for i in range(1, 5):
+        results.append(tmp_path / f"swing_{i}.json")
+        outcome = lightpen(
+            *("calibrate", "--centers", folder / f"calib_{i:02d}.csv", *inputs),
+            *("--json", results[-1]),
+        )
+        assert outcome.returncode == 0
+
+    examined = lightpen("verify", "pen", *results, *inputs)
+    improved = lightpen(
+        *("improve-pen", *results, *inputs, "--out", tmp_path / "new.json")
+    )
+    over_old = lightpen("improve-pen", *results, *inputs, "--out", folder / "leds.csv")
+
+    assert "No LED has moved against the others over 4 swings." in examined.stdout
+    assert improved.returncode == 0, improved.stderr
+    assert "swing_4.json confirms it" in improved.stdout
+    assert len(read(tmp_path / "new.json")["led_covariance"]) == 30
+    assert over_old.returncode == 2
+    assert "would replace the input file" in over_old.stderr
+
+
+def test_calibrations_are_solved_again_and_their_uncertainty_checked(
+    shared_data: Path, lightpen: Run, tip: Path, tmp_path: Path
+) -> None:
+    folder = shared_data / "fixed-point"
+    inputs = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
+    few = tmp_path / "few.json"
+    calibrated = lightpen(
+        *("calibrate", folder / "images", *inputs, "--json", few),
+    )
+    assert calibrated.returncode == 0
+
+    outcome = lightpen(
+        *("recalculate", few, *inputs, "--monte-carlo", "20"),
+        *("--workers", "2", "--json", tmp_path / "again.json"),
+    )
+
+    assert outcome.returncode == 0, outcome.stderr
+    assert "U (k = 2), Monte Carlo" in outcome.stdout
+    (again,) = read(tmp_path / "again.json")["calibrations"]
+    assert max(map(abs, again["change_mm"])) < 1e-6
+    assert again["monte_carlo"]["trials"] + again["monte_carlo"]["failed"] == 20
