@@ -202,6 +202,11 @@ class LiveView(QObject):
         if self._live is not None:
             self._live.set_watched(watched)
 
+    def hurry(self) -> None:
+        """Ask for every image for a while, though nothing moves."""
+        if self._live is not None:
+            self._live.hurry()
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask the camera for another exposure."""
         if self._live is not None:

@@ -250,6 +250,7 @@ class CameraWorker:
         rest : float or None
             s; None for as long as no other is set. Images that are missed meanwhile
             count as neither missed nor skipped, and the next may be as old as the rest.
+            A camera on a link sends on during a finite rest, and is read.
         """
         if rest != self._rest:
             self._rest = rest
@@ -338,9 +339,10 @@ class CameraWorker:
             self._count()
 
     def _is_due(self) -> bool:
-        """Return whether the rest since the last image that was delivered is over."""
-        rest, now_ns = self._rest, self._clock.now_ns()
-        if rest is None or now_ns - self._delivered_ns < rest * 1e9:
+        """Return whether a camera that is not left alone has rested long enough."""
+        now_ns = self._clock.now_ns()
+        rest = self._rest if self._camera.caps.has_link else None
+        if rest is not None and now_ns - self._delivered_ns < rest * 1e9:
             return False
         self._delivered_ns = now_ns
         return True

@@ -156,6 +156,11 @@ class Live:
         """Say whether anybody looks on; a swing that is captured goes on anyway."""
         self._is_watched = watched
 
+    def hurry(self) -> None:
+        """Look at every image for a while, as if something had moved."""
+        if self._moved_ns is not None:
+            self._moved_ns = self._seen_ns
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask the camera for another exposure."""
         self._worker.set_exposure(exposure_us)

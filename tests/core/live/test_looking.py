@@ -214,6 +214,27 @@ def test_nobody_looking_on_one_image_is_looked_at_and_no_more(
     screen.wait_for_images(3)
 
 
+def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
+    station: "Station", screen: Screen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("lightpen.live.looking.LIVELY_NS", 300_000_000)
+    monkeypatch.setattr("lightpen.live.looking.UNHURRIED", TIMEOUT)
+    cv2.imwrite(str(tmp_path / "still.png"), PAINTED)
+    camera = ReplayCamera(tmp_path, loops=True)
+    live = Live(camera, CameraSettings(), screen, station.runner)
+    live.start()
+    screen.wait_for_images(1)
+    time.sleep(1.0)
+    n_images = len(screen.images)
+    time.sleep(0.3)
+    n_later = len(screen.images)
+    live.hurry()
+    screen.wait_for_images(2)
+    live.stop()
+
+    assert n_later == n_images
+
+
 def test_what_rests_is_looked_at_less_often_until_it_moves() -> None:
     spots = detect_spots(PAINTED)
     assert not have_moved(spots, spots)

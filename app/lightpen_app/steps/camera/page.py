@@ -294,6 +294,7 @@ class CameraPage(Rearranged, Page):
         before, caps = self._adjustment, self._live.caps
         if before is None or caps is None:
             return
+        self._live.hurry()
         self._adjustment = now = before.fed(seen.frame, seen.spots, inspection, caps)
         exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
         if exposure_us is not None and exposure_us != before.asked.exposure_us:
@@ -349,6 +350,7 @@ class CameraPage(Rearranged, Page):
         outcome = self._stray.outcome()
         self._stray.feed(seen)
         if self._stray.outcome() != outcome:
+            self._live.hurry()  # it searches
             self._side.ensureWidgetVisible(self._stray)
         self._adjust(seen, inspection)
 
