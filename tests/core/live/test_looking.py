@@ -220,7 +220,7 @@ def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
     monkeypatch.setattr("lightpen.live.looking.LIVELY_NS", 300_000_000)
     monkeypatch.setattr("lightpen.live.looking.UNHURRIED", TIMEOUT)
     cv2.imwrite(str(tmp_path / "still.png"), PAINTED)
-    camera = ReplayCamera(tmp_path, loops=True)
+    camera = ReplayCamera(str(tmp_path), loops=True)
     live = Live(camera, CameraSettings(), screen, station.runner)
     live.start()
     screen.wait_for_images(1)
