@@ -204,9 +204,8 @@ def test_a_recorded_swing_gives_its_tip(
     walker.click_into("Folder, record or video", str(folder))
     walker.press(Key.Key_Return)
     walker.until_says("RECORDED")
-    assert walker.says(
-        "Open the intrinsics file."
-    )  # those of the simulated pen are not
+    # Those of the simulated pen are not.
+    walker.until_says("Open the intrinsics file.")
     walker.until_says("Beside the images: camera.yaml and leds.csv")
     walker.click("Use both")
     walker.until_tells("Fits the live images: 2448 x 2048")
