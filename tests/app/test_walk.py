@@ -204,9 +204,8 @@ def test_a_recorded_swing_gives_its_tip(
     walker.click_into("Folder, record or video", str(folder))
     walker.press(Key.Key_Return)
     walker.until_says("RECORDED")
-    assert walker.says(
-        "Open the intrinsics file."
-    )  # those of the simulated pen are not
+    # Those of the simulated pen are not.
+    walker.until_says("Open the intrinsics file.")
     walker.until_says("Beside the images: camera.yaml and leds.csv")
     walker.click("Use both")
     walker.until_tells("Fits the live images: 2448 x 2048")
@@ -318,7 +317,7 @@ def _watch_the_swing(walker: "Walker") -> None:
     n_inputs = walker.n_inputs
     walker.until_tells("Starts in ")
     walker.until_says("Lean RIGHT")
-    walker.until(lambda: bool(re.search(r"\d+ of about \d+", _told(walker))))
+    walker.until(lambda: bool(re.search(r"\d+ kept, \d+ to go", _told(walker))))
     walker.until_says("CAPTURING")
     walker.until_tells("10 of 10 LEDs, ")
     assert walker.main_button().isEnabled()

@@ -12,7 +12,7 @@ from threading import Lock, Thread
 from typing import Any, TypeVar
 
 import platformdirs
-from PySide6.QtCore import QByteArray, QLocale, QObject, Signal
+from PySide6.QtCore import QByteArray, QLocale, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
@@ -23,6 +23,8 @@ from lightpen.sentences import Sentence
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import Changes, Content, load, merged, save
+
+AGAIN_MS = 5000  # after which what could not be written is tried again
 
 
 @dataclass(frozen=True)
@@ -122,9 +124,13 @@ class Settings(QObject):
     -------
     troubled(object)
         The `Sentence` why something is not, or not surely, remembered.
+    relieved(object)
+        The `Sentence` of `troubled` whose cause is gone: they could be written again.
     """
 
     troubled = Signal(object)
+    relieved = Signal(object)
+    _written = Signal(object, bool)
 
     def __init__(self, file: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -134,8 +140,12 @@ class Settings(QObject):
         self._trouble = loaded.trouble
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
+        self._why_unwritten: Sentence | None = None
         self._lock = Lock()
         self._thread: Thread | None = None
+
+        # Connections
+        self._written.connect(self._on_written, Qt.ConnectionType.QueuedConnection)
 
     @property
     def file(self) -> Path:
@@ -229,6 +239,11 @@ class Settings(QObject):
         self._content = merged(self._content, changes)
         with self._lock:
             self._changes.update(changes)
+        self._write_soon()
+
+    def _write_soon(self) -> None:
+        """Write what waits for it, if anything does."""
+        with self._lock:
             if self._is_writing or not self._changes:
                 return
             self._is_writing = True
@@ -243,8 +258,19 @@ class Settings(QObject):
                 trouble, unwritten = save(self._file, self._content, changes), {}
             except LightpenError as error:
                 trouble, unwritten = error.sentence, changes
-            if trouble is not None:
-                self.troubled.emit(trouble)
+            if trouble is not None or self._why_unwritten is not None:
+                self._written.emit(trouble, not unwritten)
+
+    def _on_written(self, trouble: Sentence | None, is_written: bool) -> None:
+        """Tell what went wrong, once, and when it is over; until then try again."""
+        before = self._why_unwritten
+        self._why_unwritten = None if is_written else trouble
+        if not is_written:
+            QTimer.singleShot(AGAIN_MS, self._write_soon)
+        if before is not None and before != trouble:
+            self.relieved.emit(before)
+        if trouble is not None and before != trouble:
+            self.troubled.emit(trouble)
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
         """Return what is to be written next; nothing if only the old is left."""

@@ -78,6 +78,8 @@ class Workbench(QObject):
         So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
+    relieved(str)
+        A sentence of `troubled` whose cause is gone.
     cameras_found(tuple of FoundDevice)
     search_failed(str)
         The sentence why no cameras can be looked for.
@@ -87,6 +89,7 @@ class Workbench(QObject):
     subject_changed = Signal(object)
     others_counted = Signal(int)
     troubled = Signal(str)
+    relieved = Signal(str)
     cameras_found = Signal(object)
     search_failed = Signal(str)
 
@@ -107,6 +110,7 @@ class Workbench(QObject):
         self._reading: Job | None = None
         self._search: Job | None = None
         self._unread = Station()
+        self._file_troubles: list[str] = []
         self._presence = Presence(folder)
         self._n_others = 0
         self._counter: Job | None = None
@@ -121,11 +125,14 @@ class Workbench(QObject):
         self.live.settings_applied.connect(self._on_settings_applied)
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
+        self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
+        self.run.relieved.connect(self.relieved)
         self._counting.timeout.connect(self._count_others)
         self.run.changed.connect(self._tell_subject)
         self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
+        settings.relieved.connect(self._on_settings_relieved)
 
     @property
     def preparation(self) -> Preparation:
@@ -177,6 +184,7 @@ class Workbench(QObject):
         """Take over what was chosen last at a station."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
+        self._relieve_of_files()
         self._preparation = replace(
             before,
             names=Names(
@@ -198,6 +206,9 @@ class Workbench(QObject):
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
         before, self._preparation = self._preparation, preparation
+        files = before.camera_file, before.pen_file
+        if (preparation.camera_file, preparation.pen_file) != files:
+            self._relieve_of_files()
         self._remember_station()
         self._remember()
         self._follow(before)
@@ -212,6 +223,7 @@ class Workbench(QObject):
 
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
+        self._relieve_of_files()
         self._start(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
     def open_camera(self) -> None:
@@ -256,6 +268,10 @@ class Workbench(QObject):
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
+        self._relieve_of_files()
+        self._write_samples()
+
+    def _write_samples(self) -> None:
         around, folder = self._around, self._folder / SIMULATED
         self._start(lambda _: sample_files(around, folder), self._on_chosen_read)
 
@@ -310,7 +326,17 @@ class Workbench(QObject):
 
     def _on_refused(self, sentence: str) -> None:
         self._reading = None
+        self._tell_of_file(sentence)
+
+    def _tell_of_file(self, sentence: str) -> None:
+        """Tell why a file is not chosen, until another is."""
+        self._file_troubles.append(sentence)
         self.troubled.emit(sentence)
+
+    def _relieve_of_files(self) -> None:
+        """Take back why a file was not chosen: others are."""
+        while self._file_troubles:
+            self.relieved.emit(self._file_troubles.pop())
 
     def _stop_reading(self) -> None:
         job, self._reading = self._reading, None
@@ -320,7 +346,7 @@ class Workbench(QObject):
     def _on_files_read(self, opened: OpenedFiles) -> None:
         self._reading, self._unread = None, Station()
         for trouble in opened.troubles:
-            self.troubled.emit(worded(trouble))
+            self._tell_of_file(worded(trouble))
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -337,20 +363,20 @@ class Workbench(QObject):
         simulated = now.source.kind == SourceKind.SIMULATED
         has_none = now.camera_file is None and now.pen_file is None
         if wants_samples and simulated and has_none:
-            self.use_sample_files()
+            self._write_samples()
 
     def _on_chosen_read(self, opened: OpenedFiles) -> None:
         self._reading = None
         for trouble in opened.troubles:
-            self.troubled.emit(worded(trouble))
-        now = self._preparation
-        self.set_preparation(
-            replace(
-                now,
-                camera_file=opened.camera_file or now.camera_file,
-                pen_file=opened.pen_file or now.pen_file,
-            )
+            self._tell_of_file(worded(trouble))
+        before = self._preparation
+        self._preparation = replace(
+            before,
+            camera_file=opened.camera_file or before.camera_file,
+            pen_file=opened.pen_file or before.pen_file,
         )
+        self._remember()
+        self._follow(before)
 
     def _follow(self, before: Preparation) -> None:
         """Let the camera and its images follow the choices."""
@@ -435,6 +461,9 @@ class Workbench(QObject):
 
     def _on_settings_troubled(self, why: Sentence) -> None:
         self.troubled.emit(worded(why))
+
+    def _on_settings_relieved(self, why: Sentence) -> None:
+        self.relieved.emit(worded(why))
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()

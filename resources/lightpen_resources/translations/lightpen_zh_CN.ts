@@ -9,7 +9,7 @@
     </message>
     <message>
         <source>Calibrates the probe tip of a light pen.</source>
-        <translation>校准光笔的测头。</translation>
+        <translation>标定光笔的测头。</translation>
     </message>
     <message>
         <source>Lightpen: MIT licence. Qt and PySide6: LGPL 3. Fonts: cut from Noto Sans and Noto Sans CJK, SIL Open Font License 1.1.</source>
@@ -39,7 +39,7 @@
     </message>
     <message>
         <source>Continue to the LEDs</source>
-        <translation>继续：LED</translation>
+        <translation>下一步：LED</translation>
     </message>
     <message>
         <source>No camera is open.</source>
@@ -105,7 +105,7 @@
     </message>
     <message>
         <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
-        <translation>演示结束。您可以随意查看；演示数据不会保留。要校准测头，请不带演示启动程序。</translation>
+        <translation>演示结束。您可以随意查看；演示数据不会保留。要标定测头，请不带演示启动程序。</translation>
     </message>
 </context>
 <context>
@@ -275,6 +275,10 @@
     <message>
         <source>No LED is seen</source>
         <translation>看不到 LED</translation>
+    </message>
+    <message>
+        <source>Saturated: lower the exposure first</source>
+        <translation>过饱和：请先降低曝光</translation>
     </message>
     <message>
         <source>Sharp</source>
@@ -690,7 +694,7 @@
     </message>
     <message>
         <source>Last calibration of this pen and tip</source>
-        <translation>本光笔和测头的上次校准</translation>
+        <translation>本光笔和测头的上次标定</translation>
     </message>
     <message>
         <source>Take back...</source>
@@ -750,7 +754,7 @@
     </message>
     <message>
         <source>It is older than {0} days. Calibrate before you measure.</source>
-        <translation>已超过 {0} 天。测量前请先校准。</translation>
+        <translation>已超过 {0} 天。测量前请先标定。</translation>
     </message>
     <message>
         <source>In the future</source>
@@ -941,7 +945,7 @@
     </message>
     <message>
         <source>Continue to the swing</source>
-        <translation>继续：摆动</translation>
+        <translation>下一步：摆动</translation>
     </message>
     <message>
         <source>The LED table has changes that are not saved.</source>
@@ -1015,12 +1019,12 @@
         <translation>测头在最弱方向上达到此不确定度时，摆动结束。通常：{0} mm。</translation>
     </message>
     <message>
-        <source>The swing does not end with fewer. Usual: {0}.</source>
-        <translation>少于此数时摆动不会结束。通常：{0}。</translation>
+        <source>The swing does not end with fewer; no more than the images at most. Usual: {0}.</source>
+        <translation>少于此数时摆动不会结束；不得大于最多图像数。通常：{0}。</translation>
     </message>
     <message>
-        <source>The swing ends with so many in any case. Usual: {0}.</source>
-        <translation>达到此数时摆动一定结束。通常：{0}。</translation>
+        <source>The swing ends with so many in any case; no fewer than the images at least. Usual: {0}.</source>
+        <translation>达到此数时摆动必定结束；不得小于最少图像数。通常：{0}。</translation>
     </message>
 </context>
 <context>
@@ -1130,7 +1134,7 @@
     </message>
     <message>
         <source>Pen tip calibration</source>
-        <translation>光笔测头校准</translation>
+        <translation>光笔测头标定</translation>
     </message>
 </context>
 <context>
@@ -1169,7 +1173,7 @@
     </message>
     <message>
         <source>The LEDs fit the images, but not the pen frame: see what is told of the file.</source>
-        <translation>LED 与图像相符，但不符合测笔坐标系：请看文件处的说明。</translation>
+        <translation>LED 与图像相符，但不符合光笔坐标系：请看文件处的说明。</translation>
     </message>
     <message>
         <source>Every LED is within {0} mm of its place in the table, in {1} views.</source>
@@ -1255,7 +1259,7 @@
     </message>
     <message>
         <source>What is calibrated</source>
-        <translation>校准对象</translation>
+        <translation>标定对象</translation>
     </message>
     <message>
         <source>Station</source>
@@ -1322,6 +1326,10 @@
         <source>Operator view</source>
         <translation>操作员视图</translation>
     </message>
+    <message>
+        <source>Esc: leave this view</source>
+        <translation>Esc：退出此视图</translation>
+    </message>
 </context>
 <context>
     <name>OptionsMenu</name>
@@ -1364,6 +1372,17 @@
     <message>
         <source>About Lightpen</source>
         <translation>关于 Lightpen</translation>
+    </message>
+</context>
+<context>
+    <name>PenInSpace</name>
+    <message>
+        <source>The pen in space</source>
+        <translation>光笔的空间姿态</translation>
+    </message>
+    <message>
+        <source>The pen as it leans, and the outline of where it should go.</source>
+        <translation>光笔当前的倾斜，以及应到位置的轮廓。</translation>
     </message>
 </context>
 <context>
@@ -1618,7 +1637,7 @@
     </message>
     <message>
         <source>Next: start the next calibration, or close the program.</source>
-        <translation>下一步：开始下一次校准，或关闭程序。</translation>
+        <translation>下一步：开始下一次标定，或关闭程序。</translation>
     </message>
     <message>
         <source>Nothing is in force until it is accepted.</source>
@@ -1634,7 +1653,7 @@
     </message>
     <message>
         <source>Start the next calibration</source>
-        <translation>开始下一次校准</translation>
+        <translation>开始下一次标定</translation>
     </message>
     <message>
         <source>Accept</source>
@@ -1762,7 +1781,7 @@
     </message>
     <message>
         <source>The tip is accepted; start the next calibration.</source>
-        <translation>测头已接受；请开始下一次校准。</translation>
+        <translation>测头已接受；请开始下一次标定。</translation>
     </message>
     <message>
         <source>All recorded images are read.</source>
@@ -1928,7 +1947,7 @@
     </message>
     <message>
         <source>Pen tip calibration</source>
-        <translation>光笔测头校准</translation>
+        <translation>光笔测头标定</translation>
     </message>
     <message>
         <source>Operator view</source>
@@ -2105,15 +2124,15 @@
     </message>
     <message>
         <source>Say what is calibrated. All of it is remembered for the station.</source>
-        <translation>填写要校准的内容，程序会为本工位记住。</translation>
+        <translation>填写要标定的内容，程序会为本工位记住。</translation>
     </message>
     <message>
         <source>Continue to the camera</source>
-        <translation>继续：相机</translation>
+        <translation>下一步：相机</translation>
     </message>
     <message>
         <source>The last calibration cannot be shown.</source>
-        <translation>无法显示上次校准。</translation>
+        <translation>无法显示上次标定。</translation>
     </message>
     <message>
         <source>The swing is being read.</source>
@@ -2393,12 +2412,20 @@
         <source>U (k = 2) of the tip / µm</source>
         <translation>测头的 U (k = 2) / µm</translation>
     </message>
+    <message>
+        <source>floor</source>
+        <translation>下限</translation>
+    </message>
 </context>
 <context>
     <name>SwingSight</name>
     <message>
         <source>The images are not of the size that this swing needs.</source>
         <translation>图像尺寸与本次摆动不符。</translation>
+    </message>
+    <message>
+        <source>bright spots: {0}, {1} images/s</source>
+        <translation>亮点：{0}，{1} 幅/秒</translation>
     </message>
     <message>
         <source>{0} of {1} LEDs, {2} images/s</source>
@@ -2410,10 +2437,6 @@
     <message>
         <source>No swing</source>
         <translation>没有摆动</translation>
-    </message>
-    <message>
-        <source>images kept, at most {0} are taken</source>
-        <translation>为已保留的图像，最多采集 {0} 幅</translation>
     </message>
     <message>
         <source>recorded images</source>
@@ -2444,8 +2467,16 @@
         <translation>请放下光笔。</translation>
     </message>
     <message>
+        <source>Go back to the step Swing at the screen to go on.</source>
+        <translation>请在屏幕上回到“摆动”步骤以继续。</translation>
+    </message>
+    <message>
         <source>An image could not be recorded; the notice at the top says why. Mend it, then press Space.</source>
         <translation>有图像无法记录，原因见顶部提示。排除后按空格键。</translation>
+    </message>
+    <message>
+        <source>The tip is being computed.</source>
+        <translation>正在计算测头。</translation>
     </message>
     <message>
         <source>Let the simulated operator swing; or press Seat, and lean the pen by dragging the dial.</source>
@@ -2466,6 +2497,18 @@
     <message>
         <source>Capture more</source>
         <translation>继续采集</translation>
+    </message>
+    <message>
+        <source>The review is open at the screen.</source>
+        <translation>复核页已在屏幕上打开。</translation>
+    </message>
+    <message>
+        <source>Put the pen down. The review is open at the screen.</source>
+        <translation>请放下光笔。复核页已在屏幕上打开。</translation>
+    </message>
+    <message>
+        <source>Go on to the review.</source>
+        <translation>请转到复核。</translation>
     </message>
     <message>
         <source>Hold the pen upright and still for 3 s to see the review.</source>
@@ -2500,8 +2543,44 @@
         <translation>已读取 {0} / {1}</translation>
     </message>
     <message>
+        <source>{0} kept, {1} to go</source>
+        <translation>已保留 {0}，还需 {1}</translation>
+    </message>
+    <message>
+        <source>about {0} min left</source>
+        <translation>约剩 {0} 分钟</translation>
+    </message>
+    <message>
+        <source>about {0} s left</source>
+        <translation>约剩 {0} 秒</translation>
+    </message>
+    <message>
+        <source>Enter: see the review</source>
+        <translation>Enter：查看复核</translation>
+    </message>
+    <message>
+        <source>Space: go on</source>
+        <translation>空格：继续</translation>
+    </message>
+    <message>
+        <source>Space: pause</source>
+        <translation>空格：暂停</translation>
+    </message>
+    <message>
         <source>TIP SLIPPED</source>
         <translation>测头滑动</translation>
+    </message>
+    <message>
+        <source>No swing yet</source>
+        <translation>尚无摆动</translation>
+    </message>
+    <message>
+        <source>It begins as soon as the step Swing is shown at the screen.</source>
+        <translation>屏幕上显示“摆动”步骤后即开始。</translation>
+    </message>
+    <message>
+        <source>at most {0} images</source>
+        <translation>最多 {0} 幅图像</translation>
     </message>
     <message>
         <source>The tip is used from now on.</source>
@@ -2510,10 +2589,6 @@
     <message>
         <source>{0} of at least {1}</source>
         <translation>{0} / 至少 {1}</translation>
-    </message>
-    <message>
-        <source>{0} of about {1}</source>
-        <translation>{0} / 约 {1}</translation>
     </message>
 </context>
 <context>
@@ -2664,7 +2739,7 @@
     </message>
     <message>
         <source>Calibrate each of both from a file of its own.</source>
-        <translation>请将两组分别存为文件，各自校准。</translation>
+        <translation>请将两组分别存为文件，各自标定。</translation>
     </message>
     <message>
         <source>Camera {camera} does not see the pen as the others do: at {n_apart} of {n_pairs} moments it is turned otherwise. Check that the images belong to the same swing and are paired rightly, that one signal triggers all cameras, and that none of them moved.</source>
@@ -3379,6 +3454,10 @@
         <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
     <message>
+        <source>The tip is being computed. Keep the pen at hand.</source>
+        <translation>正在计算测头。请把光笔放在手边。</translation>
+    </message>
+    <message>
         <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
         <translation>该测头需检查。{why}请注明理由后接受，否则不要接受。</translation>
     </message>
@@ -3469,6 +3548,10 @@
     <message>
         <source>Touch the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees by {n_touches} touches.</source>
         <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
+        <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
     </message>
     <message>
         <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip. Touch each end more often, and lay the length across the view.</source>
@@ -3627,10 +3710,6 @@
         <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
     </message>
     <message>
-        <source>The tip is being computed. Put the pen down.</source>
-        <translation>正在计算测头。可以放下光笔。</translation>
-    </message>
-    <message>
         <source>The tip is that of the first, which are more.</source>
         <translation>所得测头属于位姿较多的前一组。</translation>
     </message>
@@ -3728,7 +3807,7 @@
     </message>
     <message>
         <source>To YOUR right: it tells the program where you stand.</source>
-        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
+        <translation>朝自己右侧：程序由此得知您站在哪里。</translation>
     </message>
     <message>
         <source>Too little tilt {sides}. Lean the pen further that way. Images still needed: about {n_images}.</source>
@@ -4619,7 +4698,11 @@
     </message>
     <message>
         <source>{0} Accept it at the screen.</source>
-        <translation>{0}请在屏幕前接受。</translation>
+        <translation>{0}请在屏幕上点击“接受”。</translation>
+    </message>
+    <message>
+        <source>The LED table is not that of the file in use: save or discard it.</source>
+        <translation>LED 表与正在使用的文件不同：请保存或放弃。</translation>
     </message>
     <message>
         <source>Keep the tip pressed into the cone.</source>
@@ -4627,7 +4710,7 @@
     </message>
     <message>
         <source>Lean RIGHT</source>
-        <translation>向右倾斜</translation>
+        <translation>朝自己右侧倾斜</translation>
     </message>
     <message>
         <source>Follow the arrow</source>
@@ -4834,10 +4917,6 @@
         <translation>请打开 LED 几何文件。</translation>
     </message>
     <message>
-        <source>Save or discard the changes of the LED table.</source>
-        <translation>请保存或放弃 LED 表的更改。</translation>
-    </message>
-    <message>
         <source>WAITING</source>
         <translation>等待</translation>
     </message>
@@ -4903,7 +4982,7 @@
     </message>
     <message>
         <source>CHECK</source>
-        <translation>待查</translation>
+        <translation>需检查</translation>
     </message>
     <message>
         <source>REPEAT</source>

@@ -299,6 +299,24 @@ def test_settings_that_cannot_be_saved_are_told_and_saved_when_they_can_be(
     assert reopened(settings).preferences() == PREFERENCES
 
 
+def test_what_could_not_be_saved_is_tried_again_and_taken_back(
+    tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen_app.work.settings.AGAIN_MS", 50)
+    (tmp_path / "file").write_text("not a folder")
+    settings = Settings(tmp_path / "file" / "lightpen.json")
+    told: list[object] = []
+    settings.troubled.connect(told.append)
+    with qtbot.waitSignal(settings.troubled):
+        settings.set_preferences(PREFERENCES)
+
+    with qtbot.waitSignal(settings.relieved) as relieved:
+        (tmp_path / "file").unlink()
+
+    assert relieved.args == told
+    assert reopened(settings).preferences() == PREFERENCES
+
+
 def test_the_file_belongs_to_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere/else")
 

@@ -240,6 +240,22 @@ def test_sample_files_that_cannot_be_written_are_told(
     assert "a file" in sentences[0]
 
 
+def test_why_a_file_cannot_be_read_is_taken_back_when_another_is_chosen(
+    stage: Stage, qtbot: QtBot
+) -> None:
+    stage.choose(names=OTHER)
+    chosen = stage.workbench.preparation
+    assert chosen.pen_file is not None
+    chosen.pen_file.path.unlink()
+    stage.start_again()
+    assert stage.sentences
+
+    with qtbot.waitSignal(stage.workbench.relieved) as relieved:
+        stage.choose(pen_file=chosen.pen_file)
+
+    assert relieved.args == stage.sentences[-1:]
+
+
 def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
     stage: Stage,
 ) -> None:

@@ -83,6 +83,42 @@ def test_the_exposure_reaches_the_camera(gige: GigeSimulator) -> None:
     assert asked[-1] == 2500
 
 
+def test_images_after_a_rest_are_new_and_none_is_missed(gige: GigeSimulator) -> None:
+    sent = 0
+
+    def scene(exposure_us: float, gain: int) -> Image:
+        nonlocal sent
+        sent += 1
+        return np.full((100, 200), sent % 256, np.uint8)
+
+    gige.serve(scene)
+    asleep = Event()
+    settings = CameraSettings(region=Region(0, 0, 200, 100))
+    worker = CameraWorker(camera(), settings, lambda event: None)
+    worker.measure(True)
+    worker.set_rest(0.3)
+    worker.start()
+    behind = []
+    for _ in range(6):
+        image = worker.next_frame(TIMEOUT).image
+        behind.append((sent - int(image[0, 0])) % 256)
+    worker.set_rest(None)
+    asleep.wait(0.5)  # an image may be under way
+    n_delivered = worker.stats.delivered
+    asleep.wait(0.5)
+    assert worker.stats.delivered == n_delivered
+    worker.set_rest(0.0)
+    worker.measure(False)
+    worker.measure(True)
+    worker.next_frame(TIMEOUT)
+    worker.next_frame(TIMEOUT)
+    worker.stop()
+
+    assert max(behind) <= 2
+    assert worker.stats.missed == 0
+    assert worker.stats.delivered > n_delivered
+
+
 def test_a_camera_that_another_program_controls_is_busy(gige: GigeSimulator) -> None:
     first, second = camera(), camera()
     first.open()

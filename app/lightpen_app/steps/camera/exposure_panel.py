@@ -250,7 +250,8 @@ class FocusPanel(Translated, QFrame):
     def add(self, inspection: Inspection) -> None:
         """Show one more image."""
         self._widths.append(inspection.edge_width)
-        self._meter.set_value(self._widths)
+        is_saturated = inspection.exposure.n_saturated > 0
+        self._meter.set_value(self._widths, is_saturated=is_saturated)
 
     def clear(self) -> None:
         """Forget the images, as those of another camera."""

@@ -23,7 +23,6 @@ from lightpen.detection.inspection import Exposure, Inspection, inspect
 from lightpen.formats.opened_files import CameraFile
 from lightpen.live.looking import LiveImage
 from lightpen.record.recordings import FilesBeside, files_beside
-from lightpen.simulator.hand import Doing
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
@@ -51,6 +50,7 @@ class CameraPage(Rearranged, Page):
     """The step Camera."""
 
     key = "camera"
+    shows_images = True
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
     def __init__(
@@ -294,6 +294,7 @@ class CameraPage(Rearranged, Page):
         before, caps = self._adjustment, self._live.caps
         if before is None or caps is None:
             return
+        self._live.hurry()
         self._adjustment = now = before.fed(seen.frame, seen.spots, inspection, caps)
         exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
         if exposure_us is not None and exposure_us != before.asked.exposure_us:
@@ -346,7 +347,11 @@ class CameraPage(Rearranged, Page):
         self._more.set_stats(self._live.stats)
         self._exposure.set_value(inspection.exposure)
         self._focus.add(inspection)
+        outcome = self._stray.outcome()
         self._stray.feed(seen)
+        if self._stray.outcome() != outcome:
+            self._live.hurry()  # it searches
+            self._side.ensureWidgetVisible(self._stray)
         self._adjust(seen, inspection)
 
     def _on_connection_changed(self, connection: Connection) -> None:
@@ -419,13 +424,8 @@ class CameraPage(Rearranged, Page):
         return self.tr("No camera is open.")
 
     def _show_pen(self) -> None:
-        """Let the simulated operator bring the pen, so that there is something to see.
-
-        Only while he does nothing else.
-        """
-        operator = self._live.operator
-        if self._is_shown and operator is not None and operator.doing is Doing.ABSENT:
-            operator.seat()
+        if self._is_shown:
+            self._live.show_pen()
 
     def _mark(self) -> None:
         """Mark what is masked, and what the search for stray light found."""

@@ -288,7 +288,10 @@ class SourcePanel(Translated, QGroupBox):
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
-        self._kind.setAccessibleName(self.tr("Source of the images"))
+        title = self.tr("Source of the images")
+        self._kind.setAccessibleName(title)
+        # On Linux the name of a list that drops down is what is chosen in it.
+        self._kind.setAccessibleDescription(title)
         edit = self._place.edit()
         edit.setAccessibleName(self.tr("Folder, record or video"))
         edit.setPlaceholderText(self.tr("Folder, record or video"))
