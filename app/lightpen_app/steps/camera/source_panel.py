@@ -61,7 +61,10 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome = Remark()
 
         # Widgets
-        self._kind = QComboBox()
+        self._kind = QComboBox()  # no wider than its neighbours, however long its words
+        self._kind.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
         for _ in SOURCES:
             self._kind.addItem("")
         self._place = PathField()
