@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import (
+    QCoreApplication,
+    QEvent,
+    QMimeData,
+    QPoint,
+    QPointF,
+    Qt,
+    QUrl,
+)
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -473,13 +481,12 @@ def drop_on(panel: QWidget, path: Path) -> None:
     """Drop a file or a folder of this machine."""
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path))])
-    QApplication.sendEvent(
-        panel,
-        QDropEvent(
-            *(QPointF(5, 5), Qt.DropAction.CopyAction, data),
-            *(Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier),
-        ),
+    held = (
+        *(Qt.DropAction.CopyAction, data),
+        *(Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier),
     )
+    QApplication.sendEvent(panel, QDragEnterEvent(QPoint(5, 5), *held))
+    QApplication.sendEvent(panel, QDropEvent(QPointF(5, 5), *held))
 
 
 def test_a_folder_is_picked_in_the_dialog(
@@ -603,6 +610,8 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "swing"))
+    live.wait("Use both")
+    live.click("Use both")
     live.wait("10 of 10 LEDs")
 
     gone.rename(tmp_path / "elsewhere")
