@@ -610,7 +610,9 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "swing"))
-    live.wait("Use both")
+    why_not = "Open the intrinsics file."
+    live.wait("Beside the images: camera.yaml and leds.csv")
+    live.until(lambda: live.page.main_action().why_not == why_not)
     live.click("Use both")
     live.wait("10 of 10 LEDs")
 
