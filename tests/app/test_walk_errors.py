@@ -491,7 +491,7 @@ def test_a_swing_closed_in_the_middle_is_resumed_at_the_next_start(
     again = open_wizard()
     again.until_tells(f"{n_recorded} images")
     assert again.says("Interrupted swing")
-    again.until_says("Pen LP-04  ·  Cone C-1")
+    again.until_says("Pen LP-04  ·  Tip T-10  ·  Cone C-1")
     again.click("Resume")
     again.until_shows("Swing")
     assert n_kept(again) == n_recorded
