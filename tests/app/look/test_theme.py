@@ -1,6 +1,7 @@
 """The look: read on every ground, told apart by the colour-blind."""
 
 import re
+import shutil
 from dataclasses import fields, replace
 from itertools import combinations
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontDatabase, QFontInfo
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
@@ -176,8 +177,24 @@ def test_icons_take_their_colours_from_the_palettes() -> None:
 
 def test_every_icon_of_the_style_sheet_is_there() -> None:
     for colors in (DARK, LIGHT):
-        for path in re.findall(r"url\(([^)]+)\)", style_sheet(colors)):
+        for path in re.findall(r'url\("([^"]+)"\)', style_sheet(colors)):
             assert Path(path).is_file()
+
+
+def test_the_style_sheet_is_understood_in_a_folder_with_blanks(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "Jörg 王"
+    shutil.copytree(RESOURCES, folder)
+    monkeypatch.setattr("lightpen_app.look.theme.RESOURCES", folder)
+    label = QLabel()
+    qtbot.addWidget(label)
+
+    label.setStyleSheet(style_sheet(DARK))
+    label.show()
+
+    assert str(folder.as_posix()) in label.styleSheet()
+    assert label.grab().width() > 0  # what Qt warns of fails the test
 
 
 def test_no_widget_brings_a_style_sheet_of_its_own() -> None:
