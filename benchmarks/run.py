@@ -29,7 +29,7 @@ from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
 from benchmarks.whole_program import program_rows
-from benchmarks.wizard import soak_rows, start_rows
+from benchmarks.wizard import idle_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
 from benchmarks.wrong_files import wrong_file_rows
 
@@ -53,6 +53,7 @@ SECTIONS: dict[str, Section] = {
     "killed": lambda workers, data: killed_rows(),
     "hostile": lambda workers, data: hostile_rows(),
     "start": lambda workers, data: start_rows(),
+    "idle": lambda workers, data: idle_rows(),
     "soak": lambda workers, data: soak_rows(),
 }
 

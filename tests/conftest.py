@@ -6,16 +6,22 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from subprocess import CompletedProcess
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import pytest
 from filelock import FileLock
+
+if TYPE_CHECKING:
+    from tests.gige_simulator import GigeSimulator
+
+    from lightpen.cameras.source import SourcePlace
 
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -40,6 +46,17 @@ def no_power_cut() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def no_broadcast() -> Iterator[None]:
+    """No test asks the network for cameras, whatever keys it presses."""
+    from lightpen.cameras import aravis, basler
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(aravis, "_listed", lambda library: range(0))
+        patch.setattr(basler, "LAYERS", ("BaslerCamEmu",))
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Return the folder of image sets with truth, or skip the test without it."""
@@ -50,6 +67,62 @@ def shared_data() -> Path:
     if not (path / "swing-clean").is_dir():
         pytest.fail(f"LIGHTPEN_DATA={folder} holds no folder swing-clean")
     return path
+
+
+def require_library(key: str) -> None:
+    """Skip the test without the library of a source, but where it must be there."""
+    from lightpen.cameras.sources import source_named
+
+    source = source_named(key)
+    assert source is not None
+    why_absent = source.why_absent()
+    if why_absent is not None:
+        if os.environ.get("LIGHTPEN_CAMERAS") == "required":
+            pytest.fail(str(why_absent))
+        pytest.skip(str(why_absent))
+
+
+@pytest.fixture
+def gige() -> Iterator["GigeSimulator"]:
+    """Return a simulated camera on the loopback; one test at a time has it."""
+    require_library("aravis")
+    from tests.gige_simulator import GigeSimulator
+
+    with FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock"):
+        simulator = GigeSimulator()
+        yield simulator
+        simulator.unplug()
+
+
+@pytest.fixture
+def aravis(gige: "GigeSimulator") -> "SourcePlace":
+    """Return where Aravis finds the simulated camera."""
+    from tests.gige_simulator import ADDRESS
+
+    from lightpen.cameras.source import SourcePlace
+
+    return SourcePlace(ADDRESS)
+
+
+@pytest.fixture
+def genicam() -> "SourcePlace":
+    """Return the camera of the GenTL producer that comes with Harvesters' GenICam."""
+    require_library("genicam")
+    import genicam
+
+    from lightpen.cameras.source import SourcePlace
+
+    return SourcePlace("1", str(Path(genicam.__file__).with_name("viky.cti")))
+
+
+@pytest.fixture
+def basler(monkeypatch: pytest.MonkeyPatch) -> "SourcePlace":
+    """Return the camera that pylon emulates."""
+    from lightpen.cameras.source import SourcePlace
+
+    monkeypatch.setenv("PYLON_CAMEMU", "1")
+    require_library("basler")
+    return SourcePlace("0815-0000")
 
 
 @pytest.fixture(scope="session")

@@ -80,14 +80,16 @@ class Wizard(QObject):
         pages = make_pages(self.workbench, self._sounds)
         self.window = MainWindow(pages, settings, self._preferences)
         self.window.setMinimumSize(LEAST_SIZE)
+        self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
 
         # Connections
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
+        self.window.attention_changed.connect(self.workbench.live.set_watched)
         self.workbench.others_counted.connect(self._on_others_counted)
         self.workbench.subject_changed.connect(self.window.set_subject)
-        self.workbench.run.relieved.connect(self.window.drop_notice)
+        self.workbench.relieved.connect(self.window.drop_notice)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)

@@ -14,7 +14,7 @@ def make_pages(workbench: Workbench, sounds: Sounds) -> tuple[Page, ...]:
     """Return all pages."""
     return (
         StartPage(workbench, sounds),
-        CameraPage(workbench),
+        CameraPage(workbench, sounds),
         LedsPage(workbench),
         SwingPage(workbench, sounds),
         ReviewPage(workbench),

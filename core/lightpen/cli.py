@@ -706,6 +706,14 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
                 "The rig file names the files of its cameras. Leave out --camera.",
             )
         )
+    if options.second_cone is not None:
+        raise UsageError(
+            sentence(
+                "cli.rig-and-second-cone",
+                "A second cone is taken up with a single camera only. Leave out "
+                "--second-cone, --distance and --distance-sigma.",
+            )
+        )
     if options.pen is None:
         raise _lacking("--pen", ())
     rig_file = read_rig(options.rig)

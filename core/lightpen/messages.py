@@ -43,6 +43,7 @@ class Code(StrEnum):
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NOT_SIMULTANEOUS = "verdict.not-simultaneous"
+    OUT_OF_REACH = "swing.out-of-reach"
     TIP_CHANGED = "verdict.tip-changed"
     LAST_UNKNOWN = "verdict.last-unknown"
     NO_TIP = "verdict.no-tip"
@@ -65,7 +66,7 @@ PEN_LOST = sentence(
 )
 PEN_LIFTED = sentence(Code.PEN_LIFTED, "The pen is lifted. Put the tip back to go on.")
 PAUSED = sentence(Code.PAUSED, "The swing is paused.")
-SOLVING = sentence(Code.SOLVING, "The tip is being computed. Put the pen down.")
+SOLVING = sentence(Code.SOLVING, "The tip is being computed. Keep the pen at hand.")
 UNKNOWN = sentence(
     Code.UNKNOWN,
     "The images do not tell yet where the tip is. Lean the pen to all sides.",
@@ -182,6 +183,18 @@ def uncertain(uncertainty: float, limit: float) -> Sentence:
         "Capture more images in postures that differ.",
         uncertainty=uncertainty,
         limit=limit,
+    )
+
+
+def cannot_get_below(floor: float, limit: float) -> Sentence:
+    """Tell that U (k = 2) stays above its limit whatever is captured, mm."""
+    return sentence(
+        Code.OUT_OF_REACH,
+        "U (k = 2) cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file; "
+        "the limit is {limit:.1f} \N{MICRO SIGN}m. No more images are asked for than "
+        "the postures need.",
+        floor=1000 * floor,
+        limit=1000 * limit,
     )
 
 

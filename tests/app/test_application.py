@@ -84,7 +84,7 @@ def test_choices_take_effect_at_once_and_are_remembered(
     wizard.window.preferences_changed.emit(chosen)
     QApplication.processEvents()
 
-    assert wizard.window.windowTitle().endswith("\u5149\u7b14\u6d4b\u5934\u6821\u51c6")
+    assert wizard.window.windowTitle().endswith("\u5149\u7b14\u6d4b\u5934\u6807\u5b9a")
     assert colors_of(wizard.window.palette()) is LIGHT
     assert settings.await_saved(120.0)
     again = open_wizard(qtbot, Settings(settings.file))

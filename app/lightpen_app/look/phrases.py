@@ -79,6 +79,7 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
     Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
+    Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Nothing to compare with"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
@@ -114,6 +115,7 @@ _LACKS: dict[Lack, str] = {
     Lack.SOURCE_PLACE: QT_TRANSLATE_NOOP(
         "phrases", "Choose the folder of the recorded images."
     ),
+    Lack.DEVICE: QT_TRANSLATE_NOOP("phrases", "Search for the camera and choose it."),
     Lack.IMAGES: QT_TRANSLATE_NOOP("phrases", "No image has come from the camera yet."),
     Lack.CAMERA_FILE: QT_TRANSLATE_NOOP("phrases", "Open the intrinsics file."),
     Lack.IMAGE_SIZE: QT_TRANSLATE_NOOP(
@@ -121,7 +123,7 @@ _LACKS: dict[Lack, str] = {
     ),
     Lack.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
     Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
-        "phrases", "Save or discard the changes of the LED table."
+        "phrases", "The LED table is not that of the file in use: save or discard it."
     ),
 }
 # A word for a sign to stand beside, read from a distance.

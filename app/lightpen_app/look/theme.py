@@ -4,6 +4,7 @@ What is drawn by hand takes its colours from `colors_of` its palette, all else f
 style sheet in resources; so a change of theme reaches every widget by itself.
 """
 
+import sys
 from dataclasses import asdict, dataclass
 from enum import Enum, IntEnum, StrEnum
 from pathlib import Path
@@ -18,6 +19,11 @@ import lightpen_resources
 RESOURCES = Path(lightpen_resources.__file__).parent
 FAMILIES = ("Lightpen Sans", "Lightpen Sans SC")
 GRID = 8  # px; every margin, gap and height is a multiple of it, or half of it
+# Points of the system's font where nobody has asked for larger text.
+USUAL_POINTS = {"win32": 9.0, "darwin": 13.0}
+USUAL_POINTS_ELSEWHERE = 11.0
+LARGEST_SCALE = 1.4  # of the text; the window has no room for more
+SCALE = "text_scale"  # property of the application
 CAP_HEIGHT = 0.714  # of the font size, in the bundled font
 
 
@@ -177,14 +183,38 @@ def _linear(value: float) -> float:
 
 
 def load_fonts() -> None:
-    """Add the bundled fonts and make them the application's."""
+    """Add the bundled fonts for the application, as large as the system wants text."""
+    system = QFontDatabase.systemFont(QFontDatabase.SystemFont.GeneralFont)
+    set_text_scale(scale_for(system.pointSizeF(), sys.platform))
     for file in sorted((RESOURCES / "fonts").glob("*.ttf")):
         QFontDatabase.addApplicationFont(str(file))
     QApplication.setFont(font(TextSize.BODY))
 
 
+def scale_for(points: float, platform: str) -> float:
+    """Return by how much text is enlarged, by the size of the system's font."""
+    usual = USUAL_POINTS.get(platform, USUAL_POINTS_ELSEWHERE)
+    return min(max(points / usual, 1.0), LARGEST_SCALE)
+
+
+def set_text_scale(scale: float) -> None:
+    """Enlarge all text of the type scale that is drawn from now on."""
+    application = QApplication.instance()
+    if application is not None:
+        application.setProperty(SCALE, scale)
+
+
+def scaled(size: TextSize) -> int:
+    """Return how large text of the type scale is here, px."""
+    application = QApplication.instance()
+    scale = None if application is None else application.property(SCALE)
+    return round(size * (scale or 1.0))
+
+
 def font(size: float, *, bold: bool = False) -> QFont:
-    """Return the program's font at a size in px."""
+    """Return the program's font at a size in px, or at a place of the type scale."""
+    if isinstance(size, TextSize):
+        size = scaled(size)
     result = QFont()
     result.setFamilies(list(FAMILIES))
     result.setPixelSize(max(1, round(size)))
@@ -214,7 +244,7 @@ def apply_theme(application: QApplication, colors: Colors) -> None:
 def style_sheet(colors: Colors) -> str:
     """Return the style sheet of resources, filled in."""
     template = Template((RESOURCES / "style" / "lightpen.qss").read_text("utf-8"))
-    sizes = {f"size_{size.name.lower()}": f"{size}px" for size in TextSize}
+    sizes = {f"size_{size.name.lower()}": f"{scaled(size)}px" for size in TextSize}
     icons = (RESOURCES / "icons").as_posix()
     theme = "dark" if colors is DARK else "light"
     return template.substitute(asdict(colors), **sizes, icons=icons, theme=theme)

@@ -67,6 +67,8 @@ class MainWindow(Rearranged, QMainWindow):
     -------
     preferences_changed(Preferences)
         The user chose otherwise.
+    attention_changed(bool)
+        Whether anybody may be looking at live images now.
     closing()
         The pages are shut down; what they share must be, too, and whoever does so
         waits for what is still under way.
@@ -75,6 +77,7 @@ class MainWindow(Rearranged, QMainWindow):
     # Less is what a screen of 1920 x 1080 drawn at 200 % has.
     narrow_below, low_below = 150 * GRID, 80 * GRID  # px
     preferences_changed = Signal(object)
+    attention_changed = Signal(bool)
     closing = Signal()
 
     def __init__(
@@ -93,6 +96,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._settings = settings
         self._now = 0
         self._notice_is_of_page = False
+        self._status_holds: Callable[[], bool] | None = None  # None: until another
         self._asks = True
 
         # Widgets: the order of making them is the order of the Tab key
@@ -121,9 +125,10 @@ class MainWindow(Rearranged, QMainWindow):
         self._options.data_folder_chosen.connect(self._on_data_folder_asked)
         self._options.about_chosen.connect(self._on_about_chosen)
         self._operator_view.closed.connect(self._on_operator_view_closed)
-        self._operator_view.advance_requested.connect(self._on_advance_pressed)
-        self._operator_view.back_requested.connect(self.go_back)
+        self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
+        self._notice.value_changed.connect(self._operator_view.set_notice)
+        self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
 
@@ -148,14 +153,16 @@ class MainWindow(Rearranged, QMainWindow):
             return
         why_closed = self._pages[index].why_closed()
         if why_closed:
-            self._action_bar.set_status(why_closed)
+            asked = self._pages[index]
+            self._say_while(why_closed, lambda: asked.why_closed() == why_closed)
             return
         self.page().left()
         self._now = index
-        self._action_bar.set_status("")
+        self._set_status("")
         if self._notice_is_of_page:
             self._notice.clear()
         self._area.show_page(self.page())
+        self._tell_attention()
         self.page().entered()
         self._refresh()
         self._focus_page()
@@ -221,6 +228,10 @@ class MainWindow(Rearranged, QMainWindow):
         )
         return tuple(filter(None, said))
 
+    def is_seen(self) -> bool:
+        """Return whether it, or the operator view, is on a screen."""
+        return not self.isMinimized() or self._operator_view.isVisible()
+
     def help_window(self) -> HelpWindow:
         """Return the help."""
         return self._help_window
@@ -269,6 +280,8 @@ class MainWindow(Rearranged, QMainWindow):
     @override
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
+        if event.type() == QEvent.Type.WindowStateChange:
+            self._tell_attention()
         if event.type() == QEvent.Type.LanguageChange:
             self._retranslate()
             self._refresh()
@@ -278,7 +291,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
-        page.status_changed.connect(self._action_bar.set_status)
+        page.status_changed.connect(self._set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.operator_value_changed.connect(self._operator_view.set_value)
 
@@ -292,7 +305,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._action(Qt.Key.Key_F10, self._show_options)
         # A presenter's remote sends the page keys.
         self._hands_free_actions = (
-            self._action(Qt.Key.Key_Space, self._on_pause_pressed),
+            self._action(Qt.Key.Key_Space, self._on_space_pressed),
             self._action(Qt.Key.Key_PageDown, self._on_advance_pressed),
             self._action(Qt.Key.Key_PageUp, self.go_back),
         )
@@ -359,8 +372,20 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.title(), page.lead())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
+        if self._status_holds is not None and not self._status_holds():
+            self._set_status("")
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
+
+    def _set_status(self, text: str) -> None:
+        """Show a sentence in the status line until there is another."""
+        self._status_holds = None
+        self._action_bar.set_status(text)
+
+    def _say_while(self, text: str, holds: Callable[[], bool]) -> None:
+        """Show a sentence in the status line as long as it is true."""
+        self._set_status(text)
+        self._status_holds = holds
 
     def _focus_page(self) -> None:
         """Put the focus on the control that the page chose, or on its first one."""
@@ -390,9 +415,16 @@ class MainWindow(Rearranged, QMainWindow):
     def _on_advance_pressed(self) -> None:
         """Do as a presenter's remote asks, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
-            self._action_bar.set_status(self.tr("Press this button at the screen."))
+            words = self.tr("Press this button at the screen.")
+            self._say_while(words, lambda: self.page().main_action().at_screen)
         else:
             self._action_bar.press_main()
+
+    def _on_advance_wanted_afar(self) -> None:
+        """Go on for an operator who does not see the page: never ask anything on it."""
+        page = self.page()
+        if page.is_hands_free() and page.is_complete():
+            self._on_advance_pressed()
 
     def _on_step_requested(self, key: str) -> None:
         keys = [page.key for page in self._pages]
@@ -404,6 +436,14 @@ class MainWindow(Rearranged, QMainWindow):
             self._notice.show_text(text)
         elif self._notice_is_of_page:
             self._notice.clear()
+
+    def _on_space_pressed(self) -> None:
+        """Press the button that has the focus; pause where none has."""
+        focused = QApplication.focusWidget()
+        if isinstance(focused, QAbstractButton) and focused.isEnabled():
+            focused.click()
+        else:
+            self._on_pause_pressed()
 
     def _on_pause_pressed(self) -> None:
         self.page().toggle_pause()
@@ -418,6 +458,12 @@ class MainWindow(Rearranged, QMainWindow):
             self._operator_view.open_beside(self)
         else:
             self._operator_view.close()
+        self._tell_attention()
+
+    def _tell_attention(self) -> None:
+        """Tell whether live images can be seen now."""
+        is_seen = self.is_seen()
+        self.attention_changed.emit(self.page().shows_images and is_seen)
 
     def _on_operator_view_closed(self) -> None:
         self._operator_action.setChecked(False)
@@ -428,7 +474,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_mute_toggled(self, muted: bool) -> None:
         words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
-        self._action_bar.set_status(words)
+        self._set_status(words)
 
     def _on_data_folder_asked(self) -> None:
         dialog = QFileDialog(self, self.tr("Data folder"))

@@ -1,8 +1,9 @@
-"""A sentence above the page that waits to be read, and stops nothing."""
+"""A sentence over the page that waits to be read, and stops nothing."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
+from lightpen_app.look.announcements import announce
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
@@ -13,11 +14,11 @@ class NoticeBar(Translated, QFrame):
 
     Signals
     -------
-    closed()
-        The user has read it.
+    value_changed(str)
+        What it says; empty once it says nothing any more.
     """
 
-    closed = Signal()
+    value_changed = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -36,7 +37,7 @@ class NoticeBar(Translated, QFrame):
         layout.addWidget(self._close)
 
         # Connections
-        self._close.clicked.connect(self._on_close_clicked)
+        self._close.clicked.connect(self.clear)
 
         self._retranslate()
         self.hide()
@@ -55,15 +56,14 @@ class NoticeBar(Translated, QFrame):
         self._text.setAccessibleName(text)
         set_tone(self, tone)
         self.show()
+        announce(self, text)
+        self.value_changed.emit(text)
 
     def clear(self) -> None:
         """Say nothing."""
         self._text.clear()
         self.hide()
-
-    def _on_close_clicked(self) -> None:
-        self.clear()
-        self.closed.emit()
+        self.value_changed.emit("")
 
     def _retranslate(self) -> None:
         self._close.setText(self.tr("Close"))

@@ -1,8 +1,11 @@
-"""The part of the window that the page has: above it a notice, its title and lead."""
+"""The part of the window that the page has: its title and lead, over them a notice."""
 
 from collections.abc import Sequence
 
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QBoxLayout,
     QFrame,
     QSizePolicy,
@@ -10,6 +13,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+from typing_extensions import override
 
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.shell.notice_bar import NoticeBar
@@ -18,6 +22,9 @@ from lightpen_app.widgets.rearranged import Room
 
 class PageArea(QFrame):
     """Shows one page of several.
+
+    A notice lies over it and moves nothing, so that a key pressed meanwhile reaches
+    what it was meant for.
 
     Parameters
     ----------
@@ -31,7 +38,7 @@ class PageArea(QFrame):
         self._pages = tuple(pages)
 
         # Widgets: the order of making them is the order of the Tab key
-        self._notice = NoticeBar()
+        self._notice = NoticeBar(self)
         self._title = text_label(TextSize.TITLE)
         self._title.setWordWrap(False)
         self._lead = text_label(TextSize.BODY, Tone.QUIET)
@@ -46,17 +53,24 @@ class PageArea(QFrame):
         self._heading.addWidget(self._lead, 1)
         self._layout = layout = QVBoxLayout(self)
         layout.setSpacing(GRID)
-        layout.addWidget(self._notice)
         layout.addSpacing(GRID)
         layout.addLayout(self._heading)
         layout.addSpacing(GRID)
         layout.addWidget(self._stack, 1)
+
+        # Connections
+        self._notice.value_changed.connect(self._place_notice)
 
         self.show_page(self._pages[0])
 
     def notice(self) -> NoticeBar:
         """Return the bar of the notice."""
         return self._notice
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_notice()
 
     def words(self) -> tuple[str, ...]:
         """Return what is said about the page."""
@@ -87,3 +101,16 @@ class PageArea(QFrame):
             self._layout.setContentsMargins(side, 2 * GRID, side, 3 * GRID)
             self._heading.setDirection(QBoxLayout.Direction.TopToBottom)
             self._heading.setSpacing(GRID)
+
+    def _place_notice(self) -> None:
+        """Lay the notice over title and lead, but not over what is typed in."""
+        notice = self._notice
+        width = self.width() - 2 * GRID
+        place = QRect(GRID, GRID // 2, width, notice.heightForWidth(width))
+        focused = QApplication.focusWidget()
+        if focused is not None and self._stack.isAncestorOf(focused):
+            corner = focused.mapTo(self, QPoint(0, 0))
+            if place.intersects(QRect(corner, focused.size())):
+                place.moveBottom(self.height() - GRID)
+        notice.setGeometry(place)
+        notice.raise_()

@@ -32,12 +32,15 @@ class Sidebar(Translated, QFrame):
         Index of the step, which may be closed.
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
+    subject_told(str)
+        `subject` is different.
     """
 
     step_chosen = Signal(int)
     operator_view_chosen = Signal()
     help_chosen = Signal()
     options_chosen = Signal()
+    subject_told = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -115,6 +118,7 @@ class Sidebar(Translated, QFrame):
         text = PARTED.join(part.replace(" ", NO_BREAK) for part in parts)
         self._subject.setText(text)
         self._subject.setVisible(bool(text))
+        self.subject_told.emit(text)
         self._origin.set_value(origin_remark(self._value.origin))
 
     def set_room(self, room: Room) -> None:

@@ -42,6 +42,8 @@ class Page(Translated, QWidget):
     ----------
     key : str
         Names the step in the settings and its help file: "start", "camera" and so on.
+    shows_images : bool
+        Whether live images are looked at on it.
 
     Signals
     -------
@@ -61,6 +63,7 @@ class Page(Translated, QWidget):
     """
 
     key = ""
+    shows_images = False
     changed = Signal()
     advance_requested = Signal()
     step_requested = Signal(str)

@@ -1,7 +1,9 @@
 """Text as large as its place allows, up to the size that the distance asks for."""
 
+from math import ceil
+
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent
+from PySide6.QtGui import QFontMetricsF, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
@@ -19,6 +21,8 @@ class FittedText(QWidget):
         Size of the letters where there is room, px.
     n_lines : int
         Lines of that size for which the widget asks.
+    least : float
+        Size of the letters, px, in which all words always have room.
     """
 
     def __init__(
@@ -26,9 +30,11 @@ class FittedText(QWidget):
         largest: float,
         n_lines: int = 1,
         alignment: Qt.AlignmentFlag = Qt.AlignmentFlag.AlignLeft,
+        least: float = 0.0,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
+        self._least = least
         self._largest = largest
         self._n_lines = n_lines
         self._flags = WRAPPED | int(alignment | Qt.AlignmentFlag.AlignVCenter)
@@ -49,6 +55,7 @@ class FittedText(QWidget):
             return
         self._text, self._tone, self._bold = text, tone, bold
         self.setAccessibleName(text)
+        self._ask_room()
         self.update()
 
     def set_largest(self, largest: float) -> None:
@@ -76,6 +83,20 @@ class FittedText(QWidget):
     @override
     def minimumSizeHint(self) -> QSize:
         return QSize(40, 3 * GRID)
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._ask_room()
+
+    def _ask_room(self) -> None:
+        """Ask for so much height that no words are smaller than can be read."""
+        if not self._least or not self.width():
+            return
+        metrics = QFontMetricsF(font(self._least, bold=self._bold))
+        box = QRectF(0, 0, self.width(), 1e6)
+        needed = ceil(metrics.boundingRect(box, self._flags, self._text).height())
+        self.setMinimumHeight(max(needed, self.minimumSizeHint().height()))
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:

@@ -7,7 +7,8 @@ from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent,
 from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID, letters_for
+from lightpen_app.look.theme import GRID, Tone, letters_for
+from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.state_banner import State, StateBanner
@@ -16,7 +17,9 @@ from lightpen_app.widgets.translated import Translated
 DISTANCES_M = (1, 2, 3, 4, 6)
 DIAL_SHARE, SIDE_SHARE = 11, 10  # of the width
 # Of the height, at most:
-INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.22
+INSTRUCTION_SHARE, HINT_SHARE, COUNT_SHARE, STATE_SHARE = 0.26, 0.12, 0.12, 0.2
+NOTICE_SHARE, SMALL_SHARE, GAP_SHARE = 0.12, 0.03, 0.008
+BESIDE_NOTICE = 0.55  # of their share that instruction and hint have below a notice
 LEAST_SHARE = 1 / 18  # of the height; smaller letters would leave it empty
 USUAL_DPI = 92.0  # a 24 inch screen of 1920 x 1080
 CREDIBLE_DPI = (60.0, 250.0)  # outside, a screen does not tell its size
@@ -33,21 +36,27 @@ class OperatorValue:
     hint : str
         A sentence more.
     count : str
-        Such as "184 / 300".
+        Such as "60 kept, 40 to go".
+    time_left : str
+        Such as "about 20 s left"; empty where nothing is waited for.
     fraction : float or None
         How much is done, 0 to 1.
+    keys : str
+        What keys of this view do now, besides leaving it.
     """
 
     instruction: str = ""
     hint: str = ""
     state: State = field(default_factory=State)
     count: str = ""
+    time_left: str = ""
     fraction: float | None = None
+    keys: str = ""
     dial: DialValue | None = None
 
 
 class OperatorView(Translated, QWidget):
-    """One instruction, the dial, the count and the state.
+    """One instruction, the dial, the count and the state, of a pen and its tip.
 
     The letters are as large as the viewing distance asks for, where they fit; on a
     large window they are larger.
@@ -56,13 +65,12 @@ class OperatorView(Translated, QWidget):
     -------
     closed()
         The view was left; nothing else has ended by that.
-    advance_requested(), back_requested(), pause_requested()
-        Enter or PageDown, PageUp, Space.
+    advance_requested(), pause_requested()
+        Enter or PageDown, Space.
     """
 
     closed = Signal()
     advance_requested = Signal()
-    back_requested = Signal()
     pause_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -72,21 +80,26 @@ class OperatorView(Translated, QWidget):
         self.setAutoFillBackground(True)
 
         # Widgets
+        self._subject = FittedText(43, 1)
+        self._notice = FittedText(43, 2)
+        self._notice.hide()
         self._instruction = FittedText(86, 1)
         self._hint = FittedText(43, 1)
         self._dial = PostureDial()
         self._count = FittedText(120, 1)
+        self._time_left = FittedText(43, 1)
         self._progress = QProgressBar()
         self._progress.setRange(0, 1000)
         self._progress.setTextVisible(False)
         self._banner = StateBanner()
+        self._keys = FittedText(43, 1)
 
         # Layout
-        side = QVBoxLayout()
-        side.setSpacing(3 * GRID)
+        self._side = side = QVBoxLayout()
         side.addStretch(1)
         side.addWidget(self._count)
         side.addWidget(self._progress)
+        side.addWidget(self._time_left)
         side.addStretch(1)
         side.addWidget(self._banner)
         side.addStretch(1)
@@ -94,11 +107,13 @@ class OperatorView(Translated, QWidget):
         layout.setContentsMargins(4 * GRID, 3 * GRID, 4 * GRID, 3 * GRID)
         layout.setHorizontalSpacing(4 * GRID)
         layout.setVerticalSpacing(GRID)
-        layout.addWidget(self._instruction, 0, 0, 1, 2)
-        layout.addWidget(self._hint, 1, 0, 1, 2)
-        layout.addWidget(self._dial, 2, 0)
-        layout.addLayout(side, 2, 1)
-        layout.setRowStretch(2, 1)
+        for widget in (self._subject, self._notice, self._instruction, self._hint):
+            layout.addWidget(widget, layout.rowCount(), 0, 1, 2)
+        row = layout.rowCount()
+        layout.addWidget(self._dial, row, 0)
+        layout.addLayout(side, row, 1)
+        layout.addWidget(self._keys, row + 1, 0, 1, 2)
+        layout.setRowStretch(row, 1)
         layout.setColumnStretch(0, DIAL_SHARE)
         layout.setColumnStretch(1, SIDE_SHARE)
 
@@ -116,6 +131,8 @@ class OperatorView(Translated, QWidget):
         self._hint.set_text(value.hint, bold=False)
         self._banner.set_value(value.state)
         self._count.set_text(value.count)
+        self._time_left.set_text(value.time_left, Tone.QUIET, bold=False)
+        self._time_left.setVisible(bool(value.time_left))
         self._progress.setVisible(value.fraction is not None)
         if value.fraction is not None:
             self._progress.setValue(round(1000 * value.fraction))
@@ -124,6 +141,17 @@ class OperatorView(Translated, QWidget):
         self._layout.setHorizontalSpacing(0 if value.dial is None else 4 * GRID)
         if value.dial is not None:
             self._dial.set_value(value.dial)
+        self._tell_keys()
+        self._resize_letters()
+
+    def set_subject(self, text: str) -> None:
+        """Say what is being calibrated, such as pen and tip."""
+        self._subject.set_text(text, Tone.QUIET, bold=False)
+
+    def set_notice(self, text: str) -> None:
+        """Show a sentence that must be read, or none."""
+        self._notice.set_text(text, Tone.BAD)
+        self._notice.setVisible(bool(text))
         self._resize_letters()
 
     def distance_m(self) -> float:
@@ -168,8 +196,6 @@ class OperatorView(Translated, QWidget):
                 self.close()
             case Qt.Key.Key_Return | Qt.Key.Key_Enter | Qt.Key.Key_PageDown:
                 self.advance_requested.emit()
-            case Qt.Key.Key_PageUp:
-                self.back_requested.emit()
             case Qt.Key.Key_Space:
                 self.pause_requested.emit()
             case _:
@@ -182,17 +208,26 @@ class OperatorView(Translated, QWidget):
 
     def _resize_letters(self) -> None:
         letters = max(self.letters(), self.height() * LEAST_SHARE)
+        self._side.setSpacing(min(3 * GRID, round(self.height() * GAP_SHARE)))
         self._instruction.set_largest(letters * 1.2)
         self._hint.set_largest(letters * 0.6)
+        self._notice.set_largest(letters * 0.45)
+        for quiet in (self._subject, self._time_left, self._keys):
+            quiet.set_largest(letters * 0.4)
         is_digit = len(self._value.count) == 1
         self._count.set_largest(letters * (2.4 if is_digit else 1.2))
         has_room = self._value.dial is None
         self._banner.set_word_size(letters * (1.6 if has_room else 0.8))
         # Else the dial, which wants to be square, would take the room of the words, and
         # of these one that of another.
+        room = 1.0 if self._notice.isHidden() else BESIDE_NOTICE
         for widget, share in (
-            (self._instruction, INSTRUCTION_SHARE),
-            (self._hint, HINT_SHARE),
+            (self._instruction, room * INSTRUCTION_SHARE),
+            (self._hint, room * HINT_SHARE),
+            (self._notice, NOTICE_SHARE),
+            (self._subject, SMALL_SHARE),
+            (self._time_left, SMALL_SHARE),
+            (self._keys, SMALL_SHARE),
             (self._count, COUNT_SHARE),
             (self._banner, STATE_SHARE),
         ):
@@ -201,6 +236,11 @@ class OperatorView(Translated, QWidget):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Operator view"))
+        self._tell_keys()
+
+    def _tell_keys(self) -> None:
+        keys = self._value.keys, self.tr("Esc: leave this view")
+        self._keys.set_text(PARTED.join(filter(None, keys)), Tone.QUIET, bold=False)
 
 
 def other_screen(present: QScreen, screens: list[QScreen]) -> QScreen:

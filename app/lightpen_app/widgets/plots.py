@@ -12,16 +12,26 @@ from typing import TypeAlias
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QImage, QPainter
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.formats.files import write_whole
-from lightpen_app.look.theme import GRID, Colors, TextSize, Tone, colors_of, font
+from lightpen_app.look.theme import (
+    GRID,
+    Colors,
+    TextSize,
+    Tone,
+    colors_of,
+    font,
+    scaled,
+)
 
 PNG_SCALE = 2
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
+TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
+LEAST_TITLE = 9  # px
 LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
 N_LEAST = 10  # images that have room along a trace, so that its numbers are whole
 LABELLED = (1, 2, 5)  # of each decade
@@ -97,6 +107,7 @@ class Plot(QWidget):
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._columns: dict[str, Column] = {}
+        self._title_px = 0
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
         # Widgets
@@ -193,19 +204,41 @@ class Plot(QWidget):
         if event.type() == QEvent.Type.PaletteChange:
             self._restyle()
 
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if self._fitted_title_px() != self._title_px:
+            self._restyle()
+
+    def _named_curves(self) -> tuple[str, ...]:
+        """Return the names that stand beside the title."""
+        return ()
+
+    def _fitted_title_px(self) -> int:
+        """Return how large the title is, which has to be read whole, px."""
+        largest = scaled(TextSize.SMALL)
+        words = "   ".join((self._axes.title, *self._named_curves()))
+        needed = QFontMetricsF(font(largest, bold=True)).horizontalAdvance(words)
+        room = max(self.width() - TITLE_MARGIN, 1)
+        return max(min(int(largest * room / max(needed, 1.0)), largest), LEAST_TITLE)
+
     def _restyle(self) -> None:
         """Colour what is there already; a subclass colours its curves besides."""
         colors = colors_of(self.palette())
         self._graphics.setBackground(colors.panel)
-        size = f"{TextSize.SMALL}px"
+        self._title_px = self._fitted_title_px()
+        size = f"{self._title_px}px"
         title = {"color": colors.text, "size": size, "justify": "left"}
         self._item.setTitle(self._axes.title, **title)
+        if names := self._named_curves():  # beside the title they hide nothing
+            words = title_with_names(self._axes.title, names, colors)
+            self._item.titleLabel.setText(words)
         for side, words in (("left", self._axes.y), ("bottom", self._axes.x)):
             axis = self._item.getAxis(side)
             axis.setPen(pg.mkPen(colors.line))
             axis.setTextPen(pg.mkPen(colors.muted))
             axis.setTickFont(font(TextSize.SMALL))
-            label = {"color": colors.muted, "font-size": f"{TextSize.SMALL}px"}
+            label = {"color": colors.muted, "font-size": f"{scaled(TextSize.SMALL)}px"}
             if words:
                 axis.setLabel(words, **label)
             else:
@@ -308,6 +341,11 @@ class TracePlot(Plot):
         self._limit.hide()
         self._item.addItem(self._limit)
         self._item.vb.sigResized.connect(self._on_area_resized)
+        self._restyle()
+
+    def set_names(self, *names: str) -> None:
+        """Change the names of the curves, as when the language changes."""
+        self._legend = names
         self._restyle()
 
     def set_data(self, x: FloatArray, *values: FloatArray) -> None:
@@ -422,6 +460,7 @@ class TracePlot(Plot):
             self._limit.setPen(pen)
             self._limit.label.setColor(QColor(colors.muted))
             self._limit.label.fill = pg.mkBrush(colors.panel)
-        if len(self._curves) > 1:  # beside the title they hide nothing
-            title = title_with_names(self._axes.title, self._legend, colors)
-            self._item.titleLabel.setText(title)
+
+    @override
+    def _named_curves(self) -> tuple[str, ...]:
+        return self._legend if len(self._curves) > 1 else ()

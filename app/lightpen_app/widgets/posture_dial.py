@@ -23,6 +23,7 @@ from lightpen.model.posture import Posture
 from lightpen_app.look.signs import Sign, draw_arrow, draw_sign
 from lightpen_app.look.theme import Colors, TextSize, colors_of, font
 from lightpen_app.widgets.camera_mark import Stand, draw_camera
+from lightpen_app.widgets.fitted_text import fitted_size
 from lightpen_app.widgets.translated import Translated
 
 MAX_TILT = math.radians(36)  # drawn at the rim
@@ -283,10 +284,8 @@ class PostureDial(Translated, QWidget):
         self._draw_turn_aim(painter, track, x_of, colors)
         words = self.tr("turn about the pen's own axis")
         painter.setPen(QColor(colors.muted))
-        painter.setFont(font(size))
-        below = QRectF(
-            box.left(), line.bottom() + 0.1 * box.height(), box.width(), 2 * size
-        )
+        below = QRectF(0, line.bottom() + 0.1 * box.height(), self.width(), 2 * size)
+        painter.setFont(font(fitted_size(words, below, size, bold=False)))
         flags = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
         painter.drawText(below, flags, words)
 

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.announcements import announce
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.fitted_text import fitted_size
@@ -38,11 +39,20 @@ class State:
 class StateBanner(QWidget):
     """A filled area with a sign, a word and a sentence.
 
+    A screen reader is told each new word with its sentence.
+
     Parameters
     ----------
     word_size : float
         Size of the word, px; the sentence is half of it, at least `TextSize.BODY`.
+
+    Signals
+    -------
+    announced(str)
+        What is said aloud where somebody listens.
     """
+
+    announced = Signal(str)
 
     def __init__(
         self, word_size: float = TextSize.DISPLAY, parent: QWidget | None = None
@@ -60,10 +70,24 @@ class StateBanner(QWidget):
         """Show another state."""
         if value == self._value:
             return
+        is_new = value.word != self._value.word
         self._value = value
         self.setAccessibleName(value.word)
         self.setAccessibleDescription(value.detail)
         self.update()
+        if is_new and self.isVisible():
+            self._announce()
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not event.spontaneous():
+            self._announce()
+
+    def _announce(self) -> None:
+        text = ". ".join(filter(None, (self._value.word, self._value.detail)))
+        announce(self, text)
+        self.announced.emit(text)
 
     def set_word_size(self, word_size: float) -> None:
         """Change the size of the word, px."""

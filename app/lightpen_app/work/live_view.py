@@ -1,5 +1,6 @@
 """The live images of a camera as signals of Qt."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from threading import Thread
 from time import monotonic
@@ -12,6 +13,7 @@ from lightpen.cameras.protocol import (
     CameraSettings,
     Caps,
     DeviceLost,
+    FramesSkipped,
     ImageCamera,
     Stats,
 )
@@ -20,6 +22,7 @@ from lightpen.cameras.worker import (
     ConnectionChanged,
     Ended,
     Failed,
+    KeepsUp,
     SettingsApplied,
     Troubled,
     WorkerEvent,
@@ -28,7 +31,7 @@ from lightpen.detection.aim import Aim
 from lightpen.live.looking import Live, LiveImage
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
-from lightpen.simulator.hand import Operator
+from lightpen.simulator.hand import Doing, Operator
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
@@ -73,6 +76,8 @@ class LiveView(QObject):
         A sentence to be read; the camera carries on.
     failed(str)
         A sentence to be read; no more images come until another `open`.
+    relieved(str)
+        The sentence of one of these whose cause is gone.
     """
 
     image_shown = Signal(object)
@@ -80,6 +85,7 @@ class LiveView(QObject):
     settings_applied = Signal(object)
     troubled = Signal(str)
     failed = Signal(str)
+    relieved = Signal(str)
 
     def __init__(self, run: SwingRun, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -87,14 +93,23 @@ class LiveView(QObject):
         self._live: Live | None = None
         self._connection = Connection.CLOSED
         self._aim = Aim()
+        self._is_watched = True
         self._operator: Operator | None = None
         self._teller: _Teller | None = None
         self._closing: list[Thread] = []
+        self._without_images = self._skipping = ""  # as was told of them
 
     def open(
-        self, camera: ImageCamera, settings: CameraSettings, clock: Clock | None = None
+        self,
+        camera: ImageCamera,
+        settings: CameraSettings,
+        clock: Clock | None = None,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
-        """Show another camera; the one before is closed."""
+        """Show another camera; the one before is closed.
+
+        A camera whose serial number is among the ``known`` gets the settings there.
+        """
         self.close()
         self._operator = (
             camera.operator if isinstance(camera, SimulatedCamera) else None
@@ -102,8 +117,11 @@ class LiveView(QObject):
         self._teller = teller = _Teller(self)
         teller.image_shown.connect(self.image_shown)
         teller.told.connect(self._on_told)
-        self._live = live = Live(camera, settings, teller, self._run.runner, clock)
+        self._live = live = Live(
+            *(camera, settings, teller, self._run.runner, clock, known)
+        )
         live.set_aim(self._aim)
+        live.set_watched(self._is_watched)
         live.start()
 
     def close(self) -> None:
@@ -117,6 +135,7 @@ class LiveView(QObject):
         if live is None or teller is None:
             return
         teller.blockSignals(True)
+        self._relieve()
         self.set_following(False)
         self._operator = None
         self._closing = [thread for thread in self._closing if thread.is_alive()]
@@ -152,6 +171,11 @@ class LiveView(QObject):
         return self._connection
 
     @property
+    def serial(self) -> str:
+        """Serial number of the camera; empty where none is open."""
+        return "" if self._live is None else self._live.serial
+
+    @property
     def caps(self) -> Caps | None:
         """What the camera can do; None until it was open."""
         return None if self._live is None else self._live.caps
@@ -172,6 +196,17 @@ class LiveView(QObject):
         if self._live is not None:
             self._live.set_aim(aim)
 
+    def set_watched(self, watched: bool) -> None:
+        """Say whether anybody looks at the images, of this camera and later ones."""
+        self._is_watched = watched
+        if self._live is not None:
+            self._live.set_watched(watched)
+
+    def hurry(self) -> None:
+        """Ask for every image for a while, though nothing moves."""
+        if self._live is not None:
+            self._live.hurry()
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask the camera for another exposure."""
         if self._live is not None:
@@ -181,6 +216,19 @@ class LiveView(QObject):
         """Ask the camera for another gain."""
         if self._live is not None:
             self._live.set_gain(gain_db)
+
+    def show_pen(self) -> None:
+        """Let the simulated operator bring the pen, so that there is something to see.
+
+        Only while he does nothing else.
+        """
+        if self._operator is not None and self._operator.doing is Doing.ABSENT:
+            self._operator.seat()
+
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask the camera for other settings, for which it stops for a moment."""
+        if self._live is not None:
+            self._live.configure(settings)
 
     def set_following(self, follows: bool) -> None:
         """Let the simulated operator do what the swing asks for, or leave it."""
@@ -198,7 +246,20 @@ class LiveView(QObject):
     def _set_connection(self, connection: Connection) -> None:
         if connection is not self._connection:
             self._connection = connection
+            if connection is Connection.STREAMING:
+                self._take_back(self._without_images)
+                self._without_images = ""
             self.connection_changed.emit(connection)
+
+    def _relieve(self) -> None:
+        """Take back all that was told of a camera."""
+        for told in (self._without_images, self._skipping):
+            self._take_back(told)
+        self._without_images = self._skipping = ""
+
+    def _take_back(self, told: str) -> None:
+        if told:
+            self.relieved.emit(told)
 
     def _on_told(self, what: WorkerEvent) -> None:
         match what:
@@ -207,9 +268,17 @@ class LiveView(QObject):
             case SettingsApplied(settings):
                 self.settings_applied.emit(settings)
             case Failed(error):
-                self.failed.emit(worded(error.sentence))
+                self._without_images = worded(error.sentence)
+                self.failed.emit(self._without_images)
+            case Troubled(FramesSkipped() as trouble):
+                self._skipping = worded(trouble.sentence)
+                self.troubled.emit(self._skipping)
             case Troubled(trouble):
-                self.troubled.emit(worded(trouble.sentence))
+                self._without_images = worded(trouble.sentence)
+                self.troubled.emit(self._without_images)
+            case KeepsUp():
+                self._take_back(self._skipping)
+                self._skipping = ""
 
 
 class _Teller(QObject):

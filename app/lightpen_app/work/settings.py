@@ -6,15 +6,16 @@ window.
 """
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeVar
 
 import platformdirs
-from PySide6.QtCore import QByteArray, QLocale, QObject, Signal
+from PySide6.QtCore import QByteArray, QLocale, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
+from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.model.limits import SwingLimits
@@ -22,6 +23,8 @@ from lightpen.sentences import Sentence
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import Changes, Content, load, merged, save
+
+AGAIN_MS = 5000  # after which what could not be written is tried again
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,8 @@ class Station:
         Of a pen file that does not say.
     mask : str
         Stray light to leave out, "x y radius" in px, circles parted by ";".
-    exposure_us, gain_db : float
-        Of the camera; not a number when they were never set.
+    source_producer : str
+        File of a GenTL producer, where one was chosen.
     max_uncertainty : float
         U (k = 2) of the tip that ends a swing, mm.
     """
@@ -77,18 +80,41 @@ class Station:
     nominal_tip: str = ""
     source: str = "simulated"
     source_place: str = ""
+    source_producer: str = ""
     camera_file: str = ""
     pen_file: str = ""
     pen_units: str = ""
     mask: str = ""
-    exposure_us: float = math.nan
-    gain_db: float = math.nan
     max_uncertainty: float = SwingLimits.max_uncertainty
     min_images: int = SwingLimits.min_images
     max_images: int = SwingLimits.max_images
 
 
-Group = TypeVar("Group", Preferences, Station)
+@dataclass(frozen=True)
+class KeptCamera:
+    """How a camera was set up last.
+
+    Attributes
+    ----------
+    exposure_us, gain_db, frame_rate : float
+        Not a number when they were never set; likewise the texts are empty and the
+        size of packets is 0.
+    region : str
+        "x y width height" in px.
+    trigger : str
+        See `lightpen.cameras.protocol.TriggerMode`.
+    """
+
+    exposure_us: float = math.nan
+    gain_db: float = math.nan
+    frame_rate: float = math.nan
+    pixel_format: str = ""
+    region: str = ""
+    trigger: str = ""
+    packet_size: int = 0
+
+
+Group = TypeVar("Group", Preferences, Station, KeptCamera)
 
 
 class Settings(QObject):
@@ -98,9 +124,13 @@ class Settings(QObject):
     -------
     troubled(object)
         The `Sentence` why something is not, or not surely, remembered.
+    relieved(object)
+        The `Sentence` of `troubled` whose cause is gone: they could be written again.
     """
 
     troubled = Signal(object)
+    relieved = Signal(object)
+    _written = Signal(object, bool)
 
     def __init__(self, file: Path, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -110,8 +140,12 @@ class Settings(QObject):
         self._trouble = loaded.trouble
         self._changes: Changes = {}  # that wait to be written
         self._is_writing = False
+        self._why_unwritten: Sentence | None = None
         self._lock = Lock()
         self._thread: Thread | None = None
+
+        # Connections
+        self._written.connect(self._on_written, Qt.ConnectionType.QueuedConnection)
 
     @property
     def file(self) -> Path:
@@ -145,6 +179,18 @@ class Settings(QObject):
         if not name:
             raise ValueError("`name` of a station must not be empty.")
         self._save("stations", {name: _entries(station)})
+
+    def cameras(self) -> dict[str, CameraSettings]:
+        """Return how cameras were set up last, by their serial numbers."""
+        kept = self._content.get("cameras", {})
+        return {
+            serial: _camera_settings(_read(entries, KeptCamera()))
+            for serial, entries in kept.items()
+        }
+
+    def set_camera(self, serial: str, settings: CameraSettings) -> None:
+        """Remember how a camera is set up."""
+        self._save("cameras", {serial: _entries(_kept_camera(settings))})
 
     def last_station(self) -> str:
         """Return the name of the station used last; empty at first."""
@@ -193,6 +239,11 @@ class Settings(QObject):
         self._content = merged(self._content, changes)
         with self._lock:
             self._changes.update(changes)
+        self._write_soon()
+
+    def _write_soon(self) -> None:
+        """Write what waits for it, if anything does."""
+        with self._lock:
             if self._is_writing or not self._changes:
                 return
             self._is_writing = True
@@ -207,8 +258,19 @@ class Settings(QObject):
                 trouble, unwritten = save(self._file, self._content, changes), {}
             except LightpenError as error:
                 trouble, unwritten = error.sentence, changes
-            if trouble is not None:
-                self.troubled.emit(trouble)
+            if trouble is not None or self._why_unwritten is not None:
+                self._written.emit(trouble, not unwritten)
+
+    def _on_written(self, trouble: Sentence | None, is_written: bool) -> None:
+        """Tell what went wrong, once, and when it is over; until then try again."""
+        before = self._why_unwritten
+        self._why_unwritten = None if is_written else trouble
+        if not is_written:
+            QTimer.singleShot(AGAIN_MS, self._write_soon)
+        if before is not None and before != trouble:
+            self.relieved.emit(before)
+        if trouble is not None and before != trouble:
+            self.troubled.emit(trouble)
 
     def _taken_changes(self, unwritten: Changes) -> Changes:
         """Return what is to be written next; nothing if only the old is left."""
@@ -232,7 +294,45 @@ def data_folder(preferences: Preferences) -> Path:
     return platformdirs.user_data_path("lightpen", appauthor=False)
 
 
-def _entries(value: Preferences | Station) -> dict[str, Any]:
+def _kept_camera(settings: CameraSettings) -> KeptCamera:
+    nan = math.nan
+    region = settings.region
+    return KeptCamera(
+        exposure_us=nan if settings.exposure_us is None else settings.exposure_us,
+        gain_db=nan if settings.gain_db is None else settings.gain_db,
+        frame_rate=nan if settings.frame_rate is None else settings.frame_rate,
+        pixel_format=settings.pixel_format or "",
+        region="" if region is None else " ".join(map(str, astuple(region))),
+        trigger="" if settings.trigger is None else str(settings.trigger),
+        packet_size=settings.packet_size or 0,
+    )
+
+
+def _camera_settings(kept: KeptCamera) -> CameraSettings:
+    """Return settings; what was not kept, or makes no sense, is left as it is."""
+    return CameraSettings(
+        exposure_us=_given(kept.exposure_us),
+        gain_db=_given(kept.gain_db),
+        frame_rate=_given(kept.frame_rate),
+        pixel_format=kept.pixel_format or None,
+        region=_region(kept.region),
+        trigger=next((mode for mode in TriggerMode if mode == kept.trigger), None),
+        packet_size=kept.packet_size or None,
+    )
+
+
+def _given(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _region(text: str) -> Region | None:
+    words = text.split()
+    if len(words) != 4 or not all(word.isdecimal() for word in words):
+        return None
+    return Region(*map(int, words))
+
+
+def _entries(value: Preferences | Station | KeptCamera) -> dict[str, Any]:
     """Return the fields of a value as they are kept; no number is none."""
     entries = {each.name: getattr(value, each.name) for each in fields(value)}
     return {

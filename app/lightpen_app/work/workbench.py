@@ -1,8 +1,8 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 
@@ -11,6 +11,8 @@ from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.source import FoundDevice, Needs
+from lightpen.cameras.sources import source_named
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import (
     Surroundings,
@@ -26,13 +28,19 @@ from lightpen.record.names import Names
 from lightpen.record.presence import Presence
 from lightpen.record.recordings import FilesBeside
 from lightpen.sentences import Sentence
-from lightpen.swing.preparation import Preparation, SourceChoice, SourceKind
+from lightpen.swing.preparation import (
+    CameraInUse,
+    Preparation,
+    SourceChoice,
+    SourceKind,
+)
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.swing_run import SwingRun
 
+LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 COUNTING_MS = 5000  # from one look for other windows to the next
 
 
@@ -72,6 +80,11 @@ class Workbench(QObject):
         A sentence to be read.
     swing_wanted(Path)
         What leads to a recorded swing was opened from outside the program.
+    relieved(str)
+        A sentence of `troubled` whose cause is gone.
+    cameras_found(tuple of FoundDevice)
+    search_failed(str)
+        The sentence why no cameras can be looked for.
     """
 
     changed = Signal()
@@ -79,6 +92,9 @@ class Workbench(QObject):
     others_counted = Signal(int)
     swing_wanted = Signal(object)
     troubled = Signal(str)
+    relieved = Signal(str)
+    cameras_found = Signal(object)
+    search_failed = Signal(str)
 
     def __init__(
         self,
@@ -92,11 +108,12 @@ class Workbench(QObject):
         self._folder = folder
         self._around = around or Surroundings()
         self._preparation = Preparation()
-        self._camera_settings = CameraSettings()
         self._is_started = False
         self._wants_samples = False
         self._reading: Job | None = None
+        self._search: Job | None = None
         self._unread = Station()
+        self._file_troubles: list[str] = []
         self._presence = Presence(folder)
         self._n_others = 0
         self._counter: Job | None = None
@@ -111,11 +128,14 @@ class Workbench(QObject):
         self.live.settings_applied.connect(self._on_settings_applied)
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
+        self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
+        self.run.relieved.connect(self.relieved)
         self._counting.timeout.connect(self._count_others)
         self.run.changed.connect(self._tell_subject)
         self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
+        settings.relieved.connect(self._on_settings_relieved)
 
     @property
     def preparation(self) -> Preparation:
@@ -167,6 +187,7 @@ class Workbench(QObject):
         """Take over what was chosen last at a station."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
+        self._relieve_of_files()
         self._preparation = replace(
             before,
             names=Names(
@@ -181,18 +202,16 @@ class Workbench(QObject):
             mask=_parse_circles(station.mask),
             limits=_limits(station),
         )
-        self._camera_settings = CameraSettings(
-            exposure_us=_given(station.exposure_us), gain_db=_given(station.gain_db)
-        )
         self._open_files(station)
         self._remember_station()
         self._follow(before)
-        if self._preparation.source == before.source:
-            self._set_camera()
 
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
         before, self._preparation = self._preparation, preparation
+        files = before.camera_file, before.pen_file
+        if (preparation.camera_file, preparation.pen_file) != files:
+            self._relieve_of_files()
         self._remember_station()
         self._remember()
         self._follow(before)
@@ -207,6 +226,7 @@ class Workbench(QObject):
 
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
+        self._relieve_of_files()
         self._start(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
 
     def open_camera(self) -> None:
@@ -215,16 +235,46 @@ class Workbench(QObject):
         A swing that is captured goes on with it.
         """
         self._is_started = True
-        if self._preparation.source.kind is SourceKind.RECORDED and not (
-            self._preparation.source.place
-        ):
+        source = self._preparation.source
+        if source.lacks_place:
             self.live.close()
             return
-        camera = camera_of(self._preparation.source, self._around)
-        self.live.open(camera, self._camera_settings, self._around.clock)
+        camera, clock = camera_of(source, self._around), self._around.clock
+        self.live.open(camera, CameraSettings(), clock, self._settings.cameras())
+
+    def search_cameras(self, kind: str, producer: str) -> None:
+        """Look for the cameras of a source; `cameras_found` or `search_failed` tells.
+
+        A camera that is open is closed first: some libraries end the stream of one
+        while they look for others. Of a search before nothing is told any more.
+        """
+        source = source_named(kind)
+        if source is None:
+            return
+        if self._search is not None:
+            self._search.cancel()
+        was_open = self.live.is_open
+        self.live.close()
+        find, live = source.find, self.live
+
+        def search(_: Report) -> tuple[FoundDevice, ...]:
+            live.await_closed()
+            return find(producer)
+
+        self._search = job = Job(search, self)
+
+        # Connections
+        job.succeeded.connect(self._on_cameras_found)
+        job.failed.connect(self._on_search_failed)
+        job.ended.connect(partial(self._on_search_ended, job, opens=was_open))
+        job.start()
 
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
+        self._relieve_of_files()
+        self._write_samples()
+
+    def _write_samples(self) -> None:
         around, folder = self._around, self._folder / SIMULATED
         self._start(lambda _: sample_files(around, folder), self._on_chosen_read)
 
@@ -242,7 +292,9 @@ class Workbench(QObject):
         self.run.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
-        has_closed = self.live.await_closed(max(0.0, deadline - monotonic()))
+        # A dead camera may take longer, and has nothing to tell any more.
+        of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
+        has_closed = self.live.await_closed(of_camera)
         has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
         self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
@@ -277,7 +329,17 @@ class Workbench(QObject):
 
     def _on_refused(self, sentence: str) -> None:
         self._reading = None
+        self._tell_of_file(sentence)
+
+    def _tell_of_file(self, sentence: str) -> None:
+        """Tell why a file is not chosen, until another is."""
+        self._file_troubles.append(sentence)
         self.troubled.emit(sentence)
+
+    def _relieve_of_files(self) -> None:
+        """Take back why a file was not chosen: others are."""
+        while self._file_troubles:
+            self.relieved.emit(self._file_troubles.pop())
 
     def _stop_reading(self) -> None:
         job, self._reading = self._reading, None
@@ -287,7 +349,7 @@ class Workbench(QObject):
     def _on_files_read(self, opened: OpenedFiles) -> None:
         self._reading, self._unread = None, Station()
         for trouble in opened.troubles:
-            self.troubled.emit(worded(trouble))
+            self._tell_of_file(worded(trouble))
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -301,29 +363,29 @@ class Workbench(QObject):
         """Use the simulated camera's own files at the start if there are no others."""
         now, wants_samples = self._preparation, self._wants_samples
         self._wants_samples = False
-        simulated = now.source.kind is SourceKind.SIMULATED
+        simulated = now.source.kind == SourceKind.SIMULATED
         has_none = now.camera_file is None and now.pen_file is None
         if wants_samples and simulated and has_none:
-            self.use_sample_files()
+            self._write_samples()
 
     def _on_chosen_read(self, opened: OpenedFiles) -> None:
         self._reading = None
         for trouble in opened.troubles:
-            self.troubled.emit(worded(trouble))
-        now = self._preparation
-        self.set_preparation(
-            replace(
-                now,
-                camera_file=opened.camera_file or now.camera_file,
-                pen_file=opened.pen_file or now.pen_file,
-            )
+            self._tell_of_file(worded(trouble))
+        before = self._preparation
+        self._preparation = replace(
+            before,
+            camera_file=opened.camera_file or before.camera_file,
+            pen_file=opened.pen_file or before.pen_file,
         )
+        self._remember()
+        self._follow(before)
 
     def _follow(self, before: Preparation) -> None:
         """Let the camera and its images follow the choices."""
         now = self._preparation
         if now.source != before.source:
-            self._preparation = now = replace(now, image_size=None)
+            self._preparation = now = replace(now, image_size=None, camera_in_use=None)
         self.run.runner.choose(now)
         if now.source != before.source and self._is_started:
             self.open_camera()
@@ -353,15 +415,18 @@ class Workbench(QObject):
             self._subject_told = subject
             self.subject_changed.emit(subject)
 
-    def _set_camera(self) -> None:
-        """Let a camera that stays open have the exposure and gain of the station."""
-        caps, wanted = self.live.caps, self._camera_settings
-        if caps is None:
+    def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
+        self.cameras_found.emit(found)
+
+    def _on_search_failed(self, why: str) -> None:
+        self.search_failed.emit(why)
+
+    def _on_search_ended(self, job: Job, *, opens: bool) -> None:
+        if job is not self._search:
             return
-        if caps.exposure_us is not None and wanted.exposure_us is not None:
-            self.live.set_exposure(wanted.exposure_us)
-        if caps.gain_db is not None and wanted.gain_db is not None:
-            self.live.set_gain(wanted.gain_db)
+        self._search = None
+        if opens and not self.live.is_open:
+            self.open_camera()
 
     def _remember_station(self) -> None:
         station = self._preparation.names.station
@@ -375,11 +440,6 @@ class Workbench(QObject):
             return
         camera_file, pen_file = now.camera_file, now.pen_file
         unread = self._unread  # files that are being read stay remembered
-        nan = math.nan
-        exposure_us, gain_db = (
-            self._camera_settings.exposure_us,
-            self._camera_settings.gain_db,
-        )
         station = Station(
             operator=names.operator,
             pen=names.pen,
@@ -389,14 +449,13 @@ class Workbench(QObject):
             nominal_tip=_point_text(now.nominal_tip),
             source=now.source.kind,
             source_place=now.source.place,
+            source_producer=now.source.producer,
             camera_file=(
                 unread.camera_file if camera_file is None else str(camera_file.path)
             ),
             pen_file=unread.pen_file if pen_file is None else str(pen_file.path),
             pen_units=(unread.pen_units if pen_file is None else pen_file.units or ""),
             mask=_circles_text(now.mask),
-            exposure_us=nan if exposure_us is None else exposure_us,
-            gain_db=nan if gain_db is None else gain_db,
             max_uncertainty=now.limits.max_uncertainty,
             min_images=now.limits.min_images,
             max_images=now.limits.max_images,
@@ -406,6 +465,9 @@ class Workbench(QObject):
     def _on_settings_troubled(self, why: Sentence) -> None:
         self.troubled.emit(worded(why))
 
+    def _on_settings_relieved(self, why: Sentence) -> None:
+        self.relieved.emit(worded(why))
+
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()
         if size != self._preparation.image_size:
@@ -414,13 +476,12 @@ class Workbench(QObject):
             self.changed.emit()
 
     def _on_settings_applied(self, settings: CameraSettings) -> None:
-        before = self._camera_settings  # stays for what a recording has not
-        exposure_us, gain_db = settings.exposure_us, settings.gain_db
-        self._camera_settings = CameraSettings(
-            exposure_us=before.exposure_us if exposure_us is None else exposure_us,
-            gain_db=before.gain_db if gain_db is None else gain_db,
-        )
-        self._remember()
+        serial = self.live.serial
+        used = CameraInUse(serial, settings)
+        self._preparation = replace(self._preparation, camera_in_use=used)
+        self.run.runner.choose(self._preparation)
+        if self._preparation.source.source.needs is not Needs.FILES:
+            self._settings.set_camera(serial, settings)
 
 
 def _limits(station: Station) -> SwingLimits:
@@ -434,14 +495,9 @@ def _limits(station: Station) -> SwingLimits:
 
 
 def _source(station: Station) -> SourceChoice:
-    try:
-        return SourceChoice(SourceKind(station.source), station.source_place)
-    except ValueError:  # of a later version
+    if source_named(station.source) is None:  # of a later version
         return SourceChoice()
-
-
-def _given(value: float) -> float | None:
-    return None if math.isnan(value) else value
+    return SourceChoice(station.source, station.source_place, station.source_producer)
 
 
 def _point_text(point: FloatArray | None) -> str:

@@ -6,11 +6,16 @@ the thing that delivers images. One thread makes all calls of an open one, see
 """
 
 from dataclasses import dataclass, fields
+from enum import StrEnum
 from math import isnan
 from typing import Protocol
 
 from lightpen.arrays import Image
 from lightpen.errors import LightpenError
+from lightpen.sentences import sentence
+
+EXPOSURE = sentence("camera.exposure", "exposure")
+GAIN = sentence("camera.gain", "gain")
 
 
 class CameraFailure(LightpenError):  # noqa: N818 - its children tell what is wrong
@@ -64,8 +69,9 @@ class Frame:
         When the image was there, by the monotonic clock of the machine.
     device_ts_ns : int or None
         By the clock of the camera.
-    exposure_us : float or None
-        That this image was exposed with.
+    exposure_us, gain_db : float or None
+        That this image was taken with; None where that is not known, as shortly after a
+        change.
     pixel_format : str
         Name in the GenICam Pixel Format Naming Convention.
     bits : int
@@ -77,8 +83,14 @@ class Frame:
     host_ts_ns: int
     device_ts_ns: int | None = None
     exposure_us: float | None = None
+    gain_db: float | None = None
     pixel_format: str = "Mono8"
     bits: int = 8
+
+    @property
+    def full_scale(self) -> int:
+        """Brightest value a pixel can have."""
+        return int(2**self.bits - 1)
 
     def __post_init__(self) -> None:
         if self.image.flags.writeable:
@@ -120,6 +132,11 @@ class Stats:
         names = [item.name for item in fields(self)]
         return Stats(*(getattr(self, name) - getattr(earlier, name) for name in names))
 
+    def and_then(self, later: "Stats") -> "Stats":
+        """Return the counts of both."""
+        names = [item.name for item in fields(self)]
+        return Stats(*(getattr(self, name) + getattr(later, name) for name in names))
+
 
 @dataclass(frozen=True)
 class Range:
@@ -149,6 +166,62 @@ class Range:
         return min(self.low + n_steps * self.step, self.high)
 
 
+class TriggerMode(StrEnum):
+    """What makes a camera take an image."""
+
+    FREE = "free running"  # its own clock
+    SOFTWARE = "software"  # this program, whenever it waits for an image
+
+
+@dataclass(frozen=True)
+class Region:
+    """The part of the sensor that is read out, px from its top left corner."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class RegionLimits:
+    """Regions that a camera can read out.
+
+    Attributes
+    ----------
+    width, height : Range
+        ``high`` is that of the sensor.
+    x_step, y_step : int
+        Of the place of a region; 0 where it cannot be moved.
+    """
+
+    width: Range
+    height: Range
+    x_step: int = 0
+    y_step: int = 0
+
+    @property
+    def whole(self) -> Region:
+        """The whole sensor."""
+        return Region(0, 0, int(self.width.high), int(self.height.high))
+
+    def nearest(self, wanted: Region) -> Region:
+        """Return the region that the camera reads out instead of this one."""
+        width = int(self.width.nearest(wanted.width))
+        height = int(self.height.nearest(wanted.height))
+        return Region(
+            _place(wanted.x, self.width.high - width, self.x_step),
+            _place(wanted.y, self.height.high - height, self.y_step),
+            width,
+            height,
+        )
+
+
+def _place(wanted: int, most: float, step: int) -> int:
+    """Return where a region begins instead of there."""
+    return step and int(min(max(wanted, 0), most)) // step * step
+
+
 @dataclass(frozen=True)
 class Caps:
     """What an open camera can do.
@@ -159,8 +232,16 @@ class Caps:
         Of the images, px.
     pixel_formats : tuple of str
         That are offered, the usual one first.
-    exposure_us, gain_db, frame_rate : Range or None
+    exposure_us, gain_db, frame_rate, packet_size : Range or None
         None if it cannot be set.
+    gain_in_db : bool
+        Whether the gain is in dB, not in steps of the camera's own.
+    regions : RegionLimits or None
+        None if there is but the whole image.
+    triggers : tuple of TriggerMode
+        That are offered, free running first.
+    has_link : bool
+        Whether images come over a cable that may lose some.
     waits : bool
         Whether no image is lost when nobody reads, as with a file.
     n_images : int or None
@@ -173,7 +254,12 @@ class Caps:
     exposure_us: Range | None = None
     gain_db: Range | None = None
     frame_rate: Range | None = None
+    packet_size: Range | None = None
+    gain_in_db: bool = True
+    regions: RegionLimits | None = None
+    triggers: tuple[TriggerMode, ...] = (TriggerMode.FREE,)
     waits: bool = False
+    has_link: bool = False
     n_images: int | None = None
 
 
@@ -181,16 +267,21 @@ class Caps:
 class CameraSettings:
     """How a camera is to take images, or takes them.
 
+    In a request None means: leave it. In an answer: the camera has no such thing.
+
     Attributes
     ----------
-    exposure_us, gain_db, frame_rate : float or None
-        In a request None means: leave it. In an answer: the camera has no such thing.
+    packet_size : int or None
+        Of what a network camera sends at once, bytes.
     """
 
     exposure_us: float | None = None
     gain_db: float | None = None
     frame_rate: float | None = None
     pixel_format: str | None = None
+    region: Region | None = None
+    trigger: TriggerMode | None = None
+    packet_size: int | None = None
 
 
 class ImageCamera(Protocol):
@@ -223,6 +314,7 @@ class ImageCamera(Protocol):
         """Set up the camera before the start; return what is in force.
 
         Values out of range are brought into it; what the camera has not is left out.
+        `caps` may be others after it: the region gives the size of the images.
 
         Raises
         ------

@@ -9,6 +9,8 @@ from math import inf
 from lightpen.arrays import Image
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import (
+    EXPOSURE,
+    GAIN,
     CameraSettings,
     Caps,
     ConfigError,
@@ -22,6 +24,7 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
+from lightpen.cameras.source import Needs, Source, SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, find_images
@@ -127,11 +130,11 @@ class ReplayCamera:
 
     def set_exposure(self, exposure_us: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken(sentence("camera.exposure", "exposure"))
+        raise _already_taken(EXPOSURE)
 
     def set_gain(self, gain_db: float) -> float:
         """Refuse: the images are taken."""
-        raise _already_taken(sentence("camera.gain", "gain"))
+        raise _already_taken(GAIN)
 
     def start(self) -> None:
         """Let images come from the first on; nothing if they do."""
@@ -231,7 +234,7 @@ class ReplayCamera:
             seq=seq,
             host_ts_ns=self._clock.now_ns(),
             pixel_format=self.caps.pixel_formats[0],
-            bits=8 * image.itemsize,
+            bits=_bits(image),
         )
 
     def _name(self, seq: int) -> str:
@@ -246,6 +249,13 @@ class ReplayCamera:
         files = self._source.files
         is_there = not files or any(os.access(file, os.R_OK) for file in files)
         return not is_there or self._n_unread >= len(self._source.names)
+
+
+def _bits(image: Image) -> int:
+    """Return the depth of an image; a file of 16 bits does not say how many it uses."""
+    if image.itemsize == 1:
+        return 8
+    return 12 if int(image.max(initial=0)) < 2**12 else 16
 
 
 def _first_image(source: ImageSource, where: str) -> Image:
@@ -296,3 +306,12 @@ def _already_taken(what: Sentence) -> ConfigError:
             what=what,
         )
     )
+
+
+def _camera(place: SourcePlace, clock: Clock) -> ReplayCamera:
+    return ReplayCamera(place.name, loops=True, clock=clock)
+
+
+RECORDED = Source(
+    "recorded", sentence("source.recorded", "Recorded images"), Needs.FILES, _camera
+)

@@ -4,8 +4,8 @@ Every call of the camera is made in this thread. Frames leave it two ways: throu
 for the newest one, for showing, and through a queue that loses nothing, for measuring.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import Enum, auto
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
@@ -13,6 +13,7 @@ from typing import TypeAlias
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
+from lightpen.cameras.link_watch import LinkWatch
 from lightpen.cameras.protocol import (
     CameraFailure,
     CameraSettings,
@@ -38,9 +39,11 @@ LEAST_QUIET = 1.0  # s without an image after which the camera is asked if it is
 LONGEST_SILENCE = 6.0  # s after which it is taken for dead, whatever it answers
 LONGEST_READ = 2.0  # s, after which requests are served at the latest
 BUSY_PAUSE = 0.5  # s
-# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat.
-LONGEST_BUSY = 4.0  # s
-BACK_OFF = (0.5, 1.0, 2.0, 4.0)  # s between attempts to reconnect; the last repeats
+PROBING = 2.0  # s, after which a camera of which nobody wants images is looked after
+# A GigE Vision camera frees itself from a program that crashed after a 3 s heartbeat;
+# that it is not free yet may take 5 s to find out.
+LONGEST_BUSY = 8.0  # s
+BACK_OFF = (0.5, 1.0, 2.0)  # s between attempts to reconnect; the last repeats
 LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # Of the images since measuring began, skipped by a computer that is too slow; fewer
 # are skipped when something else holds it up once.
@@ -85,6 +88,11 @@ class Troubled:
 
 
 @dataclass(frozen=True)
+class KeepsUp:
+    """No image is skipped any more, after it was told that they were."""
+
+
+@dataclass(frozen=True)
 class Failed:
     """Something went wrong that ended the worker."""
 
@@ -97,7 +105,13 @@ class Ended:
 
 
 WorkerEvent: TypeAlias = (
-    FrameReady | ConnectionChanged | SettingsApplied | Troubled | Failed | Ended
+    FrameReady
+    | ConnectionChanged
+    | SettingsApplied
+    | Troubled
+    | KeepsUp
+    | Failed
+    | Ended
 )
 
 
@@ -110,6 +124,8 @@ class CameraWorker:
         Not open yet. Nobody else may call it any more.
     settings : CameraSettings
         To be applied, again at each reconnection.
+    known : mapping of str to CameraSettings
+        By serial numbers; a camera that is among them gets these instead.
     on_event : callable
         Called in the thread of the worker with what happens; must return at once and
         not call `stop`.
@@ -127,9 +143,11 @@ class CameraWorker:
         *,
         clock: Clock | None = None,
         n_queued: int = N_QUEUED,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
         self._camera = camera
         self._settings = settings
+        self._known = dict(known or {})
         self._applied = settings
         self._caps: Caps | None = None
         self._on_event = on_event
@@ -138,6 +156,11 @@ class CameraWorker:
         self._queue = FrameQueue(n_queued)
         self._requests: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._stopping = Event()
+        self._wake = Event()
+        self._rest: float | None = 0.0
+        self._is_rested = self._is_stopped = False
+        self._delivered_ns = 0
+        self._n_missed_read = self._n_missed_resting = 0
         self._measures = Event()
         self._thread = Thread(target=self._run, name="camera", daemon=True)
         self._connection: Connection | None = None
@@ -146,6 +169,7 @@ class CameraWorker:
         self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
         self._heard_ns = 0
+        self._link = LinkWatch()
 
     @property
     def serial(self) -> str:
@@ -175,6 +199,7 @@ class CameraWorker:
             The camera did not come back from a call within ``timeout_s``.
         """
         self._stopping.set()
+        self._wake.set()
         self._queue.end()
         if self._thread.ident is None:
             return
@@ -199,9 +224,9 @@ class CameraWorker:
         if measures and not self._measures.is_set():
             self._queue.clear()
             self._n_offered = self._n_missed = 0
-            self._told_of_skipping = False
             self._measures.set()
         elif not measures:
+            self._n_offered = self._n_missed = 0
             self._measures.clear()
             self._queue.clear()  # a recording may wait for room in it
 
@@ -217,13 +242,34 @@ class CameraWorker:
         """
         return self._queue.take(timeout_s)
 
+    def set_rest(self, rest: float | None) -> None:
+        """Leave the camera alone between two images.
+
+        Parameters
+        ----------
+        rest : float or None
+            s; None for as long as no other is set. Images that are missed meanwhile
+            count as neither missed nor skipped, and the next may be as old as the rest.
+            A camera on a link sends on during a finite rest, and is read.
+        """
+        if rest != self._rest:
+            self._rest = rest
+            self._wake.set()
+
     def set_exposure(self, exposure_us: float) -> None:
         """Ask for another exposure while images come."""
         self._requests.put(lambda: self._set_exposure(exposure_us))
+        self._wake.set()
 
     def set_gain(self, gain_db: float) -> None:
         """Ask for another gain while images come."""
         self._requests.put(lambda: self._set_gain(gain_db))
+        self._wake.set()
+
+    def configure(self, settings: CameraSettings) -> None:
+        """Ask for other settings, for which images stop coming for a moment."""
+        self._requests.put(lambda: self._configure(settings))
+        self._wake.set()
 
     def _run(self) -> None:
         try:
@@ -243,10 +289,37 @@ class CameraWorker:
         """Run the camera for one image, or reconnect."""
         try:
             self._serve_requests()
-            self._read()
+            self._tell_of_keeping_up()
+            if self._is_wanted():
+                self._read()
         except DeviceLost as error:
             self._on_event(Troubled(error))
             self._reconnect()
+
+    def _is_wanted(self) -> bool:
+        """Return whether an image is wanted, after the rest before it."""
+        rest = self._rest
+        if rest is not None and self._is_stopped:
+            self._is_stopped = False
+            self._camera.start()
+            self._hear()
+        # What waits in the buffers of a link would be ever older.
+        if rest == 0.0 or (rest is not None and self._camera.caps.has_link):
+            return True
+        self._wake.clear()
+        if rest != self._rest or self._stopping.is_set():  # just before
+            return False
+        self._is_rested = True
+        if rest is not None:
+            self._clock.wait(rest, self._wake)
+        else:
+            if not self._camera.caps.waits:  # a recording would begin anew
+                self._camera.stop()
+                self._is_stopped = True
+            self._wake.wait(PROBING)
+            self._camera.probe()
+        self._hear()
+        return rest is not None
 
     def _read(self) -> None:
         try:
@@ -256,18 +329,29 @@ class CameraWorker:
             return
         except FrameIncomplete as error:
             self._hear()
+            self._count()
             self._on_event(Troubled(error))
         else:
             self._hear()
             self._change(Connection.STREAMING)
-            self._deliver(frame)
+            if self._is_due():
+                self._deliver(frame)
+            self._count()
+
+    def _is_due(self) -> bool:
+        """Return whether a camera that is not left alone has rested long enough."""
+        now_ns = self._clock.now_ns()
+        rest = self._rest if self._camera.caps.has_link else None
+        if rest is not None and now_ns - self._delivered_ns < rest * 1e9:
+            return False
+        self._delivered_ns = now_ns
+        return True
 
     def _deliver(self, frame: Frame) -> None:
         if self._mailbox.put(frame):
             self._on_event(FrameReady())
         if self._measures.is_set():
             self._enqueue(frame)
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
 
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
@@ -279,9 +363,16 @@ class CameraWorker:
         self._n_skipped += 1
         self._n_missed += 1
         is_slow = is_too_slow(self._n_missed, self._n_offered)
-        if is_slow and not self._told_of_skipping:  # once is enough until measured anew
+        if is_slow and not self._told_of_skipping:  # once is enough until it is over
             self._told_of_skipping = True
             self._on_event(Troubled(_too_slow(self._n_missed, self._n_offered)))
+
+    def _tell_of_keeping_up(self) -> None:
+        """Tell that it is over with skipping, as when no more images are measured."""
+        is_slow = is_too_slow(self._n_missed, self._n_offered)
+        if self._told_of_skipping and not is_slow:
+            self._told_of_skipping = False
+            self._on_event(KeepsUp())
 
     def _quiet_time(self) -> float:
         """Return how long no image may come before the camera is probed, s."""
@@ -292,7 +383,7 @@ class CameraWorker:
 
     def _watch(self) -> None:
         """Find out whether a camera that sent nothing for long is still there."""
-        self._stats = replace(self._camera.stats(), skipped=self._n_skipped)
+        self._count()
         silence = round((self._clock.now_ns() - self._heard_ns) * 1e-9, 3)
         if silence >= self._quiet_time():
             self._change(Connection.SILENT)
@@ -310,6 +401,24 @@ class CameraWorker:
 
     def _hear(self) -> None:
         self._heard_ns = self._clock.now_ns()
+
+    def _count(self) -> None:
+        """Take what became of the images, but of those that nobody wanted."""
+        stats = self._camera.stats()
+        if self._is_rested:
+            self._is_rested = False
+            self._n_missed_resting = stats.missed - self._n_missed_read
+            self._link = replace(self._link, since=None)
+        self._n_missed_read = stats.missed - self._n_missed_resting
+        self._stats = replace(
+            stats, skipped=self._n_skipped, missed=self._n_missed_read
+        )
+        if self._camera.caps.has_link:
+            self._link, trouble = self._link.after(
+                self._stats, self._heard_ns * 1e-9, self._applied
+            )
+            if trouble is not None:
+                self._on_event(Troubled(trouble))
 
     def _open_first(self) -> None:
         """Open the camera, waiting a little for another program to let go of it."""
@@ -343,10 +452,26 @@ class CameraWorker:
 
     def _connect(self) -> None:
         self._camera.open()
+        known = self._known.pop(self._camera.serial, None)
+        if known is None:
+            self._start(self._settings)
+            return
+        self._settings = known
+        try:
+            self._start(known)
+        except ConfigError as error:  # it is not what it was when they were kept
+            self._on_event(Troubled(error))
+            self._settings = CameraSettings()
+            self._start(self._settings)
+
+    def _start(self, settings: CameraSettings) -> None:
+        """Set up the open camera and let its images come."""
+        self._applied = self._camera.configure(settings)
         self._caps = self._camera.caps
-        self._applied = self._camera.configure(self._settings)
         self._camera.start()
+        self._is_stopped = False
         self._hear()
+        self._link = LinkWatch()
         self._on_event(SettingsApplied(self._applied))
         self._change(Connection.STREAMING)
 
@@ -361,12 +486,25 @@ class CameraWorker:
             except ConfigError as error:
                 self._on_event(Troubled(error))
 
+    def _configure(self, settings: CameraSettings) -> None:
+        before = self._settings
+        self._camera.stop()
+        try:
+            self._start(settings)
+        except ConfigError:
+            self._start(before)
+            raise
+        self._settings = merged(before, self._applied)
+
     def _set_exposure(self, exposure_us: float) -> None:
+        # Where the camera is lost over it, it is set when it comes back.
+        self._settings = replace(self._settings, exposure_us=exposure_us)
         applied = self._camera.set_exposure(exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         self._apply(replace(self._applied, exposure_us=applied))
 
     def _set_gain(self, gain_db: float) -> None:
+        self._settings = replace(self._settings, gain_db=gain_db)
         applied = self._camera.set_gain(gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         self._apply(replace(self._applied, gain_db=applied))
@@ -379,6 +517,12 @@ class CameraWorker:
         if connection is not self._connection:
             self._connection = connection
             self._on_event(ConnectionChanged(connection))
+
+
+def merged(before: CameraSettings, now: CameraSettings) -> CameraSettings:
+    """Return settings, and of what they leave open those before."""
+    given = {f.name: getattr(now, f.name) for f in fields(now)}
+    return replace(before, **{n: v for n, v in given.items() if v is not None})
 
 
 def is_too_slow(n_missed: int, n_offered: int) -> bool:

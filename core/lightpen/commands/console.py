@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.errors import UsageError
-from lightpen.estimation.report import json_bytes
+from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import printable, write_whole
-from lightpen.formats.own_json import with_checksum
 from lightpen.sentences import sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2
@@ -68,7 +67,7 @@ def require_other_file(record: Path | None, *inputs: Path | None) -> None:
 
 def write_record(path: Path, record: Mapping[str, Any]) -> None:
     """Write a record as JSON that tells when it was changed."""
-    write_whole(path, with_checksum(json_bytes(record)) + b"\n")
+    write_whole(path, record_bytes(record))
 
 
 def lacking(option: str) -> UsageError:

@@ -39,7 +39,7 @@ from lightpen.verification.articulation import (
     N_TOUCHES,
     measure_articulation,
 )
-from lightpen.verification.assessment import Assessment
+from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import measure_circle
 from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
@@ -393,7 +393,7 @@ def _tell(
         )
     if options.json is None:
         return
-    assessment: Assessment = found.assessment
+    assessment: Conformity = found.assessment
     limits = asdict(_limits(options))
     record = verification_record(
         kind,

@@ -1,6 +1,6 @@
 """What a live image says of the set-up: exposure, focus and stray light."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -28,10 +28,26 @@ class Exposure:
         Of each LED, as a fraction of the full scale; 1 where it is clipped.
     are_leds : bool
         False where no LED could be told, and these are of all that is bright.
+    leds : tuple of int
+        Numbers of the LEDs, counted from 1; empty where no LED could be told.
     """
 
     peaks: tuple[float, ...] = ()
     are_leds: bool = True
+    leds: tuple[int, ...] = ()
+
+    @property
+    def dark_leds(self) -> tuple[int, ...]:
+        """Numbers of the LEDs below `DARK_PEAK`."""
+        return tuple(led for led, peak in self._told() if peak < DARK_PEAK)
+
+    @property
+    def saturated_leds(self) -> tuple[int, ...]:
+        """Numbers of the LEDs that reach the full scale."""
+        return tuple(led for led, peak in self._told() if peak >= SATURATED_LEVEL)
+
+    def _told(self) -> Iterator[tuple[int, float]]:
+        return zip(self.leds, self.peaks, strict=False)
 
     @property
     def n_dark(self) -> int:
@@ -49,7 +65,7 @@ class Exposure:
         return len(self.peaks) - self.n_dark - self.n_saturated
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Inspection:
     """Exposure and focus of one image.
 
@@ -59,10 +75,13 @@ class Inspection:
         Of the LEDs; of all spots where no LED is labelled.
     edge_width : float
         Median width of their rims from dark to bright, px; NaN without any.
+    chosen : (N,) array of int
+        Which of the spots these are.
     """
 
     exposure: Exposure
     edge_width: float
+    chosen: IntArray
 
     @property
     def is_sharp(self) -> bool:
@@ -79,14 +98,17 @@ def inspect(spots: Spots, labels: Labels | None = None) -> Inspection:
     """Inspect the LEDs of an image, or all its spots where none are labelled."""
     are_leds = labels is not None and bool((labels.spot >= 0).any())
     chosen: IntArray = np.arange(len(spots))
+    leds: tuple[int, ...] = ()
     if labels is not None and are_leds:
         chosen = labels.spot[labels.spot >= 0]
+        leds = tuple((np.flatnonzero(labels.spot >= 0) + 1).tolist())
     clipped = (spots.flaws[chosen] & Flaw.SATURATED) > 0
     peaks = np.where(clipped, 1.0, spots.contrasts[chosen])
     widths = spots.edge_widths[chosen]
     return Inspection(
-        exposure=Exposure(tuple(peaks.tolist()), are_leds),
+        exposure=Exposure(tuple(peaks.tolist()), are_leds, leds),
         edge_width=float(np.median(widths)) if len(widths) else float("nan"),
+        chosen=chosen,
     )
 
 

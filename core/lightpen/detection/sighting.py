@@ -116,6 +116,7 @@ def look(
     pen: Pen,
     mask: FloatArray | None = None,
     before: Sighting | None = None,
+    full_scale: int | None = None,
 ) -> Sighting:
     """Find the pen in an image, and its pose by maximum likelihood.
 
@@ -129,11 +130,13 @@ def look(
         Of the image before, which tells where to look first. Where the LEDs are there,
         that settles it, also for an image that would be refused on its own; where they
         are not, the image is looked at on its own.
+    full_scale : int, optional
+        Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
     """
     if not camera.fits(image):
         return unseen(pen, Reason.WRONG_SIZE)
     try:
-        spots = detect_spots(image, mask)
+        spots = detect_spots(image, mask, full_scale=full_scale)
         labels = _label(spots, camera, pen, before)
         return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
     except MISHAPS:

@@ -33,6 +33,8 @@ MAX_BOXES = 128  # the smallest of more are clutter
 MAX_REGIONS = 256  # looked at in one image
 MAX_CONTOURS = 4000
 
+MOVED = 0.5  # of a spot's size; a hand that holds still trembles by less
+CHANGED = 0.1  # of the mean area and contrast of all spots
 NOISE_SAMPLES = 48  # per side of the image
 NOISE_QUANTILE = 0.84  # of differences of neighbours; texture may cover the rest
 NOISE_OF_DIFFERENCE = 1.99  # that quantile for normal noise, in standard deviations
@@ -126,6 +128,22 @@ class Spots:
         if len(self) == 0:
             return self.has_smears
         return bool(np.mean((self.flaws & Flaw.BLURRED) > 0) > 0.5)
+
+
+def have_moved(before: Spots, now: Spots) -> bool:
+    """Return whether what is seen has moved, or looks otherwise, by more than noise."""
+    if len(before) != len(now):
+        return True
+    if not len(now):
+        return False
+    moves = np.linalg.norm(before.centers[:, None] - now.centers, axis=2).min(axis=0)
+    looks = (
+        (before.areas.mean(), now.areas.mean()),
+        (before.contrasts.mean(), now.contrasts.mean()),
+    )
+    return bool((moves > MOVED * np.sqrt(now.areas)).any()) or any(
+        abs(one - other) > CHANGED * one for one, other in looks
+    )
 
 
 def detect_spots(

@@ -69,14 +69,7 @@ class Contradiction:
     @property
     def sentence(self) -> Sentence:
         """It in words, with what to do."""
-        said: dict[str, Sentence | str | float] = {
-            "what": self.what,
-            "wanted": self.wanted,
-            "wanted_u": self.wanted_uncertainty,
-            "stated": self.stated,
-            "stated_u": self.stated_uncertainty,
-            "unit": f" {self.unit}" if self.unit else "",
-        }
+        unit = f" {self.unit}" if self.unit else ""
         if self.of_pen:
             return sentence(
                 "warning.pen-file-contradicted",
@@ -84,7 +77,12 @@ class Contradiction:
                 "{wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says {stated:.6g} "
                 "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this pen, or "
                 "measure the pen again.",
-                **said,
+                what=self.what,
+                wanted=self.wanted,
+                wanted_u=self.wanted_uncertainty,
+                stated=self.stated,
+                stated_u=self.stated_uncertainty,
+                unit=unit,
             )
         if not self.camera:
             return sentence(
@@ -93,7 +91,12 @@ class Contradiction:
                 "{wanted:.6g} \u00b1 {wanted_u:.2g}{unit}, the file says {stated:.6g} "
                 "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this camera, "
                 "lens and focus, or calibrate the camera again.",
-                **said,
+                what=self.what,
+                wanted=self.wanted,
+                wanted_u=self.wanted_uncertainty,
+                stated=self.stated,
+                stated_u=self.stated_uncertainty,
+                unit=unit,
             )
         if not self.of_rig:
             return sentence(
@@ -103,7 +106,12 @@ class Contradiction:
                 "{stated:.6g} \u00b1 {stated_u:.2g}{unit}. Check that the file is of "
                 "this camera, lens and focus, or calibrate the camera again.",
                 camera=self.camera,
-                **said,
+                what=self.what,
+                wanted=self.wanted,
+                wanted_u=self.wanted_uncertainty,
+                stated=self.stated,
+                stated_u=self.stated_uncertainty,
+                unit=unit,
             )
         return sentence(
             "warning.rig-file-contradicted",
@@ -112,7 +120,12 @@ class Contradiction:
             "{stated:.6g} \u00b1 {stated_u:.2g}{unit}. Check that no camera was moved "
             "since, or calibrate the rig again.",
             camera=self.camera,
-            **said,
+            what=self.what,
+            wanted=self.wanted,
+            wanted_u=self.wanted_uncertainty,
+            stated=self.stated,
+            stated_u=self.stated_uncertainty,
+            unit=unit,
         )
 
 
@@ -185,6 +198,8 @@ def find_pen_contradictions(
     size, scale = _denied(
         [_Entry(SCALE, "", 1.0, one, one)], bundle, at.scale, priors.scale
     )
+    if any(each.wanted_uncertainty > VAGUE for each in size):
+        size, scale = [], priors.scale
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)
 

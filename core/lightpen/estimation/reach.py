@@ -25,6 +25,26 @@ GROWTH = 1.25  # of the number of images, after which all are counted anew
 ENDLESS = 1e6  # times the images, for what no image can lower
 
 
+@dataclass(frozen=True)
+class Reached:
+    """How certain a tip is, and can become.
+
+    Attributes
+    ----------
+    uncertainty : float
+        U (k = 2) along the weakest direction, mm; infinite until it is known.
+    floor : float
+        What more images of this kind cannot bring it below, mm: what the LED file
+        leaves open, as the images themselves tell of the camera.
+    """
+
+    uncertainty: float = float("inf")
+    floor: float = 0.0
+
+
+NOT_REACHED = Reached()
+
+
 @dataclass(frozen=True, eq=False)
 class Reach:
     """What the images of a swing say of all that they depend on.
@@ -43,12 +63,8 @@ class Reach:
     n_images: int
     n_whole: int
 
-    def uncertainties(
-        self, camera: Camera, pen: Pen, sigma: float
-    ) -> tuple[float, float]:
-        """Return U (k = 2) of the tip along its weakest direction, mm, and its floor.
-
-        The floor is what more images of this kind cannot bring it below.
+    def reached(self, camera: Camera, pen: Pen, sigma: float) -> Reached:
+        """Return how certain the tip is by these images, and can become.
 
         Parameters
         ----------
@@ -67,7 +83,7 @@ class Reach:
             float(np.linalg.eigvalsh(inverse(times * known + prior)[:3, :3])[-1])
             for times in (1.0, ENDLESS)
         )
-        return COVERAGE_FACTOR * sqrt(now), COVERAGE_FACTOR * sqrt(at_last)
+        return Reached(COVERAGE_FACTOR * sqrt(now), COVERAGE_FACTOR * sqrt(at_last))
 
 
 def reach_of(

@@ -24,6 +24,7 @@ from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
+from lightpen.formats.own_json import with_checksum
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
@@ -185,6 +186,11 @@ def pivot_record(
         ],
     }
     return {name: plain(entry) for name, entry in record.items()}
+
+
+def record_bytes(record: Mapping[str, Any]) -> bytes:
+    """Return a record as JSON that tells when it was changed."""
+    return with_checksum(json_bytes(record)) + b"\n"
 
 
 def json_bytes(record: Mapping[str, Any]) -> bytes:
@@ -490,8 +496,15 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                 "detail": str(observations.details[i] or ""),
                 "rms_px": rms[i],
                 "tip_cam_mm": tips[i],
+                "edge_width_px": observations.edge_widths[i],
                 "leds": [
-                    {"led": j + 1, "x_px": x, "y_px": y, "used": leds_used[i][j]}
+                    {
+                        "led": j + 1,
+                        "x_px": x,
+                        "y_px": y,
+                        "area_px2": observations.areas[i, j],
+                        "used": leds_used[i][j],
+                    }
                     for j, (x, y) in enumerate(pixels[i])
                     if seen[i][j]
                 ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lightpen.cameras.clock import Clock, MachineClock
 from lightpen.cameras.protocol import ImageCamera
-from lightpen.cameras.replay import ReplayCamera
+from lightpen.cameras.source import SourcePlace
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import (
     CameraFile,
@@ -21,7 +21,7 @@ from lightpen.local_time import local_now
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
-from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen.swing.preparation import SourceChoice
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,7 @@ def files_of_before(
 
 def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
     """Return the camera of a source, not yet opened."""
-    match choice.kind:
-        case SourceKind.SIMULATED:
-            return SimulatedCamera(around.scene, around.clock)
-        case SourceKind.RECORDED:
-            return ReplayCamera(choice.place, loops=True, clock=around.clock)
+    camera = choice.source.camera
+    if camera is None:
+        return SimulatedCamera(around.scene, around.clock)
+    return camera(SourcePlace(choice.place, choice.producer), around.clock)

@@ -3,6 +3,7 @@
 Both hold the same record of the calibration, and tell when they were changed since.
 """
 
+import math
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -59,12 +60,14 @@ class _SeenLed(Struct):
     led: Annotated[int, Meta(ge=1)]
     x_px: Length
     y_px: Length
+    area_px2: Length | None = None
 
 
 class _Frame(Struct):
     file: str
     used: bool
     leds: list[_SeenLed]
+    edge_width_px: Length | None = None
 
 
 class _Record(Struct):
@@ -138,6 +141,10 @@ class CalibrationFile:
     used : (N,) array of bool
     pixels : (N, L, 2) array
         LED centres in the images, px; NaN where not seen.
+    areas : (N, L) array
+        Of the LEDs in the images, px^2; NaN where not known.
+    edge_widths : (N,) array
+        Of the rims of the LEDs in each image, px; NaN where not known.
     is_of_rig : bool
         Whether several cameras looked; the frames are then of all of them.
     has_checksum : bool
@@ -163,6 +170,8 @@ class CalibrationFile:
     frames: tuple[str, ...]
     used: BoolArray
     pixels: FloatArray
+    areas: FloatArray
+    edge_widths: FloatArray
     is_of_rig: bool
     has_checksum: bool
 
@@ -210,7 +219,7 @@ def _calibration(
     try:
         record = in_shape(tree, _Record)
         instrument = _instrument(record)
-        pixels = _pixels(record)
+        seen = _seen(record)
     except DamagedError as error:
         raise _other(path) from error
     return CalibrationFile(
@@ -236,7 +245,11 @@ def _calibration(
         instrument=instrument,
         frames=tuple(frame.file for frame in record.frames),
         used=np.array([frame.used for frame in record.frames], dtype=bool),
-        pixels=pixels,
+        pixels=seen[..., :2],
+        areas=seen[..., 2],
+        edge_widths=np.array(
+            [f.edge_width_px for f in record.frames], dtype=np.float64
+        ),
         is_of_rig=record.rig is not None,
         has_checksum=is_checked,
     )
@@ -260,14 +273,16 @@ def _instrument(record: _Record) -> FittedInstrument | None:
     )
 
 
-def _pixels(record: _Record) -> FloatArray:
-    pixels = np.full((len(record.frames), len(record.leds), 2), np.nan)
+def _seen(record: _Record) -> FloatArray:
+    """Return x, y and area of the LEDs in the images, (N, L, 3), px and px^2."""
+    seen = np.full((len(record.frames), len(record.leds), 3), np.nan)
     for i, frame in enumerate(record.frames):
         for led in frame.leds:
             if led.led > len(record.leds):
                 raise DamagedError("An LED is seen that the pen does not have.")
-            pixels[i, led.led - 1] = led.x_px, led.y_px
-    return pixels
+            area = math.nan if led.area_px2 is None else led.area_px2
+            seen[i, led.led - 1] = led.x_px, led.y_px, area
+    return seen
 
 
 def _other(path: Path) -> UsageError:

@@ -13,7 +13,7 @@ from itertools import chain, count
 from pathlib import Path
 
 from lightpen.errors import NameTakenError
-from lightpen.estimation.report import calibration_record, json_bytes
+from lightpen.estimation.report import calibration_record, record_bytes
 from lightpen.estimation.verdict import AXES
 from lightpen.formats.files import create_whole
 from lightpen.model.origin import Origin
@@ -60,7 +60,8 @@ def calibration_json(solution: Solution) -> bytes:
     """
     limits = recorded_limits(open_record(solution.source.folder))
     inputs = record_inputs(solution.source)
-    return json_bytes(calibration_record(solution.calibration, inputs, "joint", limits))
+    record = calibration_record(solution.calibration, inputs, "joint", limits)
+    return record_bytes(record)
 
 
 def tip_csv(solution: Solution, names: Names) -> bytes:

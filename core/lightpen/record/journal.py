@@ -36,6 +36,16 @@ Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]
 Row: TypeAlias = tuple[Entry, Entry, Entry]
 
 
+class CameraCounts(Struct):
+    """What became of the camera's images; see `lightpen.cameras.protocol.Stats`."""
+
+    delivered: Count
+    incomplete: Count
+    missed: Count
+    skipped: Count
+    timeouts: Count
+
+
 class ImageLine(Struct, tag_field="kind", tag="image"):
     """An image was acknowledged; see `lightpen.record.reading.RecordedImage`."""
 
@@ -46,6 +56,7 @@ class ImageLine(Struct, tag_field="kind", tag="image"):
     pixels: tuple[tuple[Length, Length] | None, ...]
     rotation: tuple[Row, Row, Row]
     translation: Vector
+    camera: CameraCounts | None = None  # since the swing began
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):

@@ -31,8 +31,10 @@ from typing import Annotated, Self, TypeAlias
 
 import numpy as np
 from msgspec import Meta, Struct
+from msgspec.structs import asdict
 
 from lightpen.arrays import FloatArray, Image, IntArray
+from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, read_camera
 from lightpen.formats.decoding import IMAGE_FILE, MAX_FILE_SIZE, decode_image
@@ -181,6 +183,8 @@ class RecordedImage:
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     rotation, translation : (3, 3) and (3,) array
         cam_from_pen, mm.
+    stats : Stats
+        What became of the camera's images since the swing began.
     """
 
     number: int
@@ -191,6 +195,7 @@ class RecordedImage:
     pixels: FloatArray
     rotation: FloatArray
     translation: FloatArray
+    stats: Stats = field(default_factory=Stats)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +238,11 @@ class Record:
     def numbers(self) -> IntArray:
         """Numbers of the images that take part, (N,)."""
         return np.array([i.number for i in self.used_images], dtype=np.int64)
+
+    @property
+    def stats(self) -> Stats:
+        """What became of the camera's images up to the last one that was kept."""
+        return self.images[-1].stats if self.images else Stats()
 
     @property
     def next_number(self) -> int:
@@ -430,6 +440,7 @@ def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
         pixels=np.array(points, dtype=np.float64).reshape(-1, 2),
         rotation=np.array(line.rotation, dtype=np.float64),
         translation=np.array(line.translation, dtype=np.float64),
+        stats=Stats() if line.camera is None else Stats(**asdict(line.camera)),
     )
 
 

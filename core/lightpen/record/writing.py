@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import asdict
 from datetime import datetime
 from hashlib import sha256
 from io import FileIO
@@ -16,6 +17,7 @@ import numpy as np
 from msgspec import to_builtins
 
 from lightpen.arrays import FloatArray, Image
+from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import printable, strerror, sync_folder, write_whole
@@ -23,6 +25,7 @@ from lightpen.formats.own_json import with_checksum
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.journal import (
     JOURNAL,
+    CameraCounts,
     ImageLine,
     Line,
     MoreLine,
@@ -155,6 +158,7 @@ class RecordWriter:
         translation: FloatArray,
         time: float,
         device_time_ns: int | None = None,
+        stats: Stats | None = None,
     ) -> int:
         """Record one image.
 
@@ -170,6 +174,8 @@ class RecordWriter:
             s.
         device_time_ns : int, optional
             By the clock of the camera.
+        stats : Stats, optional
+            What became of the camera's images since the swing began.
 
         Returns
         -------
@@ -195,6 +201,7 @@ class RecordWriter:
                 pixels=tuple(map(_point, pixels)),
                 rotation=rotation.tolist(),
                 translation=translation.tolist(),
+                camera=None if stats is None else CameraCounts(**asdict(stats)),
             )
         )
         self._next_number = number + 1

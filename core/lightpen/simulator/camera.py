@@ -321,6 +321,7 @@ class SimulatedCamera:
             host_ts_ns=self._clock.now_ns(),
             device_ts_ns=round(times[0] * 1e9),
             exposure_us=settings.exposure_us,
+            gain_db=settings.gain_db,
             pixel_format=pixel_format,
             bits=BITS[pixel_format],
         )

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from lightpen.arrays import Image
+from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.record.writing import RecordWriter
@@ -21,6 +22,7 @@ def capture_image(
     sighting: Sighting,
     time: float,
     device_time_ns: int | None = None,
+    stats: Stats | None = None,
     rule: Rule | None = None,
 ) -> Transition:
     """Take one image into a swing.
@@ -37,6 +39,8 @@ def capture_image(
         When it was taken, s.
     device_time_ns : int, optional
         By the clock of the camera.
+    stats : Stats, optional
+        What became of the camera's images since the swing began.
     rule : Rule, optional
         What the image does to the swing; that of a live one by default.
 
@@ -69,5 +73,6 @@ def capture_image(
                 sighting.translation,
                 time,
                 device_time_ns,
+                stats,
             )
     return transition

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, LightpenError
@@ -51,6 +51,7 @@ from lightpen.swing.rules import (
 from lightpen.swing.serial_queue import Act, Report, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.tally import Tally
 
 T = TypeVar("T")
 
@@ -100,6 +101,7 @@ class SwingCourse:
         self._status = SwingStatus()
         self._attendance = Attendance()
         self._writer: RecordWriter | None = None
+        self._tally = Tally()
         self._record: Record | None = None  # as it was when it was entered
         self._n_others = 0  # images of a recording since the last that was read
         self._known = frozenset[str]()  # checksums of images that were recorded by then
@@ -237,6 +239,7 @@ class SwingCourse:
         self._writer, self._record = writer, record
         self._n_others = 0
         self._known = frozenset(image.sha256 for image in record.images)
+        self._tally = Tally(record.stats)
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
         self._relieve()
@@ -257,6 +260,7 @@ class SwingCourse:
         sighting: Sighting | None,
         setup: SwingSetup | None,
         n_images: int | None,
+        stats: Stats | None,
     ) -> None:
         """Take an image, as `SwingRunner.take` has it."""
         status, choices = self._status, self._attendance.choices
@@ -271,6 +275,8 @@ class SwingCourse:
             if status.setup is not None and not status.setup.is_recording:
                 self._watch(status.state, sighting, frame)
         elif status.is_capturing and setup is status.setup:
+            if stats is not None:
+                self._tally = self._tally.after(stats)
             self._capture(status.state, sighting, frame, n_images)
 
     def _capture(
@@ -295,7 +301,7 @@ class SwingCourse:
         try:
             transition = capture_image(
                 *(setup, before, writer, frame.image, sighting, time),
-                *(frame.device_ts_ns, rule),
+                *(frame.device_ts_ns, self._tally.total, rule),
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)

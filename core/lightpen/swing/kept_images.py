@@ -10,7 +10,7 @@ from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
-from lightpen.estimation.reach import Reach, reach_of
+from lightpen.estimation.reach import NOT_REACHED, Reach, Reached, reach_of
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
@@ -46,11 +46,8 @@ class KeptImages:
         The joint fit, as soon as the postures allow one.
     reach : Reach or None
         What the images say beside the files, with the joint fit.
-    uncertainty : float
-        U (k = 2) of the tip along its weakest direction, what the files leave open
-        included, mm; infinite at first.
-    floor : float
-        What more images cannot bring it below, mm.
+    reached : Reached
+        How certain the tip is, what the files leave open included.
     """
 
     numbers: IntArray
@@ -63,11 +60,15 @@ class KeptImages:
     seat: Seat | None = None
     joint: JointFit | None = None
     reach: Reach | None = None
-    uncertainty: float = float("inf")
-    floor: float = 0.0
+    reached: Reached = NOT_REACHED
 
     def __len__(self) -> int:
         return len(self.numbers)
+
+    @property
+    def uncertainty(self) -> float:
+        """U (k = 2) of the tip along its weakest direction, mm; infinite at first."""
+        return self.reached.uncertainty
 
     @property
     def sigma(self) -> float:
@@ -164,6 +165,13 @@ def keep(
     return _refit(camera, pen, longer, starts)
 
 
+def first_images(
+    camera: Camera, pen: Pen, kept: KeptImages, n_images: int
+) -> KeptImages:
+    """Return the first of the images, and the fit to them."""
+    return _leave_out(camera, pen, kept, np.arange(len(kept)) >= n_images)
+
+
 def _leave_out(
     camera: Camera, pen: Pen, kept: KeptImages, out: BoolArray
 ) -> KeptImages:
@@ -189,7 +197,7 @@ def _refit(
     camera: Camera, pen: Pen, kept: KeptImages, starts: FloatArray
 ) -> KeptImages:
     """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
-    kept = replace(kept, joint=None, uncertainty=float("inf"), floor=0.0)
+    kept = replace(kept, joint=None, reached=NOT_REACHED)
     fixed = len(kept) >= MIN_JOINT and posture_spread(starts)[0][0] >= MIN_SPREAD
     seat = kept.seat
     if seat is None or not fixed:
@@ -201,17 +209,13 @@ def _refit(
         joint = fit_joint(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam)
     except CalibrationError:  # an image too bad to settle; the next ones may help
         return replace(kept, seat=seat)
+    used = joint.used.any(axis=1)
+    if posture_spread(joint.rotations[used])[0][0] < MIN_SPREAD:
+        return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
-    uncertainty, floor = reach.uncertainties(camera, pen, max(joint.sigma, NO_NOISE))
-    return replace(
-        kept,
-        seat=fitted,
-        joint=joint,
-        reach=reach,
-        uncertainty=uncertainty,
-        floor=floor,
-    )
+    reached = reach.reached(camera, pen, max(joint.sigma, NO_NOISE))
+    return replace(kept, seat=fitted, joint=joint, reach=reach, reached=reached)
 
 
 def distance_unit(kept: KeptImages) -> float:

@@ -8,6 +8,10 @@ from typing import Self
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.replay import RECORDED
+from lightpen.cameras.source import Needs, Source
+from lightpen.cameras.sources import SIMULATED, source_named
 from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
@@ -25,10 +29,10 @@ from lightpen.swing.state import SwingSetup
 
 
 class SourceKind(StrEnum):
-    """Where images come from."""
+    """The sources that are no cameras; all are in `lightpen.cameras.sources`."""
 
-    SIMULATED = "simulated"
-    RECORDED = "recorded"
+    SIMULATED = SIMULATED.key
+    RECORDED = RECORDED.key
 
 
 @dataclass(frozen=True)
@@ -37,12 +41,41 @@ class SourceChoice:
 
     Attributes
     ----------
+    kind : str
+        Key of a source.
     place : str
-        Folder, pattern or video of a recording; else empty.
+        Folder, pattern or video of a recording; serial number or address of a camera.
+    producer : str
+        File of a GenTL producer; empty for those that the system names.
     """
 
-    kind: SourceKind = SourceKind.SIMULATED
+    kind: str = SourceKind.SIMULATED
     place: str = ""
+    producer: str = ""
+
+    @property
+    def source(self) -> Source:
+        """What was chosen; the simulated pen for a kind of a later version."""
+        return source_named(self.kind) or SIMULATED
+
+    @property
+    def lacks_place(self) -> bool:
+        """Whether it has to be said where the images come from."""
+        return self.source.needs is not Needs.NOTHING and not self.place
+
+
+@dataclass(frozen=True)
+class CameraInUse:
+    """The camera that images come from.
+
+    Attributes
+    ----------
+    settings : CameraSettings
+        In force.
+    """
+
+    serial: str
+    settings: CameraSettings
 
 
 class Lack(StrEnum):
@@ -54,6 +87,7 @@ class Lack(StrEnum):
     TIP = "tip"
     CONE = "cone"
     SOURCE_PLACE = "source place"
+    DEVICE = "device"
     IMAGES = "images"
     CAMERA_FILE = "camera file"
     IMAGE_SIZE = "image size"
@@ -71,6 +105,8 @@ class Preparation:
         Its centre by design, pen frame, mm; None leaves that of the LED file in force.
     image_size : pair of int or None
         Width and height of the live images, px; None while there are none.
+    camera_in_use : CameraInUse or None
+        None until one is open.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
     has_unsaved_leds : bool
@@ -81,6 +117,7 @@ class Preparation:
     nominal_tip: FloatArray | None = None
     source: SourceChoice = field(default_factory=SourceChoice)
     image_size: tuple[int, int] | None = None
+    camera_in_use: CameraInUse | None = None
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -117,7 +154,7 @@ class Preparation:
         """
         if source == self.source:
             return self
-        simulates = source.kind is SourceKind.SIMULATED
+        simulates = source.kind == SourceKind.SIMULATED
         camera_file, pen_file = self.camera_file, self.pen_file
         if camera_file is not None and camera_file.is_simulated is not simulates:
             camera_file = None
@@ -173,8 +210,9 @@ class Preparation:
     def camera_lacks(self) -> tuple[Lack, ...]:
         """Return what the step Camera lacks."""
         lacks = []
-        if self.source.kind is SourceKind.RECORDED and not self.source.place:
-            lacks.append(Lack.SOURCE_PLACE)
+        if self.source.lacks_place:
+            is_of_files = self.source.source.needs is Needs.FILES
+            lacks.append(Lack.SOURCE_PLACE if is_of_files else Lack.DEVICE)
         elif self.image_size is None:
             lacks.append(Lack.IMAGES)
         camera = self.camera
@@ -201,7 +239,7 @@ class Preparation:
         camera, pen = self.camera, self.pen
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
-        is_recording = self.source.kind is SourceKind.RECORDED
+        is_recording = self.source.kind == SourceKind.RECORDED
         return SwingSetup(camera, pen, self.limits, self.mask, is_recording)
 
     def swings_like(self, other: "Preparation") -> bool:
@@ -240,6 +278,7 @@ class Preparation:
                 "origin": str(origin),
                 "source": str(self.source.kind),
                 "source_place": self.source.place,
+                **_camera_entries(self.camera_in_use),
                 "max_uncertainty_mm": limits.max_uncertainty,
                 "min_images": limits.min_images,
                 "max_images": limits.max_images,
@@ -250,7 +289,27 @@ class Preparation:
         )
 
 
-_ORIGINS = {
+def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
+    """Return what a record tells of the camera that took its images."""
+    if used is None:
+        return {}
+    settings, region = used.settings, used.settings.region
+    entries: dict[str, Plain] = {
+        "camera_serial": used.serial,
+        "exposure_us": settings.exposure_us,
+        "gain_db": settings.gain_db,
+        "frame_rate": settings.frame_rate,
+        "pixel_format": settings.pixel_format,
+        "trigger": None if settings.trigger is None else str(settings.trigger),
+        "packet_size": settings.packet_size,
+        "region_px": None
+        if region is None
+        else f"{region.width} x {region.height} at {region.x}, {region.y}",
+    }
+    return {name: entry for name, entry in entries.items() if entry is not None}
+
+
+_ORIGINS: dict[str, Origin] = {
     SourceKind.SIMULATED: Origin.SIMULATED,
     SourceKind.RECORDED: Origin.RECORDED,
 }

@@ -58,8 +58,8 @@ from lightpen.swing.state import (
     SwingEvent,
     SwingSetup,
     SwingState,
-    Trace,
     start_swing,
+    trace_of,
 )
 
 SETTLING = 0.5  # s between the tip being found at rest and the countdown
@@ -174,7 +174,8 @@ def start_again(
         s.
     """
     state = start_swing(setup, time)
-    return replace(state, kept=kept, next_number=next_number)
+    trace = trace_of(setup.camera, setup.pen, kept)
+    return replace(state, kept=kept, next_number=next_number, trace=trace)
 
 
 def _noticed(
@@ -305,7 +306,7 @@ def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transitio
         transition.state,
         [SwingEvent(Happening.KEPT, (number,)), *transition.events],
     )
-    state = replace(state, trace=_longer(state.trace, kept))
+    state = replace(state, trace=state.trace.with_estimate(kept))
     enough = setup.limits.min_per_field
     full = (state.counts >= enough) & (counts < enough)
     events += [
@@ -360,6 +361,9 @@ def _paused(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
         return Transition(state)
     if _is_lost(state):
         return Transition(replace(state, pause=Pause.LOST, message=PEN_LOST))
+    is_in_place = bool(state.recent) and bool(in_place(state, state.recent[-1:]).all())
+    if state.pause is Pause.LOST and sighting.has_pose and not is_in_place:
+        state = replace(state, pause=Pause.LIFTED, message=PEN_LIFTED)
     if state.time - state.since > RESEATED and rests_in_place(state, RESEATED):
         capturing = _enter(state, Phase.CAPTURING, _asking(state))
         return Transition(capturing, (SwingEvent(Happening.SEATED),))
@@ -487,13 +491,3 @@ def _more(
     if n_images:
         counts[reason] += n_images
     return counts
-
-
-def _longer(trace: Trace, kept: KeptImages) -> Trace:
-    if kept.seat is None:
-        return trace
-    return Trace(
-        np.append(trace.n_images, len(kept)),
-        np.concatenate([trace.tips, kept.seat.tip_pen[None]]),
-        np.append(trace.uncertainties, kept.uncertainty),
-    )

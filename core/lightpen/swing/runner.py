@@ -12,7 +12,7 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from lightpen.cameras.protocol import Frame
+from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.sighting import Sighting
 from lightpen.local_time import local_now
 from lightpen.record.archive import Archive
@@ -170,6 +170,7 @@ class SwingRunner:
         sighting: Sighting | None,
         setup: SwingSetup | None = None,
         n_images: int | None = None,
+        stats: Stats | None = None,
     ) -> None:
         """Take an image, and return when all is done that it asks for.
 
@@ -182,7 +183,9 @@ class SwingRunner:
         n_images : int, optional
             Of the recording that is shown over and over; a swing of recorded images
             ends with the last.
+        stats : Stats, optional
+            What the camera has counted by now.
         """
         self._queue.ask_and_wait(
-            partial(self._course.take, frame, sighting, setup, n_images)
+            partial(self._course.take, frame, sighting, setup, n_images, stats)
         )

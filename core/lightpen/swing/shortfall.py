@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.sighting import Sighting
 from lightpen.messages import (
     UNKNOWN,
+    cannot_get_below,
     not_upright,
     too_few_images,
     too_little_tilt,
@@ -54,7 +55,8 @@ class Shortfall:
         Images that the uncertainty still needs, estimated; 0 if it suffices, or if
         what the files leave open is too much for any number of images.
     n_more : int
-        Images that will still be taken, estimated: no more than the limit allows.
+        Images that will still be taken, estimated: as many for each that a field lacks
+        as it took until now, and no more than the limit allows.
     """
 
     wanted: IntArray
@@ -84,13 +86,15 @@ def measure_shortfall(setup: SwingSetup, state: SwingState) -> Shortfall:
     n_for_uncertainty = _n_for_uncertainty(state, limits)
     n_images = max(limits.min_images - state.n_kept, int(fields.sum()), 0)
     n_allowed = max(limits.max_images - state.n_kept, 0)
-    n_more = min(max(n_images, n_for_uncertainty), n_allowed)
+    n_filled = int(np.minimum(wanted, state.counts).sum())
+    n_for_fields = ceil(int(fields.sum()) * max(state.n_kept / max(n_filled, 1), 1.0))
+    n_more = min(max(n_images, n_for_fields, n_for_uncertainty), n_allowed)
     return Shortfall(wanted, fields, n_images, n_for_uncertainty, n_more)
 
 
 def _n_for_uncertainty(state: SwingState, limits: SwingLimits) -> int:
     """Return how many images would bring U to its limit; 0 where none can."""
-    limit, floor = limits.max_uncertainty, state.kept.floor
+    limit, floor = limits.max_uncertainty, state.kept.reached.floor
     if state.kept.uncertainty <= limit or floor >= limit:
         return 0
     # All but the floor goes with one over the number of images.
@@ -107,6 +111,14 @@ def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
         min_images=max(limits.min_images, n_images),
         max_images=max(limits.max_images, n_images),
     )
+
+
+def out_of_reach(limits: SwingLimits, state: SwingState) -> Sentence | None:
+    """Return why no number of images brings U to its limit, if none does."""
+    reached = state.kept.reached
+    if reached.floor < limits.max_uncertainty:
+        return None
+    return cannot_get_below(reached.floor, limits.max_uncertainty)
 
 
 def turn_range(pen: Pen, rotations: FloatArray) -> tuple[float, float] | None:
@@ -143,6 +155,9 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Sentence, ...]:
         limit = setup.limits.max_uncertainty
         known = np.isfinite(uncertainty)
         found.append(uncertain(uncertainty, limit) if known else UNKNOWN)
+    never = out_of_reach(setup.limits, state)
+    if never is not None:
+        found.append(never)
     if state.n_kept < setup.limits.min_images:
         found.append(too_few_images(state.n_kept, setup.limits.min_images))
     return tuple(found)

@@ -25,8 +25,15 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
 from lightpen.sentences import Sentence
-from lightpen.swing.kept_images import KeptImages, none_kept
+from lightpen.swing.kept_images import (
+    MIN_JOINT,
+    KeptImages,
+    first_images,
+    none_kept,
+)
 from lightpen.swing.seat import Seat
+
+N_TRACED = 12  # estimates of a swing that is gone on with
 
 
 class Phase(StrEnum):
@@ -119,13 +126,40 @@ class Trace:
         Number of kept images at each estimate.
     tips : (K, 3) array
         Tip in the pen frame, mm.
-    uncertainties : (K,) array
-        U (k = 2) along the weakest direction, mm.
+    uncertainties, floors : (K,) array
+        U (k = 2) along the weakest direction and what more images cannot bring it
+        below, mm.
     """
 
     n_images: IntArray
     tips: FloatArray
     uncertainties: FloatArray
+    floors: FloatArray
+
+    def with_estimate(self, kept: KeptImages) -> "Trace":
+        """Return it with the estimate by these images, if there is one."""
+        if kept.seat is None:
+            return self
+        return Trace(
+            np.append(self.n_images, len(kept)),
+            np.concatenate([self.tips, kept.seat.tip_pen[None]]),
+            np.append(self.uncertainties, kept.reached.uncertainty),
+            np.append(self.floors, kept.reached.floor),
+        )
+
+
+NO_TRACE = Trace(
+    np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+)
+
+
+def trace_of(camera: Camera, pen: Pen, kept: KeptImages) -> Trace:
+    """Return how the estimate went along with images that were kept before."""
+    trace = NO_TRACE
+    counts = np.linspace(0, len(kept), N_TRACED + 1).astype(np.int64)[1:]
+    for n_images in sorted({int(n) for n in counts if n >= MIN_JOINT} - {len(kept)}):
+        trace = trace.with_estimate(first_images(camera, pen, kept, n_images))
+    return trace.with_estimate(kept)
 
 
 @dataclass(frozen=True)
@@ -239,5 +273,5 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         target_since=time,
         slipped_at=None,
         still_since=None,
-        trace=Trace(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)),
+        trace=NO_TRACE,
     )

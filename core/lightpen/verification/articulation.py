@@ -23,7 +23,7 @@ from lightpen.model.coverage import posture_spread
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     refused,
 )
@@ -59,7 +59,7 @@ class Articulation:
     spreads: FloatArray
     location_error: float
     expected: float
-    assessment: Assessment
+    assessment: Conformity
 
 
 def measure_articulation(
@@ -194,7 +194,7 @@ def _expected(
     return float(np.mean([smallest_diameter(each) for each in draws]))
 
 
-def _assessment(error: float, limits: VerificationLimits) -> Assessment:
+def _assessment(error: float, limits: VerificationLimits) -> Conformity:
     if error > limits.location:
         return refused(
             sentence(

@@ -21,7 +21,7 @@ CHECK_FILES = sentence(
 
 
 @dataclass(frozen=True)
-class Assessment:
+class Conformity:
     """What a verification found.
 
     Accepted is what lies within its limit (simple acceptance); U is stated beside it
@@ -38,16 +38,16 @@ class Assessment:
         return self.grade is Grade.PASS
 
 
-def accepted(reason: Sentence) -> Assessment:
+def accepted(reason: Sentence) -> Conformity:
     """Return that all is well."""
-    return Assessment(Grade.PASS, reason, USE_TIP)
+    return Conformity(Grade.PASS, reason, USE_TIP)
 
 
-def check(reason: Sentence, next_step: Sentence) -> Assessment:
+def check(reason: Sentence, next_step: Sentence) -> Conformity:
     """Return that something is to be looked into."""
-    return Assessment(Grade.CHECK, reason, next_step)
+    return Conformity(Grade.CHECK, reason, next_step)
 
 
-def refused(reason: Sentence, next_step: Sentence) -> Assessment:
+def refused(reason: Sentence, next_step: Sentence) -> Conformity:
     """Return that a limit is not kept."""
-    return Assessment(Grade.REPEAT, reason, next_step)
+    return Conformity(Grade.REPEAT, reason, next_step)

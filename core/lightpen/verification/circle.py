@@ -23,7 +23,7 @@ from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
     CHECK_FILES,
     VERIFY_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     check,
     refused,
@@ -127,7 +127,7 @@ class Circle:
     runs: tuple[CircleRun, ...]
     certified: float
     uncertainty: float
-    assessment: Assessment
+    assessment: Conformity
 
     @property
     def radii(self) -> FloatArray:
@@ -358,7 +358,7 @@ def _assessment(
     certified: float,
     uncertainty: float,
     limits: VerificationLimits,
-) -> Assessment:
+) -> Conformity:
     mean = float(np.mean([run.radius for run in runs]))
     error = mean - certified
     if abs(error) > ANOTHER * certified:

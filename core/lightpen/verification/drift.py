@@ -23,7 +23,7 @@ from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     VERIFY_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     refused,
 )
@@ -50,7 +50,7 @@ class Drift:
     names: tuple[str, ...]
     moves: FloatArray
     uncertainties: FloatArray
-    assessment: Assessment
+    assessment: Conformity
 
     @property
     def share(self) -> FloatArray:
@@ -109,7 +109,7 @@ def _assessment(
     moves: FloatArray,
     uncertainties: FloatArray,
     limits: VerificationLimits,
-) -> Assessment:
+) -> Conformity:
     lengths = np.linalg.norm(moves, axis=1)
     worst = int(np.argmax(lengths))
     axis = int(np.argmax(np.abs(moves[worst])))

@@ -19,7 +19,7 @@ from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
     VERIFY_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     check,
     refused,
@@ -99,7 +99,7 @@ class FixedPoint:
     tip_change_uncertainty: FloatArray
     wants_other_tip: bool
     moved: FloatArray | None
-    assessment: Assessment
+    assessment: Conformity
 
 
 def measure_fixed_point(
@@ -220,7 +220,7 @@ def _other_tip(touches: Sequence[Touch]) -> tuple[FloatArray, FloatArray]:
     return np.asarray(step[:3]), np.asarray(excess * covariance[:3, :3])
 
 
-def _assessment(found: FixedPoint, limits: VerificationLimits) -> Assessment:
+def _assessment(found: FixedPoint, limits: VerificationLimits) -> Conformity:
     deviation = found.calibrated.deviation
     allowed = np.array([limits.across, limits.across, limits.along])
     axis = int(np.argmax(deviation / allowed))

@@ -95,7 +95,10 @@ def calibrate_again(
         camera,
         pen,
     )
-    return calibrate(camera, pen, seen)
+    measured = replace(
+        seen, areas=calibration.areas, edge_widths=calibration.edge_widths
+    )
+    return calibrate(camera, pen, measured)
 
 
 def improve_pen(

@@ -17,7 +17,7 @@ from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     CHECK_FILES,
     VERIFY_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     check,
     refused,
@@ -86,7 +86,7 @@ class Length:
     certified_uncertainty: float
     uncertainties: FloatArray
     scale: Scale
-    assessment: Assessment
+    assessment: Conformity
 
     @property
     def errors(self) -> FloatArray:
@@ -235,7 +235,7 @@ def _assessment(
     errors: FloatArray,
     uncertainties: FloatArray,
     limits: VerificationLimits,
-) -> Assessment:
+) -> Conformity:
     worst = int(np.argmax(np.abs(errors)))
     error, uncertainty = float(errors[worst]), float(uncertainties[worst])
     if abs(error) > limits.length:

@@ -23,7 +23,7 @@ from lightpen.record.calibrations import CalibrationFile
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
     CHECK_FILES,
-    Assessment,
+    Conformity,
     accepted,
     check,
     refused,
@@ -76,7 +76,7 @@ class PenHealth:
     swings: tuple[SwingOfPen, ...]
     moved: tuple[int, ...]
     growth: float | None
-    assessment: Assessment
+    assessment: Conformity
 
 
 def examine_pen(
@@ -201,7 +201,7 @@ def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | Non
 
 def _assessment(
     swings: Sequence[SwingOfPen], moved: tuple[int, ...], growth: float | None
-) -> Assessment:
+) -> Conformity:
     if moved:
         lengths = np.array([np.linalg.norm(each.shifts, axis=1) for each in swings])
         led = max(moved, key=lambda each: float(np.nanmax(lengths[:, each - 1])))

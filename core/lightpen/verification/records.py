@@ -9,7 +9,7 @@ from lightpen.estimation.report import plain
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.local_time import local_now
 from lightpen.verification.articulation import Articulation
-from lightpen.verification.assessment import Assessment
+from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import Circle, CircleRun
 from lightpen.verification.drift import Drift
 from lightpen.verification.fixed_point import FixedPoint, Scatter
@@ -22,7 +22,7 @@ from lightpen.verification.touch import RejectedFrame, Touch
 def verification_record(
     kind: str,
     entries: Mapping[str, Any],
-    assessment: Assessment,
+    assessment: Conformity,
     limits: Mapping[str, float],
     inputs: Mapping[str, Any],
 ) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
     VERIFY_AGAIN,
-    Assessment,
+    Conformity,
     accepted,
     check,
     refused,
@@ -105,7 +105,7 @@ class Repeatability:
     capability: Capability | None
     fixed_point_deviation: FloatArray | None
     points_to: Sentence | None
-    assessment: Assessment
+    assessment: Conformity
 
     @property
     def scatter(self) -> Scatter:
@@ -227,7 +227,7 @@ def _assessment(
     deviation: FloatArray,
     points_to: Sentence | None,
     limits: VerificationLimits,
-) -> Assessment:
+) -> Conformity:
     axis = int(np.argmax(deviation))
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
     if deviation[axis] > limits.repeatability:

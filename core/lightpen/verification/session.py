@@ -17,7 +17,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.verdict import Grade
 from lightpen.sentences import Sentence, sentence
-from lightpen.verification.assessment import Assessment
+from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import (
     MIN_ANGLE,
     MIN_TOUCHES,
@@ -123,7 +123,7 @@ class SessionState:
         return tasks[self.n_done] if self.n_done < len(tasks) else None
 
     @property
-    def assessment(self) -> Assessment | None:
+    def assessment(self) -> Conformity | None:
         """The worst that was found so far."""
         found = [
             each.assessment

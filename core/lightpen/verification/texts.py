@@ -10,7 +10,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.verification.articulation import Articulation
-from lightpen.verification.assessment import Assessment
+from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import Circle
 from lightpen.verification.drift import Drift
 from lightpen.verification.fixed_point import FixedPoint
@@ -158,7 +158,7 @@ def _left_out(rejected: Sequence[RejectedFrame]) -> list[str]:
     return [f"{len(rejected)} images left out: {named}{more}"]
 
 
-def _verdict(assessment: Assessment) -> list[str]:
+def _verdict(assessment: Conformity) -> list[str]:
     return [
         f"Verdict      {assessment.grade.upper()}: {assessment.reason}",
         f"             {assessment.next_step}",

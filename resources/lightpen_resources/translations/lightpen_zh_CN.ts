@@ -9,7 +9,7 @@
     </message>
     <message>
         <source>Calibrates the probe tip of a light pen.</source>
-        <translation>校准光笔的测头。</translation>
+        <translation>标定光笔的测头。</translation>
     </message>
     <message>
         <source>Lightpen: MIT licence. Qt and PySide6: LGPL 3. Fonts: cut from Noto Sans and Noto Sans CJK, SIL Open Font License 1.1.</source>
@@ -39,7 +39,7 @@
     </message>
     <message>
         <source>Continue to the LEDs</source>
-        <translation>继续：LED</translation>
+        <translation>下一步：LED</translation>
     </message>
     <message>
         <source>No camera is open.</source>
@@ -105,7 +105,7 @@
     </message>
     <message>
         <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
-        <translation>演示结束。您可以随意查看；演示数据不会保留。要校准测头，请不带演示启动程序。</translation>
+        <translation>演示结束。您可以随意查看；演示数据不会保留。要标定测头，请不带演示启动程序。</translation>
     </message>
 </context>
 <context>
@@ -143,6 +143,10 @@
         <translation>合适：{0} 个光点</translation>
     </message>
     <message>
+        <source>LED {0}: {1} %</source>
+        <translation>LED {0}：{1} %</translation>
+    </message>
+    <message>
         <source>dark</source>
         <translation>过暗</translation>
     </message>
@@ -178,12 +182,48 @@
         <translation>用上下键调整；输入数值后按 Enter。</translation>
     </message>
     <message>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <source>Set by the LEDs</source>
+        <translation>按 LED 设定</translation>
+    </message>
+    <message>
+        <source>Exposure and gain for 80 % of full scale at the brightest LED.</source>
+        <translation>设定曝光和增益，使最亮的 LED 达到满量程的 80 %。</translation>
+    </message>
+    <message>
         <source>No images come.</source>
         <translation>没有图像。</translation>
     </message>
     <message>
         <source>Recorded: exposure and gain are as they were taken.</source>
         <translation>录制的图像：曝光和增益为拍摄时的值。</translation>
+    </message>
+    <message>
+        <source>Hold the pen still. Brightest LED: {0}</source>
+        <translation>请保持光笔不动。最亮的 LED：{0}</translation>
+    </message>
+    <message>
+        <source>Set. Brightest LED: {0}, none is saturated.</source>
+        <translation>已设定。最亮的 LED：{0}，没有 LED 饱和。</translation>
+    </message>
+    <message>
+        <source>No LEDs are seen. Hold the pen before the camera.</source>
+        <translation>看不到 LED。请把光笔放到相机前。</translation>
+    </message>
+    <message>
+        <source>The least exposure and gain are too bright ({0}). Close the aperture of the lens.</source>
+        <translation>曝光和增益已最小，仍然过亮（{0}）。请调小镜头光圈。</translation>
+    </message>
+    <message>
+        <source>The LEDs reach {0} only: a longer exposure would smear the moving pen. Open the aperture of the lens.</source>
+        <translation>LED 只能达到 {0}：再延长曝光会使移动的光笔拖影。请调大镜头光圈。</translation>
+    </message>
+    <message>
+        <source>The light changes from image to image ({0}). Hold the pen still, and check the supply of its LEDs.</source>
+        <translation>各幅图像的亮度不一致（{0}）。请保持光笔不动，并检查 LED 的供电。</translation>
     </message>
     <message>
         <source>Hold the pen so that the camera sees its LEDs.</source>
@@ -235,6 +275,10 @@
     <message>
         <source>No LED is seen</source>
         <translation>看不到 LED</translation>
+    </message>
+    <message>
+        <source>Saturated: lower the exposure first</source>
+        <translation>过饱和：请先降低曝光</translation>
     </message>
     <message>
         <source>Sharp</source>
@@ -622,8 +666,8 @@
         <translation>与实时图像一致：{0}</translation>
     </message>
     <message>
-        <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera or switch off binning.</source>
-        <translation>相机图像为 {0}，标定文件适用于 {1}。请选择该相机的文件，或关闭像素合并。</translation>
+        <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera, set the region to the whole sensor, or switch off binning.</source>
+        <translation>相机送来 {0}，标定文件是为 {1} 做的。请选择此相机的文件，把区域设为整个传感器，或关闭像素合并。</translation>
     </message>
     <message>
         <source>no date</source>
@@ -650,7 +694,7 @@
     </message>
     <message>
         <source>Last calibration of this pen and tip</source>
-        <translation>本光笔和测头的上次校准</translation>
+        <translation>本光笔和测头的上次标定</translation>
     </message>
     <message>
         <source>Take back...</source>
@@ -710,7 +754,7 @@
     </message>
     <message>
         <source>It is older than {0} days. Calibrate before you measure.</source>
-        <translation>已超过 {0} 天。测量前请先校准。</translation>
+        <translation>已超过 {0} 天。测量前请先标定。</translation>
     </message>
     <message>
         <source>In the future</source>
@@ -901,7 +945,7 @@
     </message>
     <message>
         <source>Continue to the swing</source>
-        <translation>继续：摆动</translation>
+        <translation>下一步：摆动</translation>
     </message>
     <message>
         <source>The LED table has changes that are not saved.</source>
@@ -975,12 +1019,12 @@
         <translation>测头在最弱方向上达到此不确定度时，摆动结束。通常：{0} mm。</translation>
     </message>
     <message>
-        <source>The swing does not end with fewer. Usual: {0}.</source>
-        <translation>少于此数时摆动不会结束。通常：{0}。</translation>
+        <source>The swing does not end with fewer; no more than the images at most. Usual: {0}.</source>
+        <translation>少于此数时摆动不会结束；不得大于最多图像数。通常：{0}。</translation>
     </message>
     <message>
-        <source>The swing ends with so many in any case. Usual: {0}.</source>
-        <translation>达到此数时摆动一定结束。通常：{0}。</translation>
+        <source>The swing ends with so many in any case; no fewer than the images at least. Usual: {0}.</source>
+        <translation>达到此数时摆动必定结束；不得小于最少图像数。通常：{0}。</translation>
     </message>
 </context>
 <context>
@@ -1090,7 +1134,7 @@
     </message>
     <message>
         <source>Pen tip calibration</source>
-        <translation>光笔测头校准</translation>
+        <translation>光笔测头标定</translation>
     </message>
 </context>
 <context>
@@ -1129,7 +1173,7 @@
     </message>
     <message>
         <source>The LEDs fit the images, but not the pen frame: see what is told of the file.</source>
-        <translation>LED 与图像相符，但不符合测笔坐标系：请看文件处的说明。</translation>
+        <translation>LED 与图像相符，但不符合光笔坐标系：请看文件处的说明。</translation>
     </message>
     <message>
         <source>Every LED is within {0} mm of its place in the table, in {1} views.</source>
@@ -1215,7 +1259,7 @@
     </message>
     <message>
         <source>What is calibrated</source>
-        <translation>校准对象</translation>
+        <translation>标定对象</translation>
     </message>
     <message>
         <source>Station</source>
@@ -1282,6 +1326,10 @@
         <source>Operator view</source>
         <translation>操作员视图</translation>
     </message>
+    <message>
+        <source>Esc: leave this view</source>
+        <translation>Esc：退出此视图</translation>
+    </message>
 </context>
 <context>
     <name>OptionsMenu</name>
@@ -1324,6 +1372,17 @@
     <message>
         <source>About Lightpen</source>
         <translation>关于 Lightpen</translation>
+    </message>
+</context>
+<context>
+    <name>PenInSpace</name>
+    <message>
+        <source>The pen in space</source>
+        <translation>光笔的空间姿态</translation>
+    </message>
+    <message>
+        <source>The pen as it leans, and the outline of where it should go.</source>
+        <translation>光笔当前的倾斜，以及应到位置的轮廓。</translation>
     </message>
 </context>
 <context>
@@ -1578,7 +1637,7 @@
     </message>
     <message>
         <source>Next: start the next calibration, or close the program.</source>
-        <translation>下一步：开始下一次校准，或关闭程序。</translation>
+        <translation>下一步：开始下一次标定，或关闭程序。</translation>
     </message>
     <message>
         <source>Nothing is in force until it is accepted.</source>
@@ -1594,7 +1653,7 @@
     </message>
     <message>
         <source>Start the next calibration</source>
-        <translation>开始下一次校准</translation>
+        <translation>开始下一次标定</translation>
     </message>
     <message>
         <source>Accept</source>
@@ -1722,7 +1781,7 @@
     </message>
     <message>
         <source>The tip is accepted; start the next calibration.</source>
-        <translation>测头已接受；请开始下一次校准。</translation>
+        <translation>测头已接受；请开始下一次标定。</translation>
     </message>
     <message>
         <source>All recorded images are read.</source>
@@ -1782,6 +1841,97 @@
     </message>
 </context>
 <context>
+    <name>SettingsPanel</name>
+    <message>
+        <source>The whole sensor is read out.</source>
+        <translation>已读出整个传感器。</translation>
+    </message>
+    <message>
+        <source>Colours are made grey, which costs sharpness. A grey format such as Mono8 gives better centres, a monochrome camera the best.</source>
+        <translation>彩色会转换为灰度，清晰度因此下降。Mono8 等灰度格式的中心更准，黑白相机最好。</translation>
+    </message>
+    <message>
+        <source>delivered: {0}</source>
+        <translation>送达：{0}</translation>
+    </message>
+    <message>
+        <source>incomplete: {0}</source>
+        <translation>不完整：{0}</translation>
+    </message>
+    <message>
+        <source>missed: {0}</source>
+        <translation>丢失：{0}</translation>
+    </message>
+    <message>
+        <source>skipped: {0}</source>
+        <translation>跳过：{0}</translation>
+    </message>
+    <message>
+        <source>Free running</source>
+        <translation>自由运行</translation>
+    </message>
+    <message>
+        <source>By software</source>
+        <translation>软件触发</translation>
+    </message>
+    <message>
+        <source>Settings of the camera</source>
+        <translation>相机设置</translation>
+    </message>
+    <message>
+        <source>Frame rate</source>
+        <translation>帧率</translation>
+    </message>
+    <message>
+        <source>Pixel format</source>
+        <translation>像素格式</translation>
+    </message>
+    <message>
+        <source>Trigger</source>
+        <translation>触发</translation>
+    </message>
+    <message>
+        <source>Packet size</source>
+        <translation>数据包大小</translation>
+    </message>
+    <message>
+        <source>Region width</source>
+        <translation>区域宽度</translation>
+    </message>
+    <message>
+        <source>Region from left</source>
+        <translation>区域左边距</translation>
+    </message>
+    <message>
+        <source>Region</source>
+        <translation>区域</translation>
+    </message>
+    <message>
+        <source>from left, top</source>
+        <translation>左、上边距</translation>
+    </message>
+    <message>
+        <source>Region height</source>
+        <translation>区域高度</translation>
+    </message>
+    <message>
+        <source>Region from top</source>
+        <translation>区域上边距</translation>
+    </message>
+    <message>
+        <source>Whole sensor</source>
+        <translation>整个传感器</translation>
+    </message>
+    <message>
+        <source>Of this camera&apos;s images: came whole; came in part and were left out; never came; were not measured, as the computer was too slow.</source>
+        <translation>此相机的图像：完整送达；只到达一部分而被舍弃；从未到达；因计算机太慢而未测量。</translation>
+    </message>
+    <message>
+        <source>Larger packets cost the computer less. The network card and every switch must let them pass (jumbo frames).</source>
+        <translation>数据包越大，计算机的负担越小。网卡和每个交换机都必须允许其通过（巨型帧）。</translation>
+    </message>
+</context>
+<context>
     <name>Sidebar</name>
     <message>
         <source>Pen {0}</source>
@@ -1797,7 +1947,7 @@
     </message>
     <message>
         <source>Pen tip calibration</source>
-        <translation>光笔测头校准</translation>
+        <translation>光笔测头标定</translation>
     </message>
     <message>
         <source>Operator view</source>
@@ -1862,12 +2012,20 @@
 <context>
     <name>SourcePanel</name>
     <message>
-        <source>Simulated pen</source>
-        <translation>模拟光笔</translation>
+        <source>Cameras found: {0}</source>
+        <translation>找到的相机：{0}</translation>
     </message>
     <message>
-        <source>Recorded images</source>
-        <translation>录制的图像</translation>
+        <source>No camera was found. Check its power and its cable, or enter its serial number or its address.</source>
+        <translation>没有找到相机。请检查电源和线缆，或输入其序列号或地址。</translation>
+    </message>
+    <message>
+        <source>GenTL producer of the camera</source>
+        <translation>相机的 GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>GenTL producers ({0})</source>
+        <translation>GenTL 生产者文件 ({0})</translation>
     </message>
     <message>
         <source>Folder of the recorded images</source>
@@ -1880,6 +2038,14 @@
     <message>
         <source>Videos and images ({0})</source>
         <translation>视频和图像 ({0})</translation>
+    </message>
+    <message>
+        <source>The search is on.</source>
+        <translation>正在搜索。</translation>
+    </message>
+    <message>
+        <source>Cameras are being looked for.</source>
+        <translation>正在搜索相机。</translation>
     </message>
     <message>
         <source> and </source>
@@ -1902,6 +2068,10 @@
         <translation>图像来源</translation>
     </message>
     <message>
+        <source>{0} - not installed</source>
+        <translation>{0} - 未安装</translation>
+    </message>
+    <message>
         <source>Folder, record or video</source>
         <translation>文件夹、记录或视频</translation>
     </message>
@@ -1916,6 +2086,22 @@
     <message>
         <source>Video...</source>
         <translation>视频...</translation>
+    </message>
+    <message>
+        <source>GenTL producer</source>
+        <translation>GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>GenTL producers of the system</source>
+        <translation>系统的 GenTL 生产者文件</translation>
+    </message>
+    <message>
+        <source>Serial number or address</source>
+        <translation>序列号或地址</translation>
+    </message>
+    <message>
+        <source>Search</source>
+        <translation>搜索</translation>
     </message>
     <message>
         <source>Use its files</source>
@@ -1938,15 +2124,15 @@
     </message>
     <message>
         <source>Say what is calibrated. All of it is remembered for the station.</source>
-        <translation>填写要校准的内容，程序会为本工位记住。</translation>
+        <translation>填写要标定的内容，程序会为本工位记住。</translation>
     </message>
     <message>
         <source>Continue to the camera</source>
-        <translation>继续：相机</translation>
+        <translation>下一步：相机</translation>
     </message>
     <message>
         <source>The last calibration cannot be shown.</source>
-        <translation>无法显示上次校准。</translation>
+        <translation>无法显示上次标定。</translation>
     </message>
     <message>
         <source>The swing is being read.</source>
@@ -2226,12 +2412,20 @@
         <source>U (k = 2) of the tip / µm</source>
         <translation>测头的 U (k = 2) / µm</translation>
     </message>
+    <message>
+        <source>floor</source>
+        <translation>下限</translation>
+    </message>
 </context>
 <context>
     <name>SwingSight</name>
     <message>
         <source>The images are not of the size that this swing needs.</source>
         <translation>图像尺寸与本次摆动不符。</translation>
+    </message>
+    <message>
+        <source>bright spots: {0}, {1} images/s</source>
+        <translation>亮点：{0}，{1} 幅/秒</translation>
     </message>
     <message>
         <source>{0} of {1} LEDs, {2} images/s</source>
@@ -2243,10 +2437,6 @@
     <message>
         <source>No swing</source>
         <translation>没有摆动</translation>
-    </message>
-    <message>
-        <source>images kept, at most {0} are taken</source>
-        <translation>为已保留的图像，最多采集 {0} 幅</translation>
     </message>
     <message>
         <source>recorded images</source>
@@ -2277,8 +2467,16 @@
         <translation>请放下光笔。</translation>
     </message>
     <message>
+        <source>Go back to the step Swing at the screen to go on.</source>
+        <translation>请在屏幕上回到“摆动”步骤以继续。</translation>
+    </message>
+    <message>
         <source>An image could not be recorded; the notice at the top says why. Mend it, then press Space.</source>
         <translation>有图像无法记录，原因见顶部提示。排除后按空格键。</translation>
+    </message>
+    <message>
+        <source>The tip is being computed.</source>
+        <translation>正在计算测头。</translation>
     </message>
     <message>
         <source>Let the simulated operator swing; or press Seat, and lean the pen by dragging the dial.</source>
@@ -2299,6 +2497,18 @@
     <message>
         <source>Capture more</source>
         <translation>继续采集</translation>
+    </message>
+    <message>
+        <source>The review is open at the screen.</source>
+        <translation>复核页已在屏幕上打开。</translation>
+    </message>
+    <message>
+        <source>Put the pen down. The review is open at the screen.</source>
+        <translation>请放下光笔。复核页已在屏幕上打开。</translation>
+    </message>
+    <message>
+        <source>Go on to the review.</source>
+        <translation>请转到复核。</translation>
     </message>
     <message>
         <source>Hold the pen upright and still for 3 s to see the review.</source>
@@ -2333,8 +2543,44 @@
         <translation>已读取 {0} / {1}</translation>
     </message>
     <message>
+        <source>{0} kept, {1} to go</source>
+        <translation>已保留 {0}，还需 {1}</translation>
+    </message>
+    <message>
+        <source>about {0} min left</source>
+        <translation>约剩 {0} 分钟</translation>
+    </message>
+    <message>
+        <source>about {0} s left</source>
+        <translation>约剩 {0} 秒</translation>
+    </message>
+    <message>
+        <source>Enter: see the review</source>
+        <translation>Enter：查看复核</translation>
+    </message>
+    <message>
+        <source>Space: go on</source>
+        <translation>空格：继续</translation>
+    </message>
+    <message>
+        <source>Space: pause</source>
+        <translation>空格：暂停</translation>
+    </message>
+    <message>
         <source>TIP SLIPPED</source>
         <translation>测头滑动</translation>
+    </message>
+    <message>
+        <source>No swing yet</source>
+        <translation>尚无摆动</translation>
+    </message>
+    <message>
+        <source>It begins as soon as the step Swing is shown at the screen.</source>
+        <translation>屏幕上显示“摆动”步骤后即开始。</translation>
+    </message>
+    <message>
+        <source>at most {0} images</source>
+        <translation>最多 {0} 幅图像</translation>
     </message>
     <message>
         <source>The tip is used from now on.</source>
@@ -2343,10 +2589,6 @@
     <message>
         <source>{0} of at least {1}</source>
         <translation>{0} / 至少 {1}</translation>
-    </message>
-    <message>
-        <source>{0} of about {1}</source>
-        <translation>{0} / 约 {1}</translation>
     </message>
 </context>
 <context>
@@ -2480,12 +2722,24 @@
         <translation>另一个程序正在写入 {folder} 中的摆动。请在那里继续，或关闭该程序后重试。</translation>
     </message>
     <message>
+        <source>Another program uses the camera {place}. Close that program, or wait a few seconds if it has just ended.</source>
+        <translation>另一个程序正在使用相机 {place}。请关闭该程序；如果它刚刚结束，请等待几秒钟。</translation>
+    </message>
+    <message>
         <source>Another program uses the simulated camera {serial}. Close that program, or wait a few seconds.</source>
         <translation>另一个程序正在使用模拟相机 {serial}。请关闭该程序，或稍等几秒。</translation>
     </message>
     <message>
+        <source>Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: apt-get install libaravis-0.8-0</source>
+        <translation>未安装 Aravis。它在 Linux 上驱动 GigE Vision 和 USB3 Vision 相机：apt-get install libaravis-0.8-0</translation>
+    </message>
+    <message>
+        <source>Basler (pylon)</source>
+        <translation>Basler (pylon)</translation>
+    </message>
+    <message>
         <source>Calibrate each of both from a file of its own.</source>
-        <translation>请将两组分别存为文件，各自校准。</translation>
+        <translation>请将两组分别存为文件，各自标定。</translation>
     </message>
     <message>
         <source>Camera {camera} does not see the pen as the others do: at {n_apart} of {n_pairs} moments it is turned otherwise. Check that the images belong to the same swing and are paired rightly, that one signal triggers all cameras, and that none of them moved.</source>
@@ -2536,12 +2790,28 @@
         <translation>视频第 {number} 帧</translation>
     </message>
     <message>
+        <source>GenICam with a vendor&apos;s GenTL producer</source>
+        <translation>GenICam，使用厂商的 GenTL 生产者</translation>
+    </message>
+    <message>
+        <source>GigE and USB3 Vision (Aravis)</source>
+        <translation>GigE 和 USB3 Vision (Aravis)</translation>
+    </message>
+    <message>
+        <source>Harvesters is not installed. With the GenTL producer of its vendor it drives any GenICam camera: {python} -m pip install harvesters genicam</source>
+        <translation>未安装 Harvesters。它通过厂商的 GenTL 生产者驱动任何 GenICam 相机：{python} -m pip install harvesters genicam</translation>
+    </message>
+    <message>
         <source>Hold it so that the camera sees its LEDs.</source>
         <translation>握住光笔，使相机能看到 LED。</translation>
     </message>
     <message>
         <source>If numbers have decimal commas, separate the columns by semicolons.</source>
         <translation>如果数字使用小数逗号，请用分号分隔各列。</translation>
+    </message>
+    <message>
+        <source>Image {seq} of the camera {serial} arrived incomplete and was left out. Check the cable and the network.</source>
+        <translation>相机 {serial} 的图像 {seq} 到达时不完整，已舍弃。请检查线缆和网络。</translation>
     </message>
     <message>
         <source>Image {seq} of the simulated camera {serial} arrived incomplete. Check the cable and the network.</source>
@@ -2796,6 +3066,10 @@
         <translation>{address} 处没有 Dask 调度器应答。请检查地址（例如 tcp://10.0.0.5:8786）以及调度器是否在运行。</translation>
     </message>
     <message>
+        <source>No GenTL producer is installed: {variable} names no folder with a file {suffix}. Install the software of the camera, or open its file {suffix}.</source>
+        <translation>没有安装 GenTL 生产者：{variable} 指定的文件夹中没有 {suffix} 文件。请安装相机的软件，或打开它的 {suffix} 文件。</translation>
+    </message>
+    <message>
         <source>No LED has moved against the others over {n_swings} swings.</source>
         <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
@@ -2840,8 +3114,20 @@
         <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
     </message>
     <message>
+        <source>Recorded images</source>
+        <translation>录制的图像</translation>
+    </message>
+    <message>
         <source>Show the camera the pen that the tip belongs to.</source>
         <translation>请让相机看到该测头所属的光笔。</translation>
+    </message>
+    <message>
+        <source>Simulated pen</source>
+        <translation>模拟光笔</translation>
+    </message>
+    <message>
+        <source>The GenTL producer {file} does not load: {why}. Choose the producer of this camera, for this system and 64 bit.</source>
+        <translation>无法加载 GenTL 生产者 {file}：{why}。请选择适用于此相机、此系统和 64 位的生产者。</translation>
     </message>
     <message>
         <source>The LED centres reach to ({x:.0f}, {y:.0f}) px, the camera file was made for {width} x {height} px. Choose the file for this camera.</source>
@@ -2916,12 +3202,32 @@
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
     </message>
     <message>
+        <source>The camera sends no images in the pixel format {wanted} that can be used; it offers {offered}. Choose Mono8, or another of Mono8 to Mono16.</source>
+        <translation>相机不能以像素格式 {wanted} 送来可用的图像；它提供 {offered}。请选择 Mono8，或 Mono8 到 Mono16 中的另一种。</translation>
+    </message>
+    <message>
+        <source>The camera sends {sent:.1f} images a second, not the {wanted:.1f} that are set: its link or its exposure allows no more. Lower the frame rate, or take a smaller region or a shorter exposure.</source>
+        <translation>相机每秒送来 {sent:.1f} 幅图像，而不是设定的 {wanted:.1f} 幅：其链路或曝光不允许更多。请降低帧率，或使用更小的区域或更短的曝光。</translation>
+    </message>
+    <message>
         <source>The camera {serial} did not stop within {waited:.0f} s. Unplug it, and start the program again before you use it.</source>
         <translation>相机 {serial} 在 {waited:.0f} s 内没有停止。请拔下相机，重新启动程序后再使用。</translation>
     </message>
     <message>
+        <source>The camera {serial} no longer answers ({why}). Check its cable and its power.</source>
+        <translation>相机 {serial} 不再响应（{why}）。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} refuses a setting: {why}. Choose another.</source>
+        <translation>相机 {serial} 拒绝一项设置：{why}。请另选。</translation>
+    </message>
+    <message>
         <source>The camera {serial} sent no image for {silence:.0f} s. Check its cable and its power.</source>
         <translation>相机 {serial} 已有 {silence:.0f} s 没有送来图像。请检查线缆和电源。</translation>
+    </message>
+    <message>
+        <source>The camera {serial} sent no image for {waited:.1f} s. Check its cable and its trigger.</source>
+        <translation>相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆和触发。</translation>
     </message>
     <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
@@ -3034,6 +3340,10 @@
     <message>
         <source>The line, the plane and the columns are not parallel, or too close.</source>
         <translation>直线、平面和两列不平行，或相距太近。</translation>
+    </message>
+    <message>
+        <source>The link to the camera loses images: of {n_sent}, {n_incomplete} came incomplete and {n_missed} not at all. Lower the frame rate, take a smaller region or larger packets, or check cable and switch.</source>
+        <translation>到相机的链路丢失图像：{n_sent} 幅中有 {n_incomplete} 幅不完整，{n_missed} 幅未到达。请降低帧率，使用更小的区域或更大的数据包，或检查线缆和交换机。</translation>
     </message>
     <message>
         <source>The next image of {place} comes {seconds:.1f} s later. Wait, or replay the images faster.</source>
@@ -3152,6 +3462,10 @@
         <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
     <message>
+        <source>The tip is being computed. Keep the pen at hand.</source>
+        <translation>正在计算测头。请把光笔放在手边。</translation>
+    </message>
+    <message>
         <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
         <translation>该测头需检查。{why}请注明理由后接受，否则不要接受。</translation>
     </message>
@@ -3216,12 +3530,20 @@
         <translation>监视点只触测了一次，看不出漂移。请在工作之前、期间和之后各触测一次。</translation>
     </message>
     <message>
+        <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
+        <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
+    </message>
+    <message>
         <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
         <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
     </message>
     <message>
         <source>There are {n_postures} postures, {needed} are needed: upright, and leant to four sides.</source>
         <translation>共有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
+    </message>
+    <message>
+        <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
+        <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
     </message>
     <message>
         <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
@@ -3236,12 +3558,20 @@
         <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
     </message>
     <message>
+        <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
+        <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
+    </message>
+    <message>
         <source>U (k = 2) of the length at {run} is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip. Touch each end more often, and lay the length across the view.</source>
         <translation>{run} 处长度的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。请对每端多次触测，并使长度方向横对视线。</translation>
     </message>
     <message>
         <source>U (k = 2) of the radius is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: this does not prove the tip.</source>
         <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
+    </message>
+    <message>
+        <source>Webcam, to try it</source>
+        <translation>网络摄像头（试用）</translation>
     </message>
     <message>
         <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
@@ -3290,6 +3620,10 @@
     <message>
         <source>not of the same moment</source>
         <translation>不是同一时刻</translation>
+    </message>
+    <message>
+        <source>pypylon is not installed. It drives Basler cameras: {python} -m pip install pypylon</source>
+        <translation>未安装 pypylon。它驱动 Basler 相机：{python} -m pip install pypylon</translation>
     </message>
     <message>
         <source>rig file</source>
@@ -3382,10 +3716,6 @@
     <message>
         <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped.</source>
         <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
-    </message>
-    <message>
-        <source>The tip is being computed. Put the pen down.</source>
-        <translation>正在计算测头。可以放下光笔。</translation>
     </message>
     <message>
         <source>The tip is that of the first, which are more.</source>
@@ -3485,7 +3815,7 @@
     </message>
     <message>
         <source>To YOUR right: it tells the program where you stand.</source>
-        <translation>向“您的”右侧：程序由此得知您站在哪里。</translation>
+        <translation>朝自己右侧：程序由此得知您站在哪里。</translation>
     </message>
     <message>
         <source>Too little tilt {sides}. Lean the pen further that way. Images still needed: about {n_images}.</source>
@@ -4384,7 +4714,11 @@
     </message>
     <message>
         <source>{0} Accept it at the screen.</source>
-        <translation>{0}请在屏幕前接受。</translation>
+        <translation>{0}请在屏幕上点击“接受”。</translation>
+    </message>
+    <message>
+        <source>The LED table is not that of the file in use: save or discard it.</source>
+        <translation>LED 表与正在使用的文件不同：请保存或放弃。</translation>
     </message>
     <message>
         <source>Keep the tip pressed into the cone.</source>
@@ -4392,7 +4726,7 @@
     </message>
     <message>
         <source>Lean RIGHT</source>
-        <translation>向右倾斜</translation>
+        <translation>朝自己右侧倾斜</translation>
     </message>
     <message>
         <source>Follow the arrow</source>
@@ -4579,6 +4913,10 @@
         <translation>请选择录制图像的文件夹。</translation>
     </message>
     <message>
+        <source>Search for the camera and choose it.</source>
+        <translation>请搜索并选择相机。</translation>
+    </message>
+    <message>
         <source>No image has come from the camera yet.</source>
         <translation>相机还没有送来图像。</translation>
     </message>
@@ -4593,10 +4931,6 @@
     <message>
         <source>Open the LED geometry file.</source>
         <translation>请打开 LED 几何文件。</translation>
-    </message>
-    <message>
-        <source>Save or discard the changes of the LED table.</source>
-        <translation>请保存或放弃 LED 表的更改。</translation>
     </message>
     <message>
         <source>WAITING</source>
@@ -4664,7 +4998,7 @@
     </message>
     <message>
         <source>CHECK</source>
-        <translation>待查</translation>
+        <translation>需检查</translation>
     </message>
     <message>
         <source>REPEAT</source>

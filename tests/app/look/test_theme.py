@@ -29,6 +29,8 @@ from lightpen_app.look.theme import (
     contrast,
     font,
     letters_for,
+    scale_for,
+    set_text_scale,
     style_sheet,
     text_label,
 )
@@ -267,3 +269,22 @@ def test_a_label_takes_size_and_tone_from_the_style_sheet() -> None:
 
     assert label.font().pixelSize() == TextSize.TITLE
     assert label.palette().color(label.foregroundRole()).name() == DARK.warn
+
+
+@pytest.mark.parametrize(
+    ("points", "platform", "scale"),
+    [(9, "win32", 1.0), (11.25, "win32", 1.25), (11, "linux", 1.0), (30, "linux", 1.4)],
+)
+def test_text_is_as_much_larger_as_that_of_the_system(
+    points: float, platform: str, scale: float
+) -> None:
+    assert scale_for(points, platform) == scale
+
+
+def test_larger_text_is_larger_everywhere(qapp: QApplication) -> None:
+    set_text_scale(1.25)
+    try:
+        assert font(TextSize.DISPLAY).pixelSize() == 55
+        assert "font-size: 19px" in style_sheet(DARK)  # the words of most controls
+    finally:
+        set_text_scale(1.0)

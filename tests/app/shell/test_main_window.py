@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QMessageBox,
     QPushButton,
     QVBoxLayout,
+    QWidget,
 )
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
@@ -21,9 +22,11 @@ from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
+from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.shell.placement import fitted_place
 from lightpen_app.shell.step_states import StepState
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Subject
@@ -319,20 +322,6 @@ def test_every_control_has_a_name_for_screen_readers(shell: Shell) -> None:
         assert button.accessibleName() or button.text()
 
 
-def test_space_pauses_wherever_the_focus_is_while_the_hands_are_at_the_pen(
-    shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
-) -> None:
-    page = shell.pages[0]
-    page.hands_free = True
-    page.changed.emit()
-    page.button.setFocus()
-
-    with qtbot.assertNotEmitted(page.button.clicked):
-        press(Key.Key_Space)
-
-    assert page.log == ["entered", "pause"]
-
-
 def test_space_presses_buttons_on_other_pages(
     shell: Shell, qtbot: QtBot, press: Callable[[Key], None]
 ) -> None:
@@ -378,22 +367,92 @@ def test_f11_opens_the_operator_view_and_escape_leaves_only_that(
 def test_the_operator_view_takes_the_keys_of_a_remote(
     shell: Shell, qtbot: QtBot
 ) -> None:
-    view = shell.window.operator_view()
+    view, page = shell.window.operator_view(), shell.pages[0]
+    page.hands_free = True
+    page.field.setText("done")
     QTest.keyClick(shell.window, Key.Key_F11)
 
     QTest.keyClick(view, Key.Key_Space)
     QTest.keyClick(view, Key.Key_PageDown)
+
     assert shell.shown == "Camera"
-    QTest.keyClick(view, Key.Key_PageUp)
+    assert page.log == ["entered", "pause", "left"]
+
+
+def test_space_presses_the_button_that_has_the_focus_and_pauses_elsewhere(
+    shell: Shell, press: Callable[[Key], None]
+) -> None:
+    page = shell.pages[0]
+    page.hands_free = True
+    page.changed.emit()
+    page.button.clicked.connect(lambda: page.log.append("clicked"))
+
+    page.button.setFocus()
+    press(Key.Key_Space)
+    page.setFocus()
+    press(Key.Key_Space)
+
+    assert page.log == ["entered", "clicked", "pause"]
+
+
+def test_the_operator_view_goes_nowhere_behind_the_operators_back(shell: Shell) -> None:
+    view, page = shell.window.operator_view(), shell.pages[0]
+    QTest.keyClick(shell.window, Key.Key_F11)
+    keys = (Key.Key_Return, Key.Key_PageDown, Key.Key_PageUp)
+
+    page.field.setText("done")  # but the page is for somebody at the screen
+    for key in keys:
+        QTest.keyClick(view, key)
+    page.hands_free = True
+    page.field.clear()  # and now something is missing, which it would ask about
+    for key in keys:
+        QTest.keyClick(view, key)
 
     assert shell.shown == "Start"
-    assert shell.pages[0].log == ["entered", "pause", "left", "entered"]
+
+
+def test_the_operator_view_names_pen_and_notice_and_the_key_that_leaves_it(
+    shell: Shell,
+) -> None:
+    QTest.keyClick(shell.window, Key.Key_F11)
+    view = shell.window.operator_view()
+
+    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.LIVE))
+    shell.window.show_notice("The disk is full.")
+
+    words = [text.text() for text in view.findChildren(FittedText) if text.isVisible()]
+    assert {"Pen\xa0LP-04  \u00b7  Tip\xa0T-10", "The disk is full."} <= set(words)
+    assert any("Esc" in text for text in words)
+    shell.window.drop_notice("The disk is full.")
+    assert not any(
+        text.isVisible() and "disk" in text.text()
+        for text in view.findChildren(FittedText)
+    )
+
+
+def test_nobody_looks_at_images_on_a_page_without_them_or_at_a_window_put_away(
+    shell: Shell, qtbot: QtBot
+) -> None:
+    told: list[bool] = []
+    shell.window.attention_changed.connect(told.append)
+    shell.pages[1].shows_images = True
+
+    shell.window.go_to(1)
+    shell.window.showMinimized()
+    QTest.keyClick(shell.window, Key.Key_F11)  # the operator still looks
+    QTest.keyClick(shell.window.operator_view(), Key.Key_F11)
+    shell.window.showNormal()
+    shell.window.go_to(0)
+
+    assert told == [True, False, True, False, True, False]
 
 
 def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
     shell: Shell, press: Callable[[Key], None]
 ) -> None:
     shell.pages[0].at_screen = True
+    shell.pages[0].hands_free = True
+    shell.pages[0].field.setText("done")
     view = shell.window.operator_view()
     QTest.keyClick(shell.window, Key.Key_F11)
     QTest.keyClick(view, Key.Key_PageDown)
@@ -515,6 +574,62 @@ def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
     shell.window.drop_notice("The disk is full.")
 
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
+def test_a_notice_moves_nothing_on_the_page(shell: Shell) -> None:
+    window, controls = shell.window, (shell.pages[0].field, shell.pages[0].button)
+    places = [each.mapTo(window, QPoint()) for each in controls]
+
+    window.show_notice("The disk is full. " * 8)
+
+    assert [each.mapTo(window, QPoint()) for each in controls] == places
+    window.resize(940, 500)
+    notice = notice_of(window)
+    corners = notice.mapTo(window, QPoint()), notice.size()
+    assert window.rect().contains(QRect(*corners))
+
+
+def test_a_notice_leaves_the_field_that_is_typed_in_to_be_seen(shell: Shell) -> None:
+    window, field = shell.window, shell.pages[0].field
+    assert QApplication.focusWidget() is field
+
+    window.show_notice("The disk is full. " * 60)
+
+    notice = notice_of(window)
+    seen = QRect(field.mapTo(window, QPoint()), field.size())
+    assert not seen.intersects(QRect(notice.mapTo(window, QPoint()), notice.size()))
+
+
+def notice_of(window: MainWindow) -> QWidget:
+    (notice,) = window.findChildren(NoticeBar)
+    assert isinstance(notice, NoticeBar)
+    return notice
+
+
+def test_why_a_step_was_closed_is_said_until_it_is_open(shell: Shell) -> None:
+    shell.pages[2].closed_because = "Swing the pen first."
+    shell.window.go_to(2)
+    shell.pages[0].changed.emit()
+    assert "Swing the pen first." in shell.window.words()
+
+    shell.pages[2].closed_because = ""
+    shell.pages[0].changed.emit()
+
+    assert "Swing the pen first." not in shell.window.words()
+
+
+def test_that_someone_must_be_at_the_screen_is_said_until_they_need_not(
+    shell: Shell,
+) -> None:
+    shell.pages[0].at_screen = True
+    QTest.keyClick(shell.window, Key.Key_PageDown)
+    shell.pages[0].changed.emit()
+    assert "Press this button at the screen." in shell.window.words()
+
+    shell.pages[0].at_screen = False  # as once the tip is accepted
+    shell.pages[0].changed.emit()
+
+    assert "Press this button at the screen." not in shell.window.words()
 
 
 def test_a_page_takes_no_notice_away_that_is_not_of_a_page(shell: Shell) -> None:

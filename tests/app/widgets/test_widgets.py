@@ -189,7 +189,7 @@ def test_the_count_is_read_on_a_small_screen_too(
             instruction="Lean right",
             hint="Far. Keep the tip pressed in.",
             state=State("CAPTURING", "10 of 10 LEDs.", Sign.RECORD, Tone.GOOD),
-            count="60 of about 300",
+            count="60 kept, 240 to go",
             fraction=0.2,
             dial=dial,
         )
@@ -256,3 +256,30 @@ def test_a_text_that_may_be_parted_is_the_same_text(text: str) -> None:
 
 def test_words_of_a_usual_length_are_not_parted() -> None:
     assert BREAK not in breakable("Open the intrinsics file camera.yaml, 0.25 px.")
+
+
+def test_a_new_state_is_announced_once_it_is_seen(qtbot: QtBot) -> None:
+    banner = StateBanner()
+    qtbot.addWidget(banner)
+    said: list[str] = []
+    banner.announced.connect(said.append)
+
+    banner.set_value(State("WAITING", "Show the pen."))
+    banner.show()
+    banner.set_value(State("WAITING", "10 of 10 LEDs"))
+    banner.set_value(State("PASS", "U (k = 2) of the tip is 0.002 mm."))
+
+    assert said == ["WAITING. Show the pen.", "PASS. U (k = 2) of the tip is 0.002 mm."]
+
+
+def test_words_stay_large_enough_to_be_read(qtbot: QtBot) -> None:
+    text = FittedText(18, least=15)
+    qtbot.addWidget(text)
+    text.resize(300, 24)
+    text.show()
+
+    text.set_text("No swing can be recorded here: the folder cannot be written. " * 3)
+
+    assert text.minimumHeight() > 60
+    text.resize(300, text.minimumHeight())
+    assert text.size_px() >= 15

@@ -213,7 +213,9 @@ def test_a_lost_camera_is_told_and_comes_back(
     assert "no longer answers. Check its cable" in troubled.args[0]
     qtbot.waitUntil(lambda: view.connection is Connection.LOST)
     camera.faults.plug_in()
-    qtbot.waitUntil(lambda: view.connection is Connection.STREAMING)
+    with qtbot.waitSignal(view.relieved) as relieved:
+        qtbot.waitUntil(lambda: view.connection is Connection.STREAMING)
+    assert relieved.args == troubled.args
     with qtbot.waitSignal(view.image_shown):
         pass
 

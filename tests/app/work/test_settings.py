@@ -15,6 +15,7 @@ from PySide6.QtCore import QRect
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
+from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings import Preferences, Settings, Station, settings_file
@@ -26,8 +27,9 @@ STATION = Station(
     ball_diameter=3.0005,
     nominal_tip="1.761, -137.5, 0.02",
     source="folder",
-    exposure_us=850.0,
+    source_producer="/opt/vendor/producer.cti",
 )
+CAMERA = CameraSettings(850.0, 6.0, 20.0, "Mono12", Region(8, 0, 640, 480), None, 1500)
 PREFERENCES = Preferences(
     language=Language.CHINESE,
     appearance=Appearance.LIGHT,
@@ -255,7 +257,9 @@ def test_the_settings_of_version_0_1_are_taken_over_and_left_as_they_are(
     assert again.preferences() == replace(PREFERENCES, appearance=Appearance.SYSTEM)
     assert again.stations() == ("Hall 3/2", "Hall\\4")
     # It says the limit that was usual then.
-    assert again.station("Hall 3/2") == replace(STATION, max_uncertainty=0.005)
+    assert again.station("Hall 3/2") == replace(
+        STATION, max_uncertainty=0.005, source_producer=""
+    )
     assert again.station("Hall\\4").min_images == 60
     assert again.last_station() == "Hall 5"
     window = QWidget()
@@ -295,8 +299,50 @@ def test_settings_that_cannot_be_saved_are_told_and_saved_when_they_can_be(
     assert reopened(settings).preferences() == PREFERENCES
 
 
+def test_what_could_not_be_saved_is_tried_again_and_taken_back(
+    tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen_app.work.settings.AGAIN_MS", 50)
+    (tmp_path / "file").write_text("not a folder")
+    settings = Settings(tmp_path / "file" / "lightpen.json")
+    told: list[object] = []
+    settings.troubled.connect(told.append)
+    with qtbot.waitSignal(settings.troubled):
+        settings.set_preferences(PREFERENCES)
+
+    with qtbot.waitSignal(settings.relieved) as relieved:
+        (tmp_path / "file").unlink()
+
+    assert relieved.args == told
+    assert reopened(settings).preferences() == PREFERENCES
+
+
 def test_the_file_belongs_to_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere/else")
 
     assert settings_file().name == "lightpen.json"
     assert settings_file().parent.name == "lightpen"
+
+
+def test_cameras_are_remembered_by_their_serial_numbers(
+    settings: Settings, tmp_path: Path
+) -> None:
+    other = CameraSettings(exposure_us=400.0, trigger=TriggerMode.SOFTWARE)
+    settings.set_camera("21877692", CAMERA)
+    settings.set_camera("LP01", other)
+    assert settings.await_saved(TIMEOUT)
+
+    assert Settings(settings.file).cameras() == {"21877692": CAMERA, "LP01": other}
+
+
+@pytest.mark.parametrize("region", ["1 2 3", "a b c d", "-1 0 5 5", "1.5 0 5 5"])
+def test_a_region_that_makes_no_sense_is_passed_over(
+    settings: Settings, region: str
+) -> None:
+    settings.set_camera("LP01", CAMERA)
+    assert settings.await_saved(TIMEOUT)
+    content = json.loads(settings.file.read_text())
+    content["cameras"]["LP01"]["region"] = region
+    settings.file.write_text(json.dumps(content))
+
+    assert Settings(settings.file).cameras()["LP01"] == replace(CAMERA, region=None)

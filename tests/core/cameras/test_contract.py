@@ -1,8 +1,11 @@
-"""What every source of images promises, tried on each of them."""
+"""What every source of images promises, tried on each of them.
+
+The real libraries run, each with what it has to stand for a camera.
+"""
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
 
@@ -10,14 +13,18 @@ import cv2
 import numpy as np
 import pytest
 
-from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import (
     CameraSettings,
     ConfigError,
     FrameTimeout,
     ImageCamera,
+    Region,
+    TriggerMode,
 )
 from lightpen.cameras.replay import ReplayCamera
+from lightpen.cameras.source import SourcePlace
+from lightpen.cameras.sources import source_named
 from lightpen.cameras.worker import (
     CameraWorker,
     Connection,
@@ -30,6 +37,7 @@ from lightpen.simulator.scenes import Scene
 
 SMALL = Camera(width=306, height=256, fx=580, fy=580, cx=152, cy=129)
 N_RECORDED = 12
+HUGE = Region(0, 0, 10**6, 10**6)
 TIMEOUT = 5.0  # s, far above the period of every source
 SLACK = 2.0  # s that a busy machine may add
 
@@ -39,25 +47,25 @@ class Source:
     """A source of images under test, and how to make one of it."""
 
     name: str
-    make: Callable[[Path], ImageCamera]
+    make: Callable[[Path, pytest.FixtureRequest], ImageCamera]
 
 
-def simulated(_: Path) -> ImageCamera:
+def simulated(_: Path, __: object) -> ImageCamera:
     return SimulatedCamera(Scene(camera=SMALL))
 
 
-def simulated_without_waiting(_: Path) -> ImageCamera:
+def simulated_without_waiting(_: Path, __: object) -> ImageCamera:
     return SimulatedCamera(Scene(camera=SMALL), SkippingClock())
 
 
-def replayed_folder(folder: Path) -> ImageCamera:
+def replayed_folder(folder: Path, _: object) -> ImageCamera:
     for i in range(N_RECORDED):
         image = np.full((SMALL.height, SMALL.width), i, np.uint8)
         cv2.imwrite(str(folder / f"frame_{i}.png"), image)
     return ReplayCamera(str(folder), frame_rate=200)
 
 
-def replayed_video(folder: Path) -> ImageCamera:
+def replayed_video(folder: Path, _: object) -> ImageCamera:
     path = folder / "swing.avi"
     fourcc = cv2.VideoWriter.fourcc(*"MJPG")
     video = cv2.VideoWriter(str(path), fourcc, 20, (SMALL.width, SMALL.height))
@@ -67,18 +75,44 @@ def replayed_video(folder: Path) -> ImageCamera:
     return ReplayCamera(str(path), frame_rate=200)
 
 
+def of_stack(stack: str) -> Callable[[Path, pytest.FixtureRequest], ImageCamera]:
+    """Return what makes a camera of a library by what stands for one there."""
+
+    def make(_: Path, request: pytest.FixtureRequest) -> ImageCamera:
+        place: SourcePlace = request.getfixturevalue(stack)
+        source = source_named(stack)
+        assert source is not None
+        assert source.camera is not None
+        return source.camera(place, MachineClock())
+
+    return make
+
+
+def webcam(folder: Path, _: object) -> ImageCamera:
+    """OpenCV on a file in place of a webcam, which no test machine has."""
+    source = source_named("webcam")
+    assert source is not None
+    assert source.camera is not None
+    replayed_folder(folder, _)
+    return source.camera(SourcePlace(str(folder / "frame_%d.png")), MachineClock())
+
+
 SOURCES = (
     Source("simulated", simulated),
     Source("simulated, without waiting", simulated_without_waiting),
     Source("replayed folder", replayed_folder),
     Source("replayed video", replayed_video),
+    Source("Aravis", of_stack("aravis")),
+    Source("Harvesters", of_stack("genicam")),
+    Source("pypylon", of_stack("basler")),
+    Source("webcam", webcam),
 )
 
 
 @pytest.fixture(params=SOURCES, ids=lambda source: source.name)
 def camera(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ImageCamera]:
     source: Source = request.param
-    camera = source.make(tmp_path)
+    camera = source.make(tmp_path, request)
     yield camera
     camera.close()
 
@@ -169,7 +203,8 @@ def test_waiting_for_a_frame_ends_when_it_should_and_is_counted(
     camera.open()
     if camera.caps.frame_rate is None:
         pytest.skip("The rate of this camera cannot be set.")
-    camera.configure(CameraSettings(frame_rate=camera.caps.frame_rate.low))
+    # A camera may end its image before it stops.
+    camera.configure(CameraSettings(frame_rate=camera.caps.frame_rate.nearest(1.0)))
     camera.start()
     began = time.monotonic()
     with pytest.raises(FrameTimeout, match=r"[A-Z].*\."):
@@ -188,8 +223,10 @@ def test_the_answer_to_settings_is_what_is_in_force(camera: ImageCamera) -> None
         frame_rate=caps.frame_rate.nearest(50) if caps.frame_rate else None,
         pixel_format=caps.pixel_formats[-1],
     )
-    assert camera.configure(wanted) == wanted
-    assert camera.configure(CameraSettings()) == wanted  # None leaves it
+    applied = camera.configure(wanted)
+
+    assert replace(applied, region=None, trigger=None, packet_size=None) == wanted
+    assert camera.configure(CameraSettings()) == applied  # None leaves it
     camera.start()
     assert camera.read(TIMEOUT).pixel_format == wanted.pixel_format
 
@@ -209,10 +246,50 @@ def test_settings_out_of_range_are_brought_into_it(camera: ImageCamera) -> None:
             assert getattr(lowest, name) == offered.low
 
 
+def test_the_region_gives_the_size_of_the_images(camera: ImageCamera) -> None:
+    camera.open()
+    regions = camera.caps.regions
+    if regions is None:
+        pytest.skip("This camera sends but the whole image.")
+    wanted = regions.nearest(Region(16, 8, 301, 201))
+    applied = camera.configure(CameraSettings(region=wanted, frame_rate=50))
+
+    assert applied.region == wanted
+    assert (camera.caps.width, camera.caps.height) == (wanted.width, wanted.height)
+    camera.start()
+    assert camera.read(TIMEOUT).image.shape == (wanted.height, wanted.width)
+    camera.stop()
+    whole = camera.configure(CameraSettings(region=regions.nearest(HUGE))).region
+    assert whole == regions.whole
+
+
+def test_a_triggered_camera_sends_an_image_whenever_one_is_read(
+    camera: ImageCamera,
+) -> None:
+    camera.open()
+    if TriggerMode.SOFTWARE not in camera.caps.triggers:
+        with_trigger = CameraSettings(trigger=TriggerMode.SOFTWARE)
+        assert camera.configure(with_trigger).trigger is not TriggerMode.SOFTWARE
+        return
+    wanted = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
+    assert camera.configure(wanted).trigger is TriggerMode.SOFTWARE
+    camera.start()
+    frames = [camera.read(TIMEOUT) for _ in range(4)]
+    time.sleep(0.2)  # in which a camera that runs freely takes ten images
+    frames.append(camera.read(TIMEOUT))
+
+    assert [frame.seq - frames[0].seq for frame in frames] == [0, 1, 2, 3, 4]
+    camera.stop()
+    free = camera.configure(CameraSettings(trigger=TriggerMode.FREE))
+    assert free.trigger is TriggerMode.FREE
+    camera.start()
+    camera.read(TIMEOUT)
+
+
 def test_a_pixel_format_that_is_not_offered_is_refused(camera: ImageCamera) -> None:
     camera.open()
-    with pytest.raises(ConfigError, match="BayerRG8"):
-        camera.configure(CameraSettings(pixel_format="BayerRG8"))
+    with pytest.raises(ConfigError, match="Confidence8"):
+        camera.configure(CameraSettings(pixel_format="Confidence8"))
 
 
 def test_exposure_changes_while_images_come_or_is_refused(

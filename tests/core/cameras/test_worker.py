@@ -32,6 +32,7 @@ from lightpen.cameras.worker import (
     Ended,
     Failed,
     FrameReady,
+    KeepsUp,
     SettingsApplied,
     Troubled,
     WorkerEvent,
@@ -381,6 +382,53 @@ def test_a_reader_that_falls_behind_again_and_again_is_told_once_a_measurement(
     assert len(workbench.events.troubles(FramesSkipped)) == 2
 
 
+def test_it_is_told_when_no_image_is_skipped_any_more(benches: Benches) -> None:
+    workbench = benches.live(n_queued=1)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_trouble(FramesSkipped)
+    assert KeepsUp() not in workbench.events.all
+
+    workbench.worker.measure(False)
+    workbench.wait_for_frames(3)
+
+    assert workbench.events.all.count(KeepsUp()) == 1
+
+
+def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
+    benches: Benches, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen.cameras.worker.PROBING", 0.02)
+    workbench = benches.live()
+    assert isinstance(workbench.camera, SimulatedCamera)
+    workbench.worker.start()
+    workbench.wait_for_frames(3)
+
+    workbench.worker.set_rest(None)
+    asleep = threading.Event()
+    asleep.wait(0.2)  # an image may be under way
+    n_delivered = workbench.worker.stats.delivered
+    asleep.wait(0.3)
+    assert workbench.worker.stats.delivered == n_delivered
+
+    workbench.camera.faults.unplug()
+    lost = workbench.wait_until(Connection.LOST)
+    workbench.camera.faults.plug_in()
+    workbench.wait_until(Connection.STREAMING, after=lost)
+    workbench.worker.set_rest(0.0)
+    workbench.wait_for_frames(3)
+
+
+def test_images_missed_while_the_camera_rests_do_not_count(benches: Benches) -> None:
+    workbench = benches.live()
+    workbench.worker.set_rest(0.2)
+    workbench.worker.start()
+    workbench.wait_for_frames(4)
+
+    assert workbench.worker.stats.missed == 0
+    assert workbench.camera.stats().missed > 10
+
+
 def test_a_recording_that_waits_for_its_reader_goes_on_when_nobody_measures(
     benches: Benches, recording: Path
 ) -> None:
@@ -472,7 +520,7 @@ def test_attempts_to_reconnect_back_off(benches: Benches) -> None:
         assert camera.n_opened.acquire(timeout=TIMEOUT)
     attempts = camera.opened_at[1:7]
 
-    np.testing.assert_allclose(np.diff(attempts), [1, 2, 4, 4, 4], atol=1e-6)
+    np.testing.assert_allclose(np.diff(attempts), [1, 2, 2, 2, 2], atol=1e-6)
 
 
 def test_a_silent_camera_that_answers_is_given_up_after_six_seconds(
@@ -526,7 +574,7 @@ def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
     workbench.wait_until(Connection.CLOSED)
 
     assert "Another program" in workbench.events.troubles(DeviceBusy)[0]
-    assert camera.opened_at[-1] == pytest.approx(4.0)
+    assert camera.opened_at[-1] == pytest.approx(8.0)
 
 
 def test_a_missing_camera_ends_the_worker(benches: Benches) -> None:

@@ -229,6 +229,7 @@ def test_every_reason_that_one_image_can_have_is_among_the_scenes() -> None:
         Reason.UNREADABLE,  # a file; a live image comes whole or not at all
         Reason.UNHANDLED,  # a mistake of the program, made in the tests of both ways
         Reason.AMBIGUOUS,  # a pen that looks the same when it is turned, below
+        *(Reason.ABSENT, Reason.OTHER_MOMENT),  # of several cameras
     }
     assert reasons == set(Reason) - of_many_images - elsewhere
 

@@ -77,6 +77,7 @@ def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
             trials.priors,
             cameras=(replace(trials.priors.cameras[0], covariance=np.zeros((9, 9))),),
             scale=replace(trials.priors.scale, covariance=np.zeros((1, 1))),
+            temperature=replace(trials.priors.temperature, covariance=np.zeros((1, 1))),
             diameter=replace(trials.priors.diameter, covariance=np.zeros((1, 1))),
         ),
     )

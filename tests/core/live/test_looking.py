@@ -1,12 +1,14 @@
 """Images are looked at as they come; a swing is given every one of them, in order."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 import pytest
 
@@ -21,6 +23,7 @@ from lightpen.cameras.worker import (
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
+from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.live.looking import Live, LiveImage
 from lightpen.record.reading import open_record
 from lightpen.simulator.sample_pens import SAMPLE_PENS
@@ -31,6 +34,9 @@ if TYPE_CHECKING:
 
 TIMEOUT = 60.0  # s until a test gives up
 FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
+PAINTED = np.zeros((200, 200), np.uint8)  # two bright discs
+for _place in ((60, 60), (140, 130)):
+    cv2.circle(PAINTED, _place, 8, 200, -1, cv2.LINE_AA)
 N_IMAGES = 20  # of the record that is resumed
 
 
@@ -187,6 +193,61 @@ def test_a_swing_keeps_its_pen_and_mask_when_others_are_looked_for(
 
 def n_leds_looked_for(image: LiveImage) -> int:
     return 0 if image.sighting is None else len(image.sighting.pixels)
+
+
+# How often
+
+
+def test_nobody_looking_on_one_image_is_looked_at_and_no_more(
+    make_live: MakeLive, screen: Screen
+) -> None:
+    live = make_live(starts=False)
+    live.set_watched(False)
+    live.start()
+    screen.wait_for_images(1)
+    time.sleep(0.5)
+    n_images = len(screen.images)
+    time.sleep(0.5)
+    assert len(screen.images) == n_images
+
+    live.set_watched(True)
+    screen.wait_for_images(3)
+
+
+def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
+    station: "Station", screen: Screen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("lightpen.live.looking.LIVELY_NS", 300_000_000)
+    monkeypatch.setattr("lightpen.live.looking.UNHURRIED", TIMEOUT)
+    cv2.imwrite(str(tmp_path / "still.png"), PAINTED)
+    camera = ReplayCamera(str(tmp_path), loops=True)
+    live = Live(camera, CameraSettings(), screen, station.runner)
+    live.start()
+    screen.wait_for_images(1)
+    time.sleep(1.0)
+    n_images = len(screen.images)
+    time.sleep(0.3)
+    n_later = len(screen.images)
+    live.hurry()
+    screen.wait_for_images(2)
+    live.stop()
+
+    assert n_later == n_images
+
+
+def test_what_rests_is_looked_at_less_often_until_it_moves() -> None:
+    spots = detect_spots(PAINTED)
+    assert not have_moved(spots, spots)
+    assert not have_moved(Spots.none(), Spots.none())
+    assert not have_moved(spots, replace(spots, centers=spots.centers + 1.0))
+
+    for other in (
+        Spots.none(),
+        replace(spots, centers=spots.centers + 9.0),
+        replace(spots, areas=1.3 * spots.areas),
+        replace(spots, contrasts=0.7 * spots.contrasts),
+    ):
+        assert have_moved(spots, other)
 
 
 # Images

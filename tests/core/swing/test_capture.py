@@ -191,6 +191,10 @@ def test_an_interrupted_swing_goes_on_with_all_its_images(wizard: Wizard) -> Non
     np.testing.assert_allclose(
         wizard.state.kept.joint.tip_pen, before.kept.joint.tip_pen, atol=1e-5
     )
+    trace = wizard.state.trace  # so that its curves do not begin anew
+    assert trace.n_images[-1] == 20
+    assert len(trace.n_images) > 5
+    np.testing.assert_allclose(trace.tips[-1], before.trace.tips[-1], atol=1e-5)
     with RecordWriter.resume(record) as writer:
         wizard.writer = writer
         wizard.run(25)

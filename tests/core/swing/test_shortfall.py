@@ -26,6 +26,7 @@ from lightpen.swing.shortfall import (
     missing,
     next_target,
     oriented,
+    out_of_reach,
     turn_range,
 )
 from lightpen.swing.state import (
@@ -38,7 +39,7 @@ CAMERA, PEN = paper_camera(), paper_pen()
 
 
 # With these files any U can be reached.
-EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6)
+EXACT_PEN = replace(PEN, scale_sigma=1e-9, diameter_sigma=1e-6, expansion=0.0)
 
 
 def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
@@ -91,8 +92,23 @@ def test_no_images_are_asked_for_where_the_files_leave_too_much_open() -> None:
     setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
     state = state_of(setup, swing)
 
-    assert state.kept.floor > 0.02
+    assert state.kept.reached.floor > 0.02
     assert measure_shortfall(setup, state).n_for_uncertainty == 0
+
+
+def test_what_no_image_can_mend_is_told_with_its_file() -> None:
+    swing = swing_poses(60, np.random.default_rng(0))
+    vague = replace(PEN, scale_sigma=1e-3)
+    setup = SwingSetup(CAMERA, vague, SwingLimits(max_uncertainty=0.02))
+    state = state_of(setup, swing)
+    floor = 1000 * state.kept.reached.floor
+
+    told = out_of_reach(setup.limits, state)
+
+    words = f"cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file"
+    assert words in str(told)
+    assert told in missing(setup, state)
+    assert out_of_reach(SwingLimits(max_uncertainty=1.0), state) is None
 
 
 def test_fields_that_the_camera_cannot_see_are_not_asked_for() -> None:

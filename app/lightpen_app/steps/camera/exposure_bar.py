@@ -12,6 +12,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
 from lightpen_app.widgets.translated import Translated
 
 BAR_HEIGHT = 2 * GRID
+MOST_NAMED = 6  # LEDs in one line
 
 
 class ExposureBar(Translated, QWidget):
@@ -39,23 +40,36 @@ class ExposureBar(Translated, QWidget):
             return self.tr("No LED is seen")
         of_leds = value.are_leds
         if value.n_saturated:
-            n_meant = value.n_saturated
+            n_meant, meant = value.n_saturated, value.saturated_leds
             words = (
                 self.tr("Saturated: {0} of {1} LEDs")
                 if of_leds
                 else self.tr("Saturated: {0} of {1} spots")
             )
         elif value.n_dark:
-            n_meant = value.n_dark
+            n_meant, meant = value.n_dark, value.dark_leds
             words = (
                 self.tr("Too dark: {0} of {1} LEDs")
                 if of_leds
                 else self.tr("Too dark: {0} of {1} spots")
             )
         else:
-            n_meant = value.n_good
+            n_meant, meant = value.n_good, ()
             words = self.tr("Good: {0} LEDs") if of_leds else self.tr("Good: {0} spots")
-        return words.format(n_meant, len(value.peaks))
+        told = words.format(n_meant, len(value.peaks))
+        if not meant or len(meant) == len(value.peaks):
+            return told
+        named = ", ".join(map(str, meant[:MOST_NAMED]))
+        more = "\u2026" if len(meant) > MOST_NAMED else ""
+        return f"{told}: {named}{more}"
+
+    def levels(self) -> str:
+        """Return the level of each LED, in words."""
+        value = self._value
+        return "\n".join(
+            self.tr("LED {0}: {1} %").format(led, f"{100 * peak:.0f}")
+            for led, peak in zip(value.leds, value.peaks, strict=False)
+        )
 
     @override
     def sizeHint(self) -> QSize:
@@ -99,6 +113,7 @@ class ExposureBar(Translated, QWidget):
         self.update()
         self.setAccessibleName(self.tr("Exposure of the LEDs"))
         self.setAccessibleDescription(self.verdict())
+        self.setToolTip(self.levels())
 
     def _draw_scale(self, painter: QPainter, bar: QRectF, color: QColor) -> None:
         painter.setPen(color)

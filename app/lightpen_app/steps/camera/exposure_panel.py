@@ -2,53 +2,28 @@
 
 from collections import deque
 
-from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
-    QAbstractSpinBox,
     QFrame,
     QHBoxLayout,
     QLabel,
     QVBoxLayout,
     QWidget,
 )
-from typing_extensions import override
 
 from lightpen.cameras.protocol import CameraSettings, Caps, Range
+from lightpen.detection.auto_exposure import AutoExposure, Standing
 from lightpen.detection.exposure_advice import Advice, advise
 from lightpen.detection.inspection import Exposure, Inspection
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import N_TRACED, FocusMeter
-from lightpen_app.widgets.keys import ENTER_KEYS
-from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.steps.camera.setting_field import SettingField
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 US_PER_MS = 1000.0
 PADDING = 3 * GRID // 2
-FIELD_WIDTH = 12 * GRID  # px, at least
-
-
-class SettingField(NumberField):
-    """A number that takes effect when it is stepped, or typed and Enter pressed."""
-
-    def __init__(self, unit: str, limits: tuple[float, float], n_decimals: int) -> None:
-        super().__init__(unit, limits, n_decimals)
-        self.setKeyboardTracking(False)
-        self.setMinimumWidth(FIELD_WIDTH)
-        self.setStepType(QAbstractSpinBox.StepType.AdaptiveDecimalStepType)
-
-    @override
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        super().keyPressEvent(event)
-        if event.key() in ENTER_KEYS:
-            event.accept()  # else the window would press its main button
-
-    def set_offered(self, offered: Range, value: float) -> None:
-        """Show what the camera offers and has in force, in the unit of the field."""
-        with QSignalBlocker(self):
-            self.setRange(offered.low, offered.high)
-            self.setValue(value)
 
 
 class ExposurePanel(Translated, QFrame):
@@ -60,16 +35,20 @@ class ExposurePanel(Translated, QFrame):
         Asked for, us.
     gain_changed(float)
         Asked for, dB.
+    adjustment_requested(bool)
+        The program is to set both by the LEDs, or to stop doing so.
     """
 
     exposure_changed = Signal(float)
     gain_changed = Signal(float)
+    adjustment_requested = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("area", "panel")
         self._caps: Caps | None = None
         self._settings = CameraSettings()
+        self._adjustment: AutoExposure | None = None
 
         # Widgets
         self._bar = ExposureBar()
@@ -80,6 +59,7 @@ class ExposurePanel(Translated, QFrame):
         self._gain_name = QLabel()
         self._gain = SettingField("dB", (0.0, 48.0), 1)
         self._gain_name.setBuddy(self._gain)
+        self._adjust = PushButton()
         self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)
         self._why_fixed.setMinimumHeight(5 * GRID)  # that of the fields it stands for
 
@@ -96,11 +76,16 @@ class ExposurePanel(Translated, QFrame):
         layout.setSpacing(GRID)
         layout.addWidget(self._bar)
         layout.addLayout(fields)
-        layout.addWidget(self._advice)
+        foot = QHBoxLayout()
+        foot.setSpacing(GRID)
+        foot.addWidget(self._advice, 1)
+        foot.addWidget(self._adjust)
+        layout.addLayout(foot)
 
         # Connections
         self._exposure.valueChanged.connect(self._on_exposure_edited)
         self._gain.valueChanged.connect(self.gain_changed)
+        self._adjust.clicked.connect(self._on_adjust_clicked)
 
         self._retranslate()
         self.set_camera(None, CameraSettings())
@@ -121,11 +106,19 @@ class ExposurePanel(Translated, QFrame):
             self._exposure.set_offered(in_ms, exposure_us / US_PER_MS)
         if gains is not None and gain_db is not None:
             self._gain.set_offered(gains, gain_db)
+        if caps is not None:
+            self._gain.setSuffix(" dB" if caps.gain_in_db else "")
+        self._adjust.setVisible(exposures is not None)
         for widget in (self._exposure_name, self._exposure):
             widget.setVisible(exposures is not None)
         for widget in (self._gain_name, self._gain):
             widget.setVisible(gains is not None)
         self._why_fixed.setVisible(exposures is None and gains is None)
+        self._refresh()
+
+    def set_adjustment(self, adjustment: AutoExposure | None) -> None:
+        """Show how the adjustment by the LEDs stands, if there is one."""
+        self._adjustment = adjustment
         self._refresh()
 
     def advice(self) -> str:
@@ -134,6 +127,14 @@ class ExposurePanel(Translated, QFrame):
 
     def _on_exposure_edited(self, exposure_ms: float) -> None:
         self.exposure_changed.emit(exposure_ms * US_PER_MS)
+
+    def _on_adjust_clicked(self) -> None:
+        self.adjustment_requested.emit(not self._is_adjusting)
+
+    @property
+    def _is_adjusting(self) -> bool:
+        adjustment = self._adjustment
+        return adjustment is not None and adjustment.outcome is Standing.ADJUSTING
 
     def _retranslate(self) -> None:
         self._exposure_name.setText(self.tr("E&xposure"))
@@ -147,6 +148,12 @@ class ExposurePanel(Translated, QFrame):
         self._refresh()
 
     def _refresh(self) -> None:
+        self._adjust.setText(
+            self.tr("Stop") if self._is_adjusting else self.tr("Set by the LEDs")
+        )
+        self._adjust.setToolTip(
+            self.tr("Exposure and gain for 80 % of full scale at the brightest LED.")
+        )
         if self._caps is None:
             self._why_fixed.setText(self.tr("No images come."))
             self._advice.setText("")
@@ -154,8 +161,37 @@ class ExposurePanel(Translated, QFrame):
         self._why_fixed.setText(
             self.tr("Recorded: exposure and gain are as they were taken.")
         )
+        if self._adjustment is not None:
+            self._advice.setText(self._outcome_words(self._adjustment))
+            return
         advice = advise(self._bar.value(), self._settings, self._caps)
         self._advice.setText(self._words(advice, self._caps))
+
+    def _outcome_words(self, adjustment: AutoExposure) -> str:
+        level = f"{100 * adjustment.level:.0f} %"
+        match adjustment.outcome:
+            case Standing.ADJUSTING:
+                words = self.tr("Hold the pen still. Brightest LED: {0}")
+            case Standing.DONE:
+                words = self.tr("Set. Brightest LED: {0}, none is saturated.")
+            case Standing.NO_LEDS:
+                words = self.tr("No LEDs are seen. Hold the pen before the camera.")
+            case Standing.TOO_BRIGHT:
+                words = self.tr(
+                    "The least exposure and gain are too bright ({0}). Close the "
+                    "aperture of the lens."
+                )
+            case Standing.TOO_DARK:
+                words = self.tr(
+                    "The LEDs reach {0} only: a longer exposure would smear the moving "
+                    "pen. Open the aperture of the lens."
+                )
+            case Standing.UNSTEADY:
+                words = self.tr(
+                    "The light changes from image to image ({0}). Hold the pen still, "
+                    "and check the supply of its LEDs."
+                )
+        return words.format(level)
 
     def _words(self, advice: Advice, caps: Caps) -> str:
         is_recorded = caps.exposure_us is None and caps.gain_db is None
@@ -214,7 +250,8 @@ class FocusPanel(Translated, QFrame):
     def add(self, inspection: Inspection) -> None:
         """Show one more image."""
         self._widths.append(inspection.edge_width)
-        self._meter.set_value(self._widths)
+        is_saturated = inspection.exposure.n_saturated > 0
+        self._meter.set_value(self._widths, is_saturated=is_saturated)
 
     def clear(self) -> None:
         """Forget the images, as those of another camera."""

@@ -32,6 +32,7 @@ class FocusMeter(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value: tuple[float, ...] = ()
+        self._is_saturated = False
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._retranslate()
 
@@ -39,15 +40,21 @@ class FocusMeter(Translated, QWidget):
         """Return the widths shown, px, the present one last."""
         return self._value
 
-    def set_value(self, value: Sequence[float]) -> None:
-        """Show other widths, px, the present one last; NaN where no LED was seen."""
+    def set_value(self, value: Sequence[float], *, is_saturated: bool = False) -> None:
+        """Show other widths, px, the present one last; NaN where no LED was seen.
+
+        Those of saturated LEDs are too narrow to tell anything of the focus.
+        """
         self._value = tuple(value)[-N_TRACED:]
+        self._is_saturated = is_saturated
         self._retranslate()
 
     def verdict(self) -> str:
         """Return what is shown, in words."""
         if not np.isfinite(self._present):
             return self.tr("No LED is seen")
+        if self._is_saturated:
+            return self.tr("Saturated: lower the exposure first")
         return self.tr("Sharp") if is_sharp(self._present) else self.tr("Soft")
 
     def number(self) -> str:
@@ -89,7 +96,7 @@ class FocusMeter(Translated, QWidget):
     def _mark(self) -> tuple[Sign, Tone]:
         if not np.isfinite(self._present):
             return Sign.EYE, Tone.QUIET
-        if is_sharp(self._present):
+        if is_sharp(self._present) and not self._is_saturated:
             return Sign.CHECK, Tone.GOOD
         return Sign.WARNING, Tone.WARN
 

@@ -157,7 +157,8 @@ class IntrinsicsPanel(Translated, QGroupBox):
             return Remark(words.format(made_for), Sign.CHECK, Tone.GOOD)
         words = self.tr(
             "The camera sends {0}, the calibration file was made for {1}. Choose the "
-            "file for this camera or switch off binning."
+            "file for this camera, set the region to the whole sensor, or switch off "
+            "binning."
         )
         sent = self._size_text(*self._image_size)
         return Remark(words.format(sent, made_for), Sign.WARNING, Tone.BAD)

@@ -32,7 +32,7 @@ class LivePanel(Translated, QWidget):
         super().__init__(parent)
         self._connection = Connection.CLOSED
         self._sentence = ""
-        self._times_ns: deque[int] = deque(maxlen=N_TIMED)
+        self._arrivals: deque[tuple[int, int]] = deque(maxlen=N_TIMED)  # ns, number
         self._seen: LiveImage | None = None
         self._n_lost: deque[int] = deque(maxlen=N_TIMED)
         self._extra: tuple[Marker, ...] = ()
@@ -77,7 +77,8 @@ class LivePanel(Translated, QWidget):
     def set_image(self, shown: Shown, stats: Stats) -> None:
         """Show another image, and what became of those before."""
         self._seen = shown.seen
-        self._times_ns.append(shown.seen.frame.host_ts_ns)
+        frame = shown.seen.frame
+        self._arrivals.append((frame.host_ts_ns, frame.seq))
         self._n_lost.append(stats.missed + stats.incomplete)
         rings = live_markers(shown.seen)
         free = (ring for ring in rings if not self._is_found(ring))
@@ -94,7 +95,7 @@ class LivePanel(Translated, QWidget):
         if connection in WITHOUT_IMAGES or connection is Connection.OPENING:
             self._view.set_image(None)
             self._seen = None
-            self._times_ns.clear()
+            self._arrivals.clear()
             self._n_lost.clear()
             self._figures.clear()
         self._connection, self._sentence = connection, sentence
@@ -179,6 +180,6 @@ class LivePanel(Translated, QWidget):
 
     def _rate(self) -> float:
         """Return how many images come, 1/s."""
-        times = self._times_ns
-        seconds = (times[-1] - times[0]) * 1e-9
-        return (len(times) - 1) / seconds if seconds > 0 else 0.0
+        (start, first), (end, last) = self._arrivals[0], self._arrivals[-1]
+        seconds = (end - start) * 1e-9
+        return (last - first) / seconds if seconds > 0 else 0.0

@@ -15,18 +15,23 @@ from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.source import FoundDevice
+from lightpen.cameras.sources import absent_sources
 from lightpen.cameras.worker import Connection
-from lightpen.detection.inspection import Exposure, inspect
+from lightpen.detection.auto_exposure import AutoExposure
+from lightpen.detection.inspection import Exposure, Inspection, inspect
 from lightpen.formats.opened_files import CameraFile
+from lightpen.live.looking import LiveImage
 from lightpen.record.recordings import FilesBeside, files_beside
-from lightpen.simulator.hand import Doing
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
+from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
+from lightpen_app.steps.camera.settings_panel import SettingsPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
@@ -45,17 +50,21 @@ class CameraPage(Rearranged, Page):
     """The step Camera."""
 
     key = "camera"
+    shows_images = True
     narrow_below = 120 * GRID  # px; then it has its panels all at the side
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workbench, self._sounds = workbench, sounds
         self._live = workbench.live
         self._is_shown = False
         self._settings = CameraSettings()  # in force
         self._trouble = ""  # the last, of the camera or of a swing
         self._sentence = ""  # why no images come
         self._reading: Job | None = None
+        self._adjustment: AutoExposure | None = None
         self._looking: Job | None = None
         self._looked_beside = SourceChoice()
         self._beside = FilesBeside()
@@ -63,6 +72,7 @@ class CameraPage(Rearranged, Page):
         # Widgets
         self._swing_remark = SignLabel()
         self._source = SourcePanel()
+        self._more = SettingsPanel()
         self._intrinsics = IntrinsicsPanel()
         self._stray = StrayLightPanel()
         self._images = LivePanel()
@@ -75,6 +85,8 @@ class CameraPage(Rearranged, Page):
         # Connections
         self._source.value_changed.connect(self._on_source_chosen)
         self._source.retry_requested.connect(self._workbench.open_camera)
+        self._source.search_requested.connect(self._on_search_requested)
+        self._more.settings_changed.connect(self._live.configure)
         self._source.files_requested.connect(self._workbench.use_files)
         self._intrinsics.path_chosen.connect(self._on_path_chosen)
         self._source.samples_requested.connect(self._on_samples_requested)
@@ -82,8 +94,11 @@ class CameraPage(Rearranged, Page):
         self._stray.mask_requested.connect(self._on_mask_requested)
         self._stray.clear_requested.connect(self._on_clear_requested)
         self._stray.cover_requested.connect(self._on_cover_requested)
-        self._exposure.exposure_changed.connect(self._live.set_exposure)
-        self._exposure.gain_changed.connect(self._live.set_gain)
+        self._exposure.exposure_changed.connect(self._on_exposure_asked)
+        self._exposure.gain_changed.connect(self._on_gain_asked)
+        self._exposure.adjustment_requested.connect(self._on_adjustment_requested)
+        self._workbench.cameras_found.connect(self._on_cameras_found)
+        self._workbench.search_failed.connect(self._on_search_failed)
         self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.run.changed.connect(self._remark_swing)
         self._live.image_shown.connect(self._on_image_shown)
@@ -94,6 +109,7 @@ class CameraPage(Rearranged, Page):
 
         self._retranslate()
         self._on_workbench_changed()
+        self._look_for_libraries()
 
     @override
     def title(self) -> str:
@@ -132,6 +148,7 @@ class CameraPage(Rearranged, Page):
     @override
     def left(self) -> None:
         self._is_shown = False
+        self._end_adjustment()
         self._stray.give_up()
         self._stray.uncover()
 
@@ -153,7 +170,7 @@ class CameraPage(Rearranged, Page):
         panels.setContentsMargins(0, 0, 0, 0)
         panels.setSpacing(2 * GRID)
         panels.addWidget(self._swing_remark)
-        for panel in (self._source, self._intrinsics, self._stray):
+        for panel in (self._source, self._more, self._intrinsics, self._stray):
             panels.addWidget(panel)
         panels.addStretch(1)
         self._side = scroll = PageScroll()
@@ -205,7 +222,7 @@ class CameraPage(Rearranged, Page):
         self._looked_beside, self._beside = source, FilesBeside()
         if self._looking is not None:
             self._looking.cancel()
-        if source.kind is not SourceKind.RECORDED or not source.place:
+        if source.kind != SourceKind.RECORDED or not source.place:
             return
         self._looking = job = Job(lambda _: files_beside(source.place), self)
 
@@ -233,8 +250,58 @@ class CameraPage(Rearranged, Page):
         chosen = self._workbench.preparation.with_source(source)
         self._workbench.set_preparation(chosen)
         has_files = chosen.camera_file is not None or chosen.pen_file is not None
-        if source.kind is SourceKind.SIMULATED and not has_files:
+        if source.kind == SourceKind.SIMULATED and not has_files:
             self._workbench.use_sample_files()
+
+    def _look_for_libraries(self) -> None:
+        """Find out which libraries of cameras are installed, beside the window."""
+        job = Job(lambda _: absent_sources(), self)
+
+        # Connections
+        job.succeeded.connect(self._source.set_absent)
+        job.start()
+
+    def _on_search_requested(self) -> None:
+        source = self._source.value()
+        self._workbench.search_cameras(source.kind, source.producer)
+        self._source.set_searching(True)
+
+    def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
+        self._source.set_searching(False)
+        self._source.set_found(found)
+
+    def _on_search_failed(self, why: str) -> None:
+        self._source.set_searching(False)
+        self._source.set_search_problem(why)
+
+    def _on_exposure_asked(self, exposure_us: float) -> None:
+        self._end_adjustment()
+        self._live.set_exposure(exposure_us)
+
+    def _on_gain_asked(self, gain_db: float) -> None:
+        self._end_adjustment()
+        self._live.set_gain(gain_db)
+
+    def _on_adjustment_requested(self, begins: bool) -> None:
+        self._adjustment = AutoExposure.begun(self._settings) if begins else None
+        self._exposure.set_adjustment(self._adjustment)
+
+    def _end_adjustment(self) -> None:
+        self._on_adjustment_requested(False)
+
+    def _adjust(self, seen: LiveImage, inspection: Inspection) -> None:
+        """Go on with the adjustment of the exposure, if one is under way."""
+        before, caps = self._adjustment, self._live.caps
+        if before is None or caps is None:
+            return
+        self._live.hurry()
+        self._adjustment = now = before.fed(seen.frame, seen.spots, inspection, caps)
+        exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
+        if exposure_us is not None and exposure_us != before.asked.exposure_us:
+            self._live.set_exposure(exposure_us)
+        if gain_db is not None and gain_db != before.asked.gain_db:
+            self._live.set_gain(gain_db)
+        self._exposure.set_adjustment(now)
 
     def _on_path_chosen(self, path: str) -> None:
         if self._reading is not None:
@@ -277,18 +344,27 @@ class CameraPage(Rearranged, Page):
         labels = None if seen.sighting is None else seen.sighting.labels
         inspection = inspect(seen.spots, labels)
         self._images.set_image(shown, self._live.stats)
+        self._more.set_stats(self._live.stats)
         self._exposure.set_value(inspection.exposure)
         self._focus.add(inspection)
+        outcome = self._stray.outcome()
         self._stray.feed(seen)
+        if self._stray.outcome() != outcome:
+            self._live.hurry()  # it searches
+            self._side.ensureWidgetVisible(self._stray)
+        self._adjust(seen, inspection)
 
     def _on_connection_changed(self, connection: Connection) -> None:
         if connection in (Connection.OPENING, Connection.STREAMING):
             self._forget_trouble()
         if connection is Connection.LOST:
+            if not self._workbench.run.status.is_capturing:  # else the swing does
+                self._sounds.play(Sound.LOST)
             self._raise_trouble(self._trouble)
         if connection is Connection.OPENING:
             self._stray.uncover()  # another operator holds the pen
         if connection is not Connection.STREAMING:
+            self._end_adjustment()
             self._exposure.set_value(Exposure())
             self._focus.clear()
         if connection is Connection.STREAMING:
@@ -304,6 +380,7 @@ class CameraPage(Rearranged, Page):
         self._trouble = sentence
 
     def _on_failed(self, sentence: str) -> None:
+        self._sounds.play(Sound.FAILED)
         self._raise_trouble(sentence)
         self._show_connection()
 
@@ -335,22 +412,20 @@ class CameraPage(Rearranged, Page):
         self._source.set_faulty(is_closed and bool(self._sentence))
         self._stray.set_live(is_live)
         self._stray.set_has_operator(self._live.operator is not None)
-        self._exposure.set_camera(self._live.caps if is_live else None, self._settings)
+        caps = self._live.caps if is_live else None
+        self._exposure.set_camera(caps, self._settings)
+        self._more.set_camera(caps, self._settings)
 
     def _why_closed(self) -> str:
         """Return why no camera is open though none has failed."""
-        if Lack.SOURCE_PLACE in self._workbench.preparation.camera_lacks():
-            return lack_text(Lack.SOURCE_PLACE)
+        for lack in self._workbench.preparation.camera_lacks():
+            if lack in (Lack.SOURCE_PLACE, Lack.DEVICE):
+                return lack_text(lack)
         return self.tr("No camera is open.")
 
     def _show_pen(self) -> None:
-        """Let the simulated operator bring the pen, so that there is something to see.
-
-        Only while he does nothing else.
-        """
-        operator = self._live.operator
-        if self._is_shown and operator is not None and operator.doing is Doing.ABSENT:
-            operator.seat()
+        if self._is_shown:
+            self._live.show_pen()
 
     def _mark(self) -> None:
         """Mark what is masked, and what the search for stray light found."""

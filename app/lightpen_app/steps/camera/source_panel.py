@@ -1,6 +1,7 @@
 """Where the images come from."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import replace
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
@@ -13,44 +14,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from lightpen.cameras.source import FoundDevice, Needs
+from lightpen.cameras.sources import SOURCES
 from lightpen.formats.images import SUFFIXES, VIDEO_SUFFIXES
 from lightpen.record.recordings import FilesBeside
+from lightpen.sentences import Sentence
 from lightpen.swing.preparation import SourceChoice, SourceKind
-from lightpen_app.look.phrases import QT_TRANSLATE_NOOP
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.steps.camera.device_field import DeviceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
-
-
-@dataclass(frozen=True)
-class SourceEntry:
-    """A kind of source in the list.
-
-    Attributes
-    ----------
-    has_place : bool
-        Whether the user says where its images are.
-    """
-
-    kind: SourceKind
-    name: str
-    has_place: bool = False
-
-
-SOURCES = (
-    SourceEntry(
-        SourceKind.SIMULATED, QT_TRANSLATE_NOOP("SourcePanel", "Simulated pen")
-    ),
-    SourceEntry(
-        SourceKind.RECORDED,
-        QT_TRANSLATE_NOOP("SourcePanel", "Recorded images"),
-        has_place=True,
-    ),
-)
 
 
 class SourcePanel(Translated, QGroupBox):
@@ -59,6 +37,8 @@ class SourcePanel(Translated, QGroupBox):
     Signals
     -------
     value_changed(SourceChoice)
+    search_requested()
+        The cameras of the chosen source are to be looked for.
     samples_requested()
         The files of the simulated pen are to be used.
     retry_requested()
@@ -68,6 +48,7 @@ class SourcePanel(Translated, QGroupBox):
     """
 
     value_changed = Signal(object)
+    search_requested = Signal()
     samples_requested = Signal()
     retry_requested = Signal()
     files_requested = Signal(object)
@@ -75,9 +56,15 @@ class SourcePanel(Translated, QGroupBox):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = SourceChoice()
+        self._absent: Mapping[str, Sentence] = {}
+        self._is_searching = False
+        self._outcome = Remark()
 
         # Widgets
-        self._kind = QComboBox()
+        self._kind = QComboBox()  # no wider than its neighbours, however long its words
+        self._kind.setSizeAdjustPolicy(
+            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
         for _ in SOURCES:
             self._kind.addItem("")
         self._place = PathField()
@@ -88,6 +75,12 @@ class SourcePanel(Translated, QGroupBox):
         self._folder = menu.addAction("")
         self._file = menu.addAction("")
         self._pick.setMenu(menu)
+        self._producer = PathField()
+        self._open_producer = PushButton()
+        self._producer.add_button(self._open_producer)
+        self._device = DeviceField()
+        self._search = PushButton()
+        self._told = SignLabel()
         self._samples = PushButton()
         self._retry = PushButton()
         self._beside = FilesBeside()
@@ -104,6 +97,13 @@ class SourcePanel(Translated, QGroupBox):
         first.addWidget(self._samples)
         layout.addLayout(first)
         layout.addWidget(self._place)
+        layout.addWidget(self._producer)
+        second = QHBoxLayout()
+        second.setSpacing(GRID)
+        second.addWidget(self._device, 1)
+        second.addWidget(self._search)
+        layout.addLayout(second)
+        layout.addWidget(self._told)
         layout.addWidget(self._found)
         layout.addWidget(self._use_found)
         layout.addWidget(self._retry)
@@ -111,8 +111,12 @@ class SourcePanel(Translated, QGroupBox):
         # Connections
         self._kind.activated.connect(self._on_kind_chosen)
         self._place.value_changed.connect(self._on_place_changed)
+        self._device.value_changed.connect(self._on_place_changed)
+        self._producer.value_changed.connect(self._on_producer_changed)
+        self._open_producer.clicked.connect(self._on_open_producer_clicked)
         self._folder.triggered.connect(self._on_folder_triggered)
         self._file.triggered.connect(self._on_file_triggered)
+        self._search.clicked.connect(self.search_requested)
         self._use_found.clicked.connect(self._on_use_found_clicked)
         FileDrops(self).dropped.connect(self._on_dropped)
         self._samples.clicked.connect(self.samples_requested)
@@ -130,9 +134,46 @@ class SourcePanel(Translated, QGroupBox):
         """Show another source."""
         if value == self._value:
             return
+        if value.kind != self._value.kind:
+            self._device.set_found(())
+            self._outcome = Remark()
         self._value = value
-        if self._entry.has_place:
+        if self._needs is Needs.FILES:
             self._place.set_value(value.place)
+        elif self._has_device:
+            self._device.set_value(value.place)
+            self._producer.set_value(value.producer)
+        self._refresh()
+
+    def set_absent(self, absent: Mapping[str, Sentence]) -> None:
+        """Say what has to be installed for sources, by their keys."""
+        self._absent = absent
+        self._retranslate()
+
+    def set_searching(self, is_searching: bool) -> None:
+        """Say whether cameras are being looked for."""
+        self._is_searching = is_searching
+        self._refresh()
+
+    def set_found(self, found: tuple[FoundDevice, ...]) -> None:
+        """Offer the cameras that were found; the first if none is chosen yet."""
+        self._device.set_found(found)
+        if found:
+            words = self.tr("Cameras found: {0}").format(len(found))
+            self._outcome = Remark(words, Sign.CHECK, Tone.GOOD)
+        else:
+            words = self.tr(
+                "No camera was found. Check its power and its cable, or enter its "
+                "serial number or its address."
+            )
+            self._outcome = Remark(words, Sign.WARNING, Tone.WARN)
+        self._refresh()
+        if found and not self._value.place:
+            self._choose(replace(self._value, place=found[0].place))
+
+    def set_search_problem(self, why: str) -> None:
+        """Say why no cameras can be looked for."""
+        self._outcome = Remark(why, Sign.CROSS, Tone.BAD)
         self._refresh()
 
     def set_beside(self, files: FilesBeside) -> None:
@@ -143,25 +184,43 @@ class SourcePanel(Translated, QGroupBox):
     def set_faulty(self, faulty: bool) -> None:
         """Mark the source as one that could not be opened, and offer to try again."""
         self._place.set_faulty(faulty)
+        self._device.set_faulty(faulty)
         self._retry.setVisible(faulty)
 
     @property
-    def _entry(self) -> SourceEntry:
-        return next(entry for entry in SOURCES if entry.kind is self._value.kind)
+    def _needs(self) -> Needs:
+        return self._value.source.needs
+
+    @property
+    def _has_device(self) -> bool:
+        return self._needs in (Needs.DEVICE, Needs.DEVICE_AND_PRODUCER)
 
     def _on_kind_chosen(self, index: int) -> None:
-        entry = SOURCES[index]
-        place = self._place.value() if entry.has_place else ""
-        self._choose(SourceChoice(entry.kind, place))
-        if entry.has_place and not place:
+        source = SOURCES[index]
+        place = self._place.value() if source.needs is Needs.FILES else ""
+        self._choose(SourceChoice(source.key, place))
+        if source.needs is Needs.FILES and not place:
             self._place.setFocus()
+        elif self._has_device and source.key not in self._absent:
+            self.search_requested.emit()
 
     def _on_place_changed(self, place: str) -> None:
-        chosen = SourceChoice(self._value.kind, place)
+        chosen = replace(self._value, place=place)
         if chosen == self._value:
             self.retry_requested.emit()
         else:
             self._choose(chosen)
+
+    def _on_producer_changed(self, producer: str) -> None:
+        self._choose(replace(self._value, producer=producer, place=""))
+        self.search_requested.emit()
+
+    def _on_open_producer_clicked(self) -> None:
+        self._producer.pick(
+            QFileDialog.FileMode.ExistingFile,
+            self.tr("GenTL producer of the camera"),
+            self.tr("GenTL producers ({0})").format("*.cti"),
+        )
 
     def _on_use_found_clicked(self) -> None:
         self.files_requested.emit(self._beside)
@@ -190,14 +249,33 @@ class SourcePanel(Translated, QGroupBox):
             self.value_changed.emit(value)
 
     def _refresh(self) -> None:
-        self._kind.setCurrentIndex(SOURCES.index(self._entry))
-        self._place.setVisible(self._entry.has_place)
-        self._samples.setVisible(self._value.kind is SourceKind.SIMULATED)
+        needs, absent = self._needs, self._absent.get(self._value.source.key)
+        self._kind.setCurrentIndex(SOURCES.index(self._value.source))
+        self._place.setVisible(needs is Needs.FILES)
+        is_usable = self._has_device and absent is None
+        self._producer.setVisible(is_usable and needs is Needs.DEVICE_AND_PRODUCER)
+        self._device.setVisible(is_usable)
+        self._search.setVisible(is_usable)
+        self._search.set_why_not(
+            self.tr("The search is on.") if self._is_searching else ""
+        )
+        self._samples.setVisible(self._value.kind == SourceKind.SIMULATED)
+        self._told.set_value(self._remark(absent))
         self._refresh_beside()
+
+    def _remark(self, absent: Sentence | None) -> Remark:
+        if not self._has_device:
+            return Remark()
+        if absent is not None:
+            return Remark(worded(absent), Sign.WARNING, Tone.WARN)
+        if self._is_searching:
+            words = self.tr("Cameras are being looked for.")
+            return Remark(words, Sign.WAIT, Tone.ACTIVE)
+        return self._outcome
 
     def _refresh_beside(self) -> None:
         files = [f for f in (self._beside.camera, self._beside.pen) if f is not None]
-        is_offered = bool(files) and self._entry.has_place
+        is_offered = bool(files) and self._needs is Needs.FILES
         names = self.tr(" and ").join(file.name for file in files)
         text = self.tr("Beside the images: {0}").format(names) if is_offered else ""
         self._found.set_value(Remark(text, Sign.RING, Tone.ACTIVE))
@@ -208,17 +286,30 @@ class SourcePanel(Translated, QGroupBox):
     def _retranslate(self) -> None:
         self._refresh_beside()
         self.setTitle(self.tr("Source of the images"))
-        for index, entry in enumerate(SOURCES):
-            self._kind.setItemText(index, self.tr(entry.name))
-        self._kind.setAccessibleName(self.tr("Source of the images"))
+        for index, source in enumerate(SOURCES):
+            name = worded(source.name)
+            if source.key in self._absent:
+                name = self.tr("{0} - not installed").format(name)
+            self._kind.setItemText(index, name)
+        title = self.tr("Source of the images")
+        self._kind.setAccessibleName(title)
+        # On Linux the name of a list that drops down is what is chosen in it.
+        self._kind.setAccessibleDescription(title)
         edit = self._place.edit()
         edit.setAccessibleName(self.tr("Folder, record or video"))
         edit.setPlaceholderText(self.tr("Folder, record or video"))
         self._pick.setText(self.tr("Open..."))
         self._folder.setText(self.tr("Folder or record..."))
         self._file.setText(self.tr("Video..."))
+        producer = self._producer.edit()
+        producer.setAccessibleName(self.tr("GenTL producer"))
+        producer.setPlaceholderText(self.tr("GenTL producers of the system"))
+        self._open_producer.setText(self.tr("Open..."))
+        self._device.set_name(self.tr("Serial number or address"))
+        self._search.setText(self.tr("Search"))
         self._samples.setText(self.tr("Use its files"))
         self._samples.setToolTip(
             self.tr("Use the intrinsics and the LED file of the simulated pen.")
         )
         self._retry.setText(self.tr("Try again"))
+        self._refresh()

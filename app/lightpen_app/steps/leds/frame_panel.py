@@ -46,7 +46,7 @@ class FramePanel(Translated, QGroupBox):
 
         # Widgets
         self._view = PenView()
-        self._rules = {rule: SignLabel(wraps=False) for rule in Rule}
+        self._rules = {rule: SignLabel() for rule in Rule}
         self._amounts = {rule: text_label(TextSize.SMALL, Tone.QUIET) for rule in LONG}
         self._layout_note = SignLabel()
         self._move = PushButton()

@@ -42,6 +42,7 @@ class LedsPage(Rearranged, Page):
     """
 
     key = "leds"
+    shows_images = True
     narrow_below = 110 * GRID  # px; then two panels are side by side, not three
     low_below = 62 * GRID  # px; then it scrolls
 
@@ -127,6 +128,7 @@ class LedsPage(Rearranged, Page):
         self._is_shown = True
         self._match.clear()
         self._watch.start()
+        self._workbench.live.show_pen()
         self._aim()
         self._refresh_live()
 
@@ -193,7 +195,7 @@ class LedsPage(Rearranged, Page):
             self._open_in_use()
             if changed is not None:
                 self._set_draft(changed)
-        self._file.set_has_samples(preparation.source.kind is SourceKind.SIMULATED)
+        self._file.set_has_samples(preparation.source.kind == SourceKind.SIMULATED)
         self._refresh()
         self._aim()
 
@@ -387,6 +389,7 @@ class LedsPage(Rearranged, Page):
 
     def _on_connection_changed(self) -> None:
         if self._is_shown:
+            self._workbench.live.show_pen()
             if self._workbench.live.connection is not Connection.STREAMING:
                 self._match.clear()
             self._refresh_live()

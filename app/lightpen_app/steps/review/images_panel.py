@@ -28,6 +28,7 @@ from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job, Report
 
 TABLE_WIDTH = 40 * GRID
+VIEW_SHARE, PLOT_SHARE = 3, 2  # of the height
 LEAST_HEIGHT = 22 * GRID  # px, of the image
 RING = 10.0  # image px about an LED
 
@@ -95,8 +96,8 @@ class ImagesPanel(Translated, QWidget):
         layout.addWidget(self._card, 2, 1, 3, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
-        layout.setRowStretch(0, 3)
-        layout.setRowStretch(2, 2)
+        layout.setRowStretch(0, VIEW_SHARE)
+        layout.setRowStretch(2, PLOT_SHARE)
 
         # Connections
         self._table.number_changed.connect(self._on_number_changed)
@@ -104,6 +105,7 @@ class ImagesPanel(Translated, QWidget):
         self._misfits.number_chosen.connect(self._table.choose)
         self._take_out.clicked.connect(self._on_take_out_clicked)
         self._put_back.clicked.connect(self._on_put_back_clicked)
+        self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
         self._card.saved.connect(self.saved)
         self._card.failed.connect(self.failed)
         self._shortcut(QKeySequence.StandardKey.Delete, self._take_out.click)
@@ -296,6 +298,18 @@ class ImagesPanel(Translated, QWidget):
         self._shown = None
         self._view.set_image(None)
         self._view.set_arrows(NO_ARROWS)
+
+    def _on_enlarge_toggled(self, enlarged: bool) -> None:
+        """Give the plot the place of all that is about it, or no longer."""
+        for widget in (
+            *(self._table, self._count, self._take_out, self._put_back),
+            *(self._view, self._caption),
+        ):
+            widget.setVisible(not enlarged)
+        layout = self.layout()
+        assert isinstance(layout, QGridLayout)
+        layout.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
+        layout.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
 
     def _on_take_out_clicked(self) -> None:
         numbers = [row.number for row in self._table.selected() if row.is_used]

@@ -18,7 +18,6 @@ from lightpen_app.widgets.plots import (
     Column,
     Curve,
     Plot,
-    title_with_names,
 )
 
 GROUP = 0.8  # of the room for a label, that its bars fill
@@ -46,12 +45,8 @@ class NamedPlot(Plot):
         self._restyle()
 
     @override
-    def _restyle(self) -> None:
-        super()._restyle()
-        if len(self._names) > 1:
-            colors = colors_of(self.palette())
-            title = title_with_names(self._axes.title, self._names, colors)
-            self._item.titleLabel.setText(title)
+    def _named_curves(self) -> tuple[str, ...]:
+        return self._names if len(self._names) > 1 else ()
 
     def _named(self, *values: FloatArray) -> dict[str, Column]:
         """Return the values of each series by its column."""

@@ -23,7 +23,7 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.translated import Translated
 
 LARGEST_BALL = 100.0  # mm
-MOST_IMAGES = 2000
+LEAST_IMAGES, MOST_IMAGES = 10, 2000
 
 
 class NamesForm(Translated, QWidget):
@@ -186,8 +186,8 @@ class LimitsForm(Translated, QGroupBox):
         # Widgets
         self._uncertainty = NumberField("mm", (0.0001, 1.0), 4)
         self._uncertainty.setSingleStep(0.001)
-        self._least = NumberField("", (10, MOST_IMAGES), 0)
-        self._most = NumberField("", (10, MOST_IMAGES), 0)
+        self._least = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
+        self._most = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
         self._fields = (self._uncertainty, self._least, self._most)
         self._labels = tuple(map(_field_label, self._fields))
 
@@ -221,6 +221,8 @@ class LimitsForm(Translated, QGroupBox):
         self._value = limits
         blocked = self.blockSignals(True)
         self._uncertainty.setValue(limits.max_uncertainty)
+        self._least.setRange(LEAST_IMAGES, limits.max_images)
+        self._most.setRange(limits.min_images, MOST_IMAGES)
         self._most.setValue(limits.max_images)
         self._least.setValue(limits.min_images)
         self.blockSignals(blocked)
@@ -231,11 +233,11 @@ class LimitsForm(Translated, QGroupBox):
             field.interpretText()
 
     def _on_least_changed(self, least: float) -> None:
-        self._most.setValue(max(least, self._most.value()))
+        self._most.setMinimum(least)
         self.value_changed.emit()
 
     def _on_most_changed(self, most: float) -> None:
-        self._least.setValue(min(most, self._least.value()))
+        self._least.setMaximum(most)
         self.value_changed.emit()
 
     def _retranslate(self) -> None:
@@ -250,12 +252,14 @@ class LimitsForm(Translated, QGroupBox):
                 "The swing ends when the tip is as certain as this along its weakest "
                 "direction. Usual: {0} mm."
             ).format(f"{SwingLimits.max_uncertainty:g}"),
-            self.tr("The swing does not end with fewer. Usual: {0}.").format(
-                SwingLimits.min_images
-            ),
-            self.tr("The swing ends with so many in any case. Usual: {0}.").format(
-                SwingLimits.max_images
-            ),
+            self.tr(
+                "The swing does not end with fewer; no more than the images at most. "
+                "Usual: {0}."
+            ).format(SwingLimits.min_images),
+            self.tr(
+                "The swing ends with so many in any case; no fewer than the images at "
+                "least. Usual: {0}."
+            ).format(SwingLimits.max_images),
         )
         for field, label, text, tip in zip(
             self._fields, self._labels, texts, tips, strict=True

@@ -58,6 +58,8 @@ class InterruptedRow(Translated, QFrame):
         self._swing = swing
         self._is_under_way = is_under_way
 
+        self._had_focus: PushButton | None = None
+
         # Widgets
         self._when = text_label(TextSize.BODY)
         self._what = text_label(TextSize.SMALL, Tone.QUIET)
@@ -115,9 +117,18 @@ class InterruptedRow(Translated, QFrame):
         return max(least, self.heightForWidth(width))
 
     def set_waiting(self, why: str) -> None:
-        """Disable the buttons for a reason, or enable them for none."""
-        for button in (self._resume, self._discard, self._keep, self._confirm):
+        """Disable the buttons for a reason, or enable them for none.
+
+        The focus comes back to the one that had it.
+        """
+        buttons = (self._resume, self._discard, self._keep, self._confirm)
+        if why and self._had_focus is None:
+            self._had_focus = next((each for each in buttons if each.hasFocus()), None)
+        for button in buttons:
             button.set_why_not(why)
+        if not why and self._had_focus is not None:
+            self._had_focus.setFocus(Qt.FocusReason.OtherFocusReason)
+            self._had_focus = None
 
     def _retranslate(self) -> None:
         """Set the texts in the language that is chosen."""

@@ -17,16 +17,20 @@ from typing_extensions import override
 from lightpen.arrays import Image
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
+from lightpen_app.steps.swing.pen_in_space import PenInSpace, PenStand
 from lightpen_app.steps.swing.plots_panel import SwingPlots
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
+from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
+SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
+LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
 ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
@@ -52,7 +56,8 @@ class SwingFace(Rearranged, Translated, QWidget):
 
         # Widgets
         self._instruction = FittedText(TextSize.HUGE)
-        self._hint = FittedText(TextSize.LEAD)
+        self._hint = FittedText(TextSize.LEAD, least=TextSize.BODY)
+        self._warning = SignLabel()
         self._verdict = StateBanner(TextSize.DISPLAY)
         self._verdict.setMinimumHeight(10 * GRID)
         self.dial = LeaningDial()
@@ -66,11 +71,9 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._progress.setRange(0, PROGRESS_STEPS)
         self._progress.setTextVisible(False)
         self._banner = StateBanner(TextSize.TITLE)
+        self._pen = PenInSpace()
         self._image = ImageView()
-        # Its height is that of the numbers beside it; the plots have the rest.
-        self._image.setSizePolicy(
-            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
-        )
+        self._image.setMinimumWidth(LEAST_IMAGE)
         self._plots = SwingPlots()
 
         # Layout
@@ -88,9 +91,9 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._side = side = QGridLayout()
         side.setSpacing(2 * GRID)
         side.addLayout(numbers, 0, 0)
-        side.addWidget(self._image, 0, 1)
-        side.setColumnStretch(0, 1)
-        side.setColumnStretch(1, 1)
+        side.addWidget(self._pen, 0, 1)
+        for column, share in enumerate(SIDE_SHARES):
+            side.setColumnStretch(column, share)
         side.setRowStretch(0, 1)
         self._content = Squeezed()
         self._body = QGridLayout(self._content)
@@ -108,13 +111,14 @@ class SwingFace(Rearranged, Translated, QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setVerticalSpacing(GRID)
         layout.addWidget(self._hint, 1, 0)
-        layout.addWidget(self._verdict, 2, 0)
-        layout.addWidget(self._scroll, 3, 0)
+        layout.addWidget(self._warning, 2, 0)
+        layout.addWidget(self._verdict, 3, 0)
+        layout.addWidget(self._scroll, 4, 0)
         # The last in the order of the Tab key: Enter must press a button of these only
         # if somebody has chosen it.
         layout.addLayout(head, 0, 0)
         layout.setRowStretch(0, 1)
-        layout.setRowStretch(3, 10)
+        layout.setRowStretch(4, 10)
 
         # Connections
         self._scroll.height_changed.connect(self._hold_first_row)
@@ -145,6 +149,14 @@ class SwingFace(Rearranged, Translated, QWidget):
         if value.dial is not None:
             self.dial.set_value(value.dial)
 
+    def set_warning(self, warning: Remark) -> None:
+        """Tell what the swing cannot mend, or nothing."""
+        self._warning.set_value(warning)
+
+    def set_stand(self, stand: PenStand | None) -> None:
+        """Draw the pen in space as it stands, or none."""
+        self._pen.set_value(stand)
+
     def set_image(self, half: Image, size: QSize, markers: Sequence[Marker]) -> None:
         """Show a live image; see `ImageView.set_half`."""
         self._image.set_half(half, size, markers)
@@ -167,16 +179,24 @@ class SwingFace(Rearranged, Translated, QWidget):
         """Put the plots beside the dial, or below it where there is little room."""
         is_small = self._is_small
         if is_small:
-            self._side.addWidget(self._banner, 1, 0, 1, 2)
+            self._side.addWidget(self._banner, 1, 0, 1, 3)
             self._body.addWidget(self._plots, 1, 0, 1, 2)
+            self._body.addWidget(self._image, 2, 0, 1, 2)
         else:
             self._numbers.addWidget(self._banner)
-            self._side.addWidget(self._plots, 1, 0, 1, 2)
+            self._side.addWidget(self._plots, 1, 0, 1, 3)
+            self._side.addWidget(self._image, 0, 2)
+        self._side.setColumnStretch(2, 0 if is_small else SIDE_SHARES[2])
         self._side.setRowStretch(1, 0 if is_small else 2)
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
-        self._plots.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
-        self._plots.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
+        policy = QSizePolicy.Policy
+        # Beside the numbers it is as high as they are; the plots have the rest.
+        down = policy.Preferred if is_small else policy.Ignored
+        self._image.setSizePolicy(policy.Expanding, down)
+        for each in (self._plots, self._image):
+            each.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
+            each.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
         self._content.set_squeezed(not is_small)
         self._instruction.setMinimumHeight((5 if is_small else 7) * GRID)
 

@@ -38,7 +38,10 @@ class SwingSight(QObject):
             return ""
         if not setup.camera.fits(seen.frame.image):
             return self.tr("The images are not of the size that this swing needs.")
-        n_leds = 0 if seen.sighting is None else seen.sighting.n_leds
+        if seen.sighting is None or not seen.sighting.has_pose:
+            text = self.tr("bright spots: {0}, {1} images/s")
+            return text.format(len(seen.spots), round(self.rate()))
+        n_leds = seen.sighting.n_leds
         text = self.tr("{0} of {1} LEDs, {2} images/s")
         return text.format(n_leds, setup.pen.n_leds, round(self.rate()))
 

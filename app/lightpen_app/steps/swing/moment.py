@@ -1,10 +1,11 @@
 """What the operator is shown at one moment of a swing, as a value for the widgets."""
 
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import ceil, isfinite
 
 from PySide6.QtCore import QObject
 
+from lightpen.arrays import FloatArray
 from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade, NextStep, Verdict
 from lightpen.messages import SHOW_PEN, Code
@@ -13,7 +14,7 @@ from lightpen.model.posture import Posture, posture_of
 from lightpen.sentences import Sentence
 from lightpen.simulator.follower import FIRST_LEAN
 from lightpen.swing.rules import COUNTDOWN, has_just_slipped
-from lightpen.swing.shortfall import Shortfall, turn_range
+from lightpen.swing.shortfall import Shortfall, out_of_reach, turn_range
 from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import (
@@ -28,13 +29,20 @@ from lightpen_app.look.phrases import (
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED
+from lightpen_app.steps.swing.pen_in_space import PenStand
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State
 
 ENDED = (Phase.SOLVING, Phase.VERDICT)
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
+# Of the images to go: from so many on, rounded up to this.
+STEPS = ((30, 10), (10, 5), (-1, 1))
+PACE_S, N_PACING = 15.0, 6  # the last seconds and images by which time left is told
+LONG_S = 90.0  # told in minutes
 
 _LOOKS: dict[Phase, tuple[Sign, Tone]] = {
     Phase.WAIT: (Sign.WAIT, Tone.QUIET),
@@ -70,6 +78,8 @@ class Moment:
         What the images are of.
     is_simulated : bool
         Whether the pen is led by the mouse, so that it leans as the camera sees it.
+    is_away : bool
+        Whether another step is shown.
     """
 
     setup: SwingSetup
@@ -84,6 +94,13 @@ class Moment:
     stillness: float = 0.0
     origin: Origin | None = None
     is_simulated: bool = False
+    is_away: bool = False
+
+    @property
+    def asks_upright(self) -> bool:
+        """Whether the pen held upright and still leads to the review."""
+        asks = self.verdict is not None and not self.is_accepted
+        return asks and not (self.setup.is_recording or self.is_away)
 
     @property
     def lacks_images(self) -> bool:
@@ -108,9 +125,20 @@ class SwingWords(QObject):
             hint=told.hint,
             state=self._banner(moment),
             count=self._count(moment),
+            time_left=self._time_left(moment),
             fraction=_fraction(moment),
+            keys=self._keys(moment),
             dial=_dial(moment),
         )
+
+    def resting_value(self) -> OperatorValue:
+        """Return what is shown while other steps are, without a swing."""
+        told = Phrase(
+            self.tr("No swing yet"),
+            self.tr("It begins as soon as the step Swing is shown at the screen."),
+        )
+        state = State(phase_text(Phase.WAIT), "", *_LOOKS[Phase.WAIT])
+        return OperatorValue(told.short, told.hint, state)
 
     def waiting_value(
         self, refusal: Sentence | None, *, is_near: bool
@@ -139,15 +167,31 @@ class SwingWords(QObject):
         )
 
     def note(self, moment: Moment) -> str:
-        """Return what the count leaves out: the limit, and what was of no use."""
+        """Return what the count leaves out: time, limit, and what was of no use."""
         limit = moment.setup.limits.max_images
-        text = self.tr("images kept, at most {0} are taken").format(limit)
+        text = self.tr("at most {0} images").format(limit)
         if moment.setup.is_recording:
             text = self.tr("recorded images")
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
-        return text
+        return PARTED.join(filter(None, (self._time_left(moment), text)))
+
+    def warning(self, moment: Moment) -> Remark:
+        """Return what no swing can mend, told as soon as it is known."""
+        why = out_of_reach(moment.setup.limits, moment.state)
+        if why is None or moment.state.phase is Phase.VERDICT:
+            return Remark()
+        return Remark(worded(why), Sign.WARNING, Tone.WARN)
+
+    def stand(self, moment: Moment) -> PenStand | None:
+        """Return how the pen is drawn in space; nothing where its tip is not known."""
+        pen, seat = moment.setup.pen, moment.state.kept.seat or moment.state.seat
+        tip = pen.nominal_tip if seat is None else seat.tip_pen
+        if tip is None:
+            return None
+        dial = _dial(moment)
+        return PenStand(pen, tip, dial.posture, dial.target, dial.heading)
 
     def _told(self, moment: Moment) -> Phrase:
         state = moment.state
@@ -169,14 +213,18 @@ class SwingWords(QObject):
         if moment.is_accepted:
             return Phrase(self.tr("Accepted"), self.tr("Put the pen down."))
         if moment.verdict is not None:
-            is_recording = moment.setup.is_recording
-            return self._next_step(moment.verdict, is_recording=is_recording)
+            return self._next_step(moment, moment.verdict)
+        if moment.is_away and state.pause is Pause.BY_USER:
+            hint = self.tr("Go back to the step Swing at the screen to go on.")
+            return Phrase(told.short, hint)
         if moment.is_troubled and state.pause is Pause.BY_USER:
             hint = self.tr(
                 "An image could not be recorded; the notice at the top says why. Mend "
                 "it, then press Space."
             )
             return Phrase(told.short, hint)
+        if message.code == Code.SOLVING and moment.setup.is_recording:
+            return Phrase(told.short, self.tr("The tip is being computed."))
         if message.code == Code.SHOW_PEN and moment.is_simulated:
             hint = self.tr(
                 "Let the simulated operator swing; or press Seat, and lean the pen by "
@@ -187,18 +235,25 @@ class SwingWords(QObject):
             return lean_phrase(state.target, _posture(moment), heading)
         return told
 
-    def _next_step(self, verdict: Verdict, *, is_recording: bool) -> Phrase:
+    def _next_step(self, moment: Moment, verdict: Verdict) -> Phrase:
         steps = {
             Grade.PASS: self.tr("Done"),
             Grade.CHECK: self.tr("Look at it"),
             Grade.REPEAT: self.tr("Repeat the swing"),
         }
-        step = steps[verdict.grade]
+        step, is_recording = steps[verdict.grade], moment.setup.is_recording
         can_go_on = verdict.next_step is NextStep.CAPTURE_MORE and not is_recording
         if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
-        hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
-        return Phrase(step, "" if is_recording else hint)
+        if moment.is_away and is_recording:
+            hint = self.tr("The review is open at the screen.")
+        elif moment.is_away:
+            hint = self.tr("Put the pen down. The review is open at the screen.")
+        elif is_recording:
+            hint = self.tr("Go on to the review.")
+        else:
+            hint = self.tr("Hold the pen upright and still for 3 s to see the review.")
+        return Phrase(step, hint)
 
     def _no_images(self) -> Phrase:
         return Phrase(
@@ -229,7 +284,9 @@ class SwingWords(QObject):
             word, sign, tone = self.tr("NOT KEPT"), Sign.WARNING, Tone.WARN
         elif state.phase is Phase.VERDICT:
             return self._verdict(moment)
-        return State(word, moment.seen, sign, tone, fraction)
+        # What the last image shows is no news beside the pen being lost.
+        seen = "" if state.pause is Pause.LOST else moment.seen
+        return State(word, seen, sign, tone, fraction)
 
     def _verdict(self, moment: Moment) -> State:
         if moment.verdict is None:
@@ -246,7 +303,8 @@ class SwingWords(QObject):
         grade = moment.verdict.grade
         sign, tone = GRADE_MARKS[grade]
         word = grade_text(grade)
-        return State(word, told.hint, sign, tone, moment.stillness or None)
+        fraction = moment.stillness if moment.asks_upright else 0.0
+        return State(word, told.hint, sign, tone, fraction or None)
 
     def _count(self, moment: Moment) -> str:
         state, n_kept = moment.state, moment.state.n_kept
@@ -263,8 +321,54 @@ class SwingWords(QObject):
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)
-        total = n_kept + moment.short.n_more
-        return self.tr("{0} of about {1}").format(n_kept, total)
+        to_go = in_true_steps(moment.short.n_more)
+        return self.tr("{0} kept, {1} to go").format(n_kept, to_go)
+
+    def _time_left(self, moment: Moment) -> str:
+        """Return how long the swing goes on at the pace of the last images."""
+        state, is_recording = moment.state, moment.setup.is_recording
+        is_on = state.phase is Phase.CAPTURING and not is_recording
+        if not is_on or not isfinite(state.kept.uncertainty):
+            return ""
+        times = state.kept.times
+        period = images_period(times[times > state.time - PACE_S])
+        if period is None or moment.lacks_images:
+            return ""
+        seconds = moment.short.n_more * period
+        if seconds > LONG_S:
+            return self.tr("about {0} min left").format(ceil(seconds / 60))
+        return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
+
+    def _keys(self, moment: Moment) -> str:
+        """Return what the keys of the operator view do now."""
+        if moment.is_away:
+            return ""
+        if moment.verdict is not None:
+            return self.tr("Enter: see the review")
+        if moment.state.phase in ENDED:
+            return ""
+        if moment.state.pause is Pause.BY_USER:
+            return self.tr("Space: go on")
+        return self.tr("Space: pause")
+
+
+def in_true_steps(n_more: int) -> int:
+    """Return how many images are to go, rounded up to what an estimate is worth."""
+    step = next(step for least, step in STEPS if n_more > least)
+    return ceil(n_more / step) * step
+
+
+def images_period(times: FloatArray) -> float | None:
+    """Return the time from one kept image to the next, s; None of too few.
+
+    Parameters
+    ----------
+    times : (N,) array
+        Of the last images, s.
+    """
+    if len(times) < N_PACING:
+        return None
+    return float(times[-1] - times[0]) / (len(times) - 1)
 
 
 def _fraction(moment: Moment) -> float | None:
@@ -291,13 +395,16 @@ def _dial(moment: Moment) -> DialValue:
     counts = state.counts
     is_capturing = state.phase is Phase.CAPTURING and not moment.lacks_images
     posture, target = _posture(moment), state.target if is_capturing else None
-    if state.phase in ENDED or moment.lacks_images:
+    if moment.asks_upright:
+        turn = 0.0 if posture is None else posture.turn
+        target = replace(UPRIGHT, turn=turn)
+    elif state.phase in ENDED or moment.lacks_images:
         posture = None
     if state.heading is None and not moment.setup.is_recording:
         # Nobody knows yet how the operator sees the pen lean; right is his own right.
         if posture is not None and not moment.is_simulated:
             posture = UPRIGHT
-        target = FIRST_LEAN if is_capturing else None
+        target = FIRST_LEAN if is_capturing else target
     return DialValue(
         counts=counts[1:],
         needed=wanted[1:],

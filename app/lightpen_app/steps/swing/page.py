@@ -24,6 +24,7 @@ from lightpen_app.steps.swing.moment import Moment, SwingWords
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
 
@@ -46,6 +47,7 @@ class SwingPage(Page):
     """Shows a swing and leads it; nothing on it must be pressed."""
 
     key = "swing"
+    shows_images = True
 
     def __init__(
         self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
@@ -152,7 +154,7 @@ class SwingPage(Page):
     @override
     def entered(self) -> None:
         self._is_entered = True
-        is_recording = self._workbench.preparation.source.kind is SourceKind.RECORDED
+        is_recording = self._workbench.preparation.source.kind == SourceKind.RECORDED
         if is_recording and self._run.status.state is None:
             self._workbench.open_camera()  # it begins with its first image
         self._runner.come()
@@ -166,6 +168,7 @@ class SwingPage(Page):
         self._question.hide()
         self._is_entered = False
         self._runner.leave()
+        self._show()
 
     @override
     def unsaved(self) -> str:
@@ -230,6 +233,7 @@ class SwingPage(Page):
             stillness=stillness(state) if state.phase is Phase.VERDICT else 0.0,
             origin=status.origin,
             is_simulated=self._live.operator is not None,
+            is_away=not self._is_entered,
         )
 
     def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
@@ -263,11 +267,18 @@ class SwingPage(Page):
             is_near = self._live.connection is Connection.STREAMING
             value = self._words.waiting_value(self._run.status.refusal, is_near=is_near)
             self._face.set_value(value)
+            self._face.set_warning(Remark())
+            self._face.set_stand(None)
+            if not self._is_entered:
+                value = self._words.resting_value()
         else:
             value = self._words.operator_value(moment)
             is_verdict = moment.state.phase is Phase.VERDICT
             self._face.set_value(value, self._words.note(moment), is_verdict=is_verdict)
-            value = replace(value, dial=None) if is_verdict else value
+            self._face.set_warning(self._words.warning(moment))
+            self._face.set_stand(self._words.stand(moment))
+            if is_verdict and not moment.asks_upright:
+                value = replace(value, dial=None)
         self.operator_value_changed.emit(value)
         self._face.dial.set_interactive(self._live.operator is not None)
         text, self._press_act = self._offered()

@@ -37,7 +37,9 @@ class SwingPlots(Translated, QWidget):
             tail=TAIL,
         )
         self._uncertainty = TracePlot(
-            Axes(""), [Curve("expanded_uncertainty_um")], y_log=True
+            Axes(""),
+            [Curve("expanded_uncertainty_um"), Curve("floor_um")],
+            y_log=True,
         )
 
         # Layout
@@ -107,8 +109,10 @@ class SwingPlots(Translated, QWidget):
         self._limit = MICROMETRES * max_uncertainty
         self._show_limit()
         finite = np.where(np.isfinite(trace.uncertainties), trace.uncertainties, np.nan)
+        floors = np.where(np.isfinite(finite), trace.floors, np.nan)
         self._uncertainty.set_data(
-            trace.n_images.astype(np.float64), MICROMETRES * finite
+            trace.n_images.astype(np.float64),
+            *(MICROMETRES * finite, MICROMETRES * floors),
         )
 
     def _show_limit(self) -> None:
@@ -122,6 +126,7 @@ class SwingPlots(Translated, QWidget):
         self._scatter.set_axes(Axes(self.tr("Tip of each image / µm")))
         self._estimate.set_axes(Axes(self.tr("Tip estimate / µm")))
         self._uncertainty.set_axes(Axes(self.tr("U (k = 2) of the tip / µm")))
+        self._uncertainty.set_names("U", self.tr("floor"))
         self._show_limit()
 
 

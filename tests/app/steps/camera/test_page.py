@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import (
+    QCoreApplication,
+    QEvent,
+    QMimeData,
+    QPoint,
+    QPointF,
+    Qt,
+    QUrl,
+)
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
@@ -39,6 +47,7 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
@@ -81,7 +90,7 @@ def exposure(seen: "Seen") -> str:
 
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
-    page = CameraPage(workbench)
+    page = CameraPage(workbench, Silence())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()
@@ -306,7 +315,8 @@ def test_a_file_for_images_of_another_size_is_told_and_stops_the_step(
 
     live.wait(
         "The camera sends 1224 x 1024, the calibration file was made for 612 x 512. "
-        "Choose the file for this camera or switch off binning."
+        "Choose the file for this camera, set the region to the whole sensor, or "
+        "switch off binning."
     )
     assert not live.page.is_complete()
     assert "another size" in live.page.main_action().why_not
@@ -471,13 +481,12 @@ def drop_on(panel: QWidget, path: Path) -> None:
     """Drop a file or a folder of this machine."""
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path))])
-    QApplication.sendEvent(
-        panel,
-        QDropEvent(
-            *(QPointF(5, 5), Qt.DropAction.CopyAction, data),
-            *(Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier),
-        ),
+    held = (
+        *(Qt.DropAction.CopyAction, data),
+        *(Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier),
     )
+    QApplication.sendEvent(panel, QDragEnterEvent(QPoint(5, 5), *held))
+    QApplication.sendEvent(panel, QDropEvent(QPointF(5, 5), *held))
 
 
 def test_a_folder_is_picked_in_the_dialog(
@@ -601,6 +610,10 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     gone = tmp_path / "swing" if kind == "folder" else tmp_path / "swing" / "images"
     live.choose("Recorded images")
     live.enter("Folder, record or video", str(tmp_path / "swing"))
+    why_not = "Open the intrinsics file."
+    live.wait("Beside the images: camera.yaml and leds.csv")
+    live.until(lambda: live.page.main_action().why_not == why_not)
+    live.click("Use both")
     live.wait("10 of 10 LEDs")
 
     gone.rename(tmp_path / "elsewhere")
@@ -937,6 +950,9 @@ def test_every_control_is_named_and_reached_by_tab(
         "Live image",
         "Exposure",
         "Gain",
+        "Set by the LEDs",
+        "Frame rate",
+        "Pixel format",
     }
 
 

@@ -759,6 +759,8 @@ def test_a_pen_that_is_away_is_not_found(
     camera = SimulatedCamera(small_scene, workbench.around.clock)
     workbench.live.open(camera, CameraSettings(), workbench.around.clock)
     seen.page.entered()
+    seen.wait("10 of 10 LEDs")  # the simulated pen is shown by itself
+    camera.operator.leave()
 
     seen.wait("Pen not found")
     assert "No LED seen" in seen.words

@@ -883,6 +883,25 @@ def test_every_plot_is_saved_as_picture_and_as_numbers(
         assert (tmp_path / f"{i}.png").stat().st_size > 1000
 
 
+def test_the_plot_beside_the_images_is_enlarged_over_all_about_it(
+    page: ReviewPage,
+) -> None:
+    panel = the(page, ImagesPanel)
+    card = the(panel, PlotCard)
+    before = card.height()
+    enlarge, *_ = card.actions_offered()
+
+    enlarge.trigger()
+    QApplication.processEvents()
+    assert card.height() > 1.5 * before
+    assert not the(panel, ImageTable).isVisible()
+
+    enlarge.trigger()
+    QApplication.processEvents()
+    assert card.height() == before
+    assert the(panel, ImageTable).isVisible()
+
+
 def test_a_plot_that_cannot_be_saved_is_told(
     page: ReviewPage, qtbot: QtBot, tmp_path: Path
 ) -> None:

@@ -587,15 +587,21 @@ def test_without_an_led_file_no_centre_is_told(
     assert start.text_of("Nominal centre of the tip, x") == "0.0000 mm"
 
 
-def test_the_least_and_the_most_images_keep_their_order(
+def test_the_least_and_the_most_images_do_not_move_each_other(
     start: Opened, workbench: Workbench
 ) -> None:
-    start.type_into("Images at least", "400")
-    assert start.text_of("Images at most") == "400"
+    start.type_into("Images at least", "80")
+    start.type_into("Images at most", "100")
+    assert workbench.preparation.limits == SwingLimits(min_images=80, max_images=100)
 
-    start.type_into("Images at most", "50")
-    assert start.text_of("Images at least") == "50"
-    assert workbench.preparation.limits == SwingLimits(min_images=50, max_images=50)
+    for name, text in (("Images at least", "99999"), ("Images at most", "20")):
+        before = start.text_of("Images at least"), start.text_of("Images at most")
+        start.type_into(name, text)
+        after = start.text_of("Images at least"), start.text_of("Images at most")
+        assert sum(one != other for one, other in zip(before, after, strict=True)) <= 1
+
+    limits = workbench.preparation.limits
+    assert limits.min_images <= limits.max_images
 
 
 def test_limits_that_make_no_sense_cannot_be_entered(
@@ -938,6 +944,9 @@ def test_a_swing_does_not_go_on_with_images_of_another_size(
         "The camera sends 640 x 480, the swing was captured with 1224 x 1024."
     )
     assert start.steps == []
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Resume"
 
 
 def test_a_swing_that_was_damaged_since_is_told_and_no_longer_offered(

@@ -322,7 +322,7 @@ def test_a_record_that_cannot_be_made_is_told_and_tried_again(
     desk.window.go_to(1)
 
     until(qtbot, lambda: desk.value.instruction == "No swing")
-    assert desk.value.hint in desk.words()
+    until(qtbot, lambda: desk.value.hint in desk.words())
     assert "No image is kept yet." in desk.words()
 
     blocker.unlink()

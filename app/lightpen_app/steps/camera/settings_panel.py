@@ -1,0 +1,279 @@
+"""What else of a camera can be set: rate, region, pixel format, trigger, packets."""
+
+from PySide6.QtCore import QSignalBlocker, Signal
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QGridLayout,
+    QGroupBox,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.cameras.pixel_formats import pixel_format_named
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    Caps,
+    Range,
+    Region,
+    Stats,
+    TriggerMode,
+)
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import PARTED
+from lightpen_app.steps.camera.setting_field import SettingField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+LARGEST = 100_000  # px or bytes, of a field before the camera told its range
+
+
+class ChoiceField(QComboBox):
+    """A choice that the wheel does not change while the page scrolls."""
+
+    @override
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
+
+
+class SettingsPanel(Translated, QGroupBox):
+    """The settings of a camera, with the ranges that it offers.
+
+    Signals
+    -------
+    settings_changed(CameraSettings)
+        What is asked for; all else is None.
+    """
+
+    settings_changed = Signal(object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._caps: Caps | None = None
+        self._settings = CameraSettings()
+        self._stats = Stats()
+
+        # Widgets
+        self._rate_name = QLabel()
+        self._rate = SettingField("1/s", (0.1, 1000.0), 1)
+        self._format_name = QLabel()
+        self._format = ChoiceField()
+        self._trigger_name = QLabel()
+        self._trigger = ChoiceField()
+        self._packet_name = QLabel()
+        self._packet = SettingField("B", (0, LARGEST), 0)
+        self._size_name = QLabel()
+        self._width = SettingField("px", (1, LARGEST), 0)
+        self._height = SettingField("px", (1, LARGEST), 0)
+        self._place_name = QLabel()
+        self._x = SettingField("px", (0, LARGEST), 0)
+        self._y = SettingField("px", (0, LARGEST), 0)
+        self._whole = PushButton()
+        self._hint = SignLabel()
+        self._counts = text_label(TextSize.SMALL, Tone.QUIET)
+
+        # Layout
+        grid = QGridLayout()
+        grid.setSpacing(GRID)
+        rows: tuple[tuple[QWidget, ...], ...] = (
+            (self._rate_name, self._rate),
+            (self._format_name, self._format),
+            (self._trigger_name, self._trigger),
+            (self._packet_name, self._packet),
+            (self._size_name, self._width, self._height),
+            (self._place_name, self._x, self._y),
+        )
+        for row, (name, *fields) in enumerate(rows):
+            grid.addWidget(name, row, 0)
+            span = 2 // len(fields)
+            for column, field in enumerate(fields):
+                grid.addWidget(field, row, 1 + column, 1, span)
+        grid.addWidget(self._whole, len(rows), 1, 1, 2)
+        grid.setColumnStretch(1, 1)
+        grid.setColumnStretch(2, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addLayout(grid)
+        layout.addWidget(self._hint)
+        layout.addWidget(self._counts)
+
+        # Connections
+        self._rate.valueChanged.connect(self._on_rate_edited)
+        self._packet.valueChanged.connect(self._on_packet_edited)
+        self._format.activated.connect(self._on_format_chosen)
+        self._trigger.activated.connect(self._on_trigger_chosen)
+        for field in (self._width, self._height, self._x, self._y):
+            field.valueChanged.connect(self._on_region_edited)
+        self._whole.clicked.connect(self._on_whole_clicked)
+
+        self._retranslate()
+        self.set_camera(None, CameraSettings())
+
+    def hint(self) -> Remark:
+        """Return what to know about the pixel format."""
+        return self._hint.value()
+
+    def counts(self) -> str:
+        """Return what became of the images, in words."""
+        return self._counts.text()
+
+    def set_stats(self, stats: Stats) -> None:
+        """Show what became of the images of this camera."""
+        self._stats = stats
+        self._retranslate_counts()
+
+    def set_camera(self, caps: Caps | None, settings: CameraSettings) -> None:
+        """Show what a camera offers and has in force; hidden where nothing can be."""
+        self._caps, self._settings = caps, settings
+        is_live = caps is not None and caps.n_images is None
+        self.setVisible(is_live)
+        if caps is None or not is_live:
+            return
+        self._offer((self._rate_name, self._rate), caps.frame_rate, settings.frame_rate)
+        self._offer(
+            (self._packet_name, self._packet), caps.packet_size, settings.packet_size
+        )
+        self._offer_choices(
+            self._format, caps.pixel_formats, settings.pixel_format or ""
+        )
+        triggers = tuple(map(str, caps.triggers))
+        self._offer_choices(self._trigger, triggers, settings.trigger or triggers[0])
+        for widget in (self._trigger_name, self._trigger):
+            widget.setVisible(len(triggers) > 1)
+        self._offer_region(caps, settings.region)
+        self._retranslate_triggers()
+        self._hint.set_value(self._format_hint())
+
+    def _offer(
+        self,
+        widgets: tuple[QLabel, SettingField],
+        offered: Range | None,
+        value: float | None,
+    ) -> None:
+        name, field = widgets
+        is_there = offered is not None and value is not None
+        name.setVisible(is_there)
+        field.setVisible(is_there)
+        if offered is not None and value is not None:
+            field.set_offered(offered, value)
+
+    def _offer_choices(
+        self, field: ChoiceField, offered: tuple[str, ...], chosen: str
+    ) -> None:
+        with QSignalBlocker(field):
+            field.clear()
+            for each in offered:
+                field.addItem(each, each)
+            field.setCurrentIndex(field.findData(chosen))
+
+    def _offer_region(self, caps: Caps, region: Region | None) -> None:
+        limits = caps.regions
+        is_there = limits is not None and region is not None
+        can_move = limits is not None and min(limits.x_step, limits.y_step) > 0
+        for widget in (self._size_name, self._width, self._height, self._whole):
+            widget.setVisible(is_there)
+        for widget in (self._place_name, self._x, self._y):
+            widget.setVisible(is_there and can_move)
+        if limits is None or region is None:
+            return
+        self._width.set_offered(limits.width, region.width)
+        self._height.set_offered(limits.height, region.height)
+        self._x.set_offered(Range(0, limits.width.high - region.width), region.x)
+        self._y.set_offered(Range(0, limits.height.high - region.height), region.y)
+        is_whole = region == limits.whole
+        self._whole.set_why_not(
+            self.tr("The whole sensor is read out.") if is_whole else ""
+        )
+
+    def _on_rate_edited(self, rate: float) -> None:
+        self.settings_changed.emit(CameraSettings(frame_rate=rate))
+
+    def _on_packet_edited(self, size: float) -> None:
+        self.settings_changed.emit(CameraSettings(packet_size=round(size)))
+
+    def _on_format_chosen(self, index: int) -> None:
+        name = str(self._format.itemData(index))
+        self.settings_changed.emit(CameraSettings(pixel_format=name))
+
+    def _on_trigger_chosen(self, index: int) -> None:
+        mode = TriggerMode(self._trigger.itemData(index))
+        self.settings_changed.emit(CameraSettings(trigger=mode))
+
+    def _on_region_edited(self) -> None:
+        fields = (self._x, self._y, self._width, self._height)
+        region = Region(*(round(field.value()) for field in fields))
+        self.settings_changed.emit(CameraSettings(region=region))
+
+    def _on_whole_clicked(self) -> None:
+        if self._caps is not None and self._caps.regions is not None:
+            whole = CameraSettings(region=self._caps.regions.whole)
+            self.settings_changed.emit(whole)
+
+    def _format_hint(self) -> Remark:
+        pixel_format = pixel_format_named(self._settings.pixel_format or "")
+        if pixel_format is None or pixel_format.is_mono:
+            return Remark()
+        words = self.tr(
+            "Colours are made grey, which costs sharpness. A grey format such as "
+            "Mono8 gives better centres, a monochrome camera the best."
+        )
+        return Remark(words, Sign.WARNING, Tone.WARN)
+
+    def _retranslate_counts(self) -> None:
+        stats = self._stats
+        told = (
+            self.tr("delivered: {0}").format(stats.delivered),
+            self.tr("incomplete: {0}").format(stats.incomplete),
+            self.tr("missed: {0}").format(stats.missed),
+            self.tr("skipped: {0}").format(stats.skipped),
+        )
+        self._counts.setText(PARTED.join(told))
+
+    def _retranslate_triggers(self) -> None:
+        words = {
+            TriggerMode.FREE: self.tr("Free running"),
+            TriggerMode.SOFTWARE: self.tr("By software"),
+        }
+        for index in range(self._trigger.count()):
+            mode = TriggerMode(self._trigger.itemData(index))
+            self._trigger.setItemText(index, words[mode])
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Settings of the camera"))
+        named: tuple[tuple[QLabel, QWidget, str], ...] = (
+            (self._rate_name, self._rate, self.tr("Frame rate")),
+            (self._format_name, self._format, self.tr("Pixel format")),
+            (self._trigger_name, self._trigger, self.tr("Trigger")),
+            (self._packet_name, self._packet, self.tr("Packet size")),
+            (self._size_name, self._width, self.tr("Region width")),
+            (self._place_name, self._x, self.tr("Region from left")),
+        )
+        for label, field, name in named:
+            label.setText(name)
+            label.setBuddy(field)
+            field.setAccessibleName(name)
+        self._size_name.setText(self.tr("Region"))
+        self._place_name.setText(self.tr("from left, top"))
+        self._height.setAccessibleName(self.tr("Region height"))
+        self._y.setAccessibleName(self.tr("Region from top"))
+        self._whole.setText(self.tr("Whole sensor"))
+        self._counts.setToolTip(
+            self.tr(
+                "Of this camera's images: came whole; came in part and were left out; "
+                "never came; were not measured, as the computer was too slow."
+            )
+        )
+        self._retranslate_counts()
+        self._packet.setToolTip(
+            self.tr(
+                "Larger packets cost the computer less. The network card and every "
+                "switch must let them pass (jumbo frames)."
+            )
+        )
+        self._retranslate_triggers()
+        self._hint.set_value(self._format_hint())

@@ -1,0 +1,172 @@
+"""The pen as it leans, and as it should, seen from behind its operator."""
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from PySide6.QtCore import QPointF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.model.pen import Pen
+from lightpen.model.posture import Posture, rotations_of
+from lightpen_app.look.signs import draw_arrow
+from lightpen_app.look.theme import Colors, colors_of
+from lightpen_app.widgets.translated import Translated
+
+RAISED = math.radians(24)  # of the eye above the plane of the cone
+WIDTH, HEIGHT = 1.15, 1.3  # of what is drawn, in lengths of the pen
+GROUND = 0.42  # radius of the ring about the cone, in lengths of the pen
+CONE = 0.05  # radius of the cone, likewise
+AWAY = 0.08  # lengths of the pen from where it should be, to be worth an arrow
+SHARE_BELOW = 0.16  # of the height, below the cone
+
+
+@dataclass(frozen=True, eq=False)
+class PenStand:
+    """How a pen stands in its cone.
+
+    Attributes
+    ----------
+    pen : Pen
+        Its LEDs are drawn.
+    tip_pen : (3,) array
+        Where its tip is, mm.
+    posture, target : Posture or None
+        As it is, and as it should be.
+    heading : float
+        By how much what the camera sees is turned for the operator, as in `DialValue`.
+    """
+
+    pen: Pen
+    tip_pen: FloatArray
+    posture: Posture | None = None
+    target: Posture | None = None
+    heading: float = 0.0
+
+
+class PenInSpace(Translated, QWidget):
+    """Draws a pen in its cone, and the outline of where it should go."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: PenStand | None = None
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self._retranslate()
+
+    def value(self) -> PenStand | None:
+        """Return what is drawn."""
+        return self._value
+
+    def set_value(self, value: PenStand | None) -> None:
+        """Draw another pen, or none."""
+        self._value = value
+        self.update()
+
+    @override
+    def sizeHint(self) -> QSize:
+        return QSize(160, 200)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        return QSize(80, 100)
+
+    @override
+    def paintEvent(self, event: QPaintEvent) -> None:
+        stand = self._value
+        if stand is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colors = colors_of(self.palette())
+        length = float(np.linalg.norm(stand.pen.leds - stand.tip_pen, axis=1).max())
+        scale = min(self.width() / WIDTH, self.height() / HEIGHT) / length
+        seat = QPointF(self.width() / 2, self.height() * (1 - SHARE_BELOW))
+        _draw_ground(painter, seat, scale * length, colors)
+        drawn = [
+            np.array(seat.toTuple()) + seen_from_behind(stand, each) * (scale, -scale)
+            for each in (stand.posture, stand.target)
+            if each is not None
+        ]
+        if stand.posture is not None:
+            _draw_pen(painter, seat, drawn[0], colors)
+        if stand.target is not None:
+            _draw_outline(painter, seat, drawn[-1], QColor(colors.pointer))
+        if len(drawn) == 2:
+            top, goal = (QPointF(*each.mean(axis=0)) for each in drawn)
+            if math.dist(top.toTuple(), goal.toTuple()) > AWAY * scale * length:
+                width, halo = 0.035 * scale * length, QColor(colors.window)
+                draw_arrow(painter, top, goal, width, QColor(colors.pointer), halo)
+
+    @override
+    def _retranslate(self) -> None:
+        self.setAccessibleName(self.tr("The pen in space"))
+        self.setToolTip(
+            self.tr("The pen as it leans, and the outline of where it should go.")
+        )
+
+
+def seen_from_behind(stand: PenStand, posture: Posture) -> FloatArray:
+    """Return where the LEDs are seen from the tip, right and up, (L, 2), mm."""
+    numbers = posture.tilt, posture.direction, posture.turn
+    rotation = rotations_of(stand.pen, *(np.array([each]) for each in numbers))[0]
+    right, down, away = ((stand.pen.leds - stand.tip_pen) @ rotation.T).T
+    cosine, sine = math.cos(stand.heading), math.sin(stand.heading)
+    own_right = cosine * right - sine * away
+    own_away = sine * right + cosine * away
+    up = -down * math.cos(RAISED) + own_away * math.sin(RAISED)
+    return np.stack([own_right, up], axis=1)
+
+
+def _draw_ground(
+    painter: QPainter, seat: QPointF, length: float, colors: Colors
+) -> None:
+    """Draw the cone, a ring about it, and where upright is."""
+    flat = math.sin(RAISED)
+    painter.setPen(QPen(QColor(colors.line), 1))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawEllipse(seat, GROUND * length, GROUND * length * flat)
+    painter.setPen(QPen(QColor(colors.edge), 1, Qt.PenStyle.DashLine))
+    painter.drawLine(seat, seat - QPointF(0, length * math.cos(RAISED)))
+    painter.setPen(QPen(QColor(colors.edge), 1))
+    painter.setBrush(QColor(colors.raised))
+    painter.drawEllipse(seat, CONE * length, CONE * length * flat)
+
+
+def _draw_pen(
+    painter: QPainter, seat: QPointF, leds: FloatArray, colors: Colors
+) -> None:
+    """Draw the stem, the body about the LEDs (L, 2), px, and each of them."""
+    size = float(np.ptp(leds, axis=0).max())
+    thick = QPen(QColor(colors.muted), max(0.07 * size, 3.0))
+    thick.setCapStyle(Qt.PenCapStyle.RoundCap)
+    thick.setJoinStyle(Qt.PenJoinStyle.RoundJoin)
+    painter.setPen(thick)
+    painter.drawLine(seat, QPointF(*leds.mean(axis=0)))
+    painter.setBrush(QColor(colors.muted))
+    painter.drawPolygon(_body(leds))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colors.window))
+    radius = max(0.03 * size, 2.0)
+    for place in leds.tolist():
+        painter.drawEllipse(QPointF(*place), radius, radius)
+    painter.setBrush(QColor(colors.text))
+    painter.drawEllipse(seat, 1.3 * radius, 1.3 * radius)
+
+
+def _draw_outline(
+    painter: QPainter, seat: QPointF, leds: FloatArray, color: QColor
+) -> None:
+    painter.setPen(QPen(color, 2, Qt.PenStyle.DashLine))
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    painter.drawLine(seat, QPointF(*leds.mean(axis=0)))
+    painter.drawPolygon(_body(leds))
+
+
+def _body(leds: FloatArray) -> QPolygonF:
+    """Return the outline of what holds the LEDs (L, 2)."""
+    corners = cv2.convexHull(leds.astype(np.float32))[:, 0]
+    return QPolygonF([QPointF(x, y) for x, y in corners.tolist()])

@@ -1,0 +1,327 @@
+"""GigE Vision and USB3 Vision cameras through Aravis, without a vendor's software."""
+
+import ctypes
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from ctypes import byref, c_double, c_int, c_int64, c_size_t, c_uint
+from ipaddress import ip_address
+from typing import Any
+
+import numpy as np
+
+from lightpen.cameras.aravis_library import SUCCESS, Aravis, AravisError, load_aravis
+from lightpen.cameras.clock import Clock
+from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_errors import busy, lost, not_found, refused
+from lightpen.cameras.protocol import DeviceNotFound, Range
+from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
+from lightpen.sentences import Sentence, sentence
+
+N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+
+
+class AravisFeatures:
+    """The features of a camera that is open.
+
+    Parameters
+    ----------
+    told : callable
+        Returns what tells of errors in sentences.
+    """
+
+    def __init__(
+        self,
+        aravis: Aravis,
+        camera: int,
+        told: Callable[[], AbstractContextManager[None]],
+    ) -> None:
+        self._aravis = aravis
+        self._camera = camera
+        self._told = told
+        self._device = aravis.camera_get_device(camera)
+
+    def has(self, name: str) -> bool:
+        """Return whether the camera has a feature, and it can be used now."""
+        found: bool = self._call(
+            self._aravis.camera_is_feature_available, name.encode()
+        )
+        return found
+
+    def number(self, name: str) -> float:
+        """Return the value of a number."""
+        aravis = self._aravis
+        is_integer = self._is_integer(name)
+        get = aravis.camera_get_integer if is_integer else aravis.camera_get_float
+        return float(self._call(get, name.encode()))
+
+    def limits(self, name: str) -> Range:
+        """Return the values that a number takes now."""
+        aravis, key = self._aravis, name.encode()
+        if self._is_integer(name):
+            least, most = c_int64(), c_int64()
+            self._call(aravis.camera_get_integer_bounds, key, byref(least), byref(most))
+            step = float(self._call(aravis.camera_get_integer_increment, key))
+            return Range(float(least.value), float(most.value), step)
+        low, high = c_double(), c_double()
+        self._call(aravis.camera_get_float_bounds, key, byref(low), byref(high))
+        return Range(low.value, high.value)
+
+    def set_number(self, name: str, value: float) -> None:
+        """Set a number that is within its limits."""
+        aravis, key = self._aravis, name.encode()
+        if self._is_integer(name):
+            self._call(aravis.camera_set_integer, key, round(value))
+        else:
+            self._call(aravis.camera_set_float, key, float(value))
+
+    def choice(self, name: str) -> str:
+        """Return the entry of an enumeration that is in force."""
+        entry: bytes = self._call(self._aravis.camera_get_string, name.encode())
+        return entry.decode()
+
+    def choices(self, name: str) -> tuple[str, ...]:
+        """Return the entries of an enumeration that can be chosen now."""
+        aravis, n_entries = self._aravis, c_uint()
+        entries = self._call(
+            *(aravis.camera_dup_available_enumerations_as_strings, name.encode()),
+            byref(n_entries),
+        )
+        found = tuple(entries[i].decode() for i in range(n_entries.value))
+        aravis.free(entries)
+        return found
+
+    def choose(self, name: str, entry: str) -> None:
+        """Choose an entry of an enumeration."""
+        self._call(self._aravis.camera_set_string, name.encode(), entry.encode())
+
+    def switch_on(self, name: str) -> None:
+        """Set a truth value."""
+        self._call(self._aravis.camera_set_boolean, name.encode(), 1)
+
+    def execute(self, name: str) -> None:
+        """Execute a command."""
+        self._call(self._aravis.camera_execute_command, name.encode())
+
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        with self._told():
+            return function(self._camera, *arguments)
+
+    def _is_integer(self, name: str) -> bool:
+        node = self._aravis.device_get_feature(self._device, name.encode())
+        found: bool = self._aravis.is_a(node, self._aravis.gc_integer_get_type())
+        return found
+
+
+class AravisDevice:
+    """A camera that Aravis drives.
+
+    Parameters
+    ----------
+    place : str
+        Serial number or address. By an address it is opened without a search, also
+        where the network lets no broadcast through.
+    """
+
+    def __init__(self, place: str) -> None:
+        self._place = self._serial = place
+        self._aravis: Aravis | None = None
+        self._camera: int | None = None
+        self._stream: int | None = None
+        self._features: AravisFeatures | None = None
+        self._is_gone = False
+
+    @property
+    def serial(self) -> str:
+        """Serial number, or the place until it is open."""
+        return self._serial
+
+    @property
+    def features(self) -> AravisFeatures:
+        """The features of the open camera."""
+        assert self._features is not None
+        return self._features
+
+    def open(self) -> None:
+        """Take hold of the camera."""
+        self._is_gone = False
+        try:
+            self._aravis = aravis = load_aravis()
+        except OSError as error:
+            raise DeviceNotFound(_ABSENT) from error
+        name = self._place if _is_address(self._place) else self._searched(aravis)
+        try:
+            self._camera = camera = aravis.camera_new(name.encode())
+        except AravisError as error:
+            raise not_found(self._place, str(error)) from error
+        self._require_control(aravis, camera)
+        with suppress(AravisError):  # not every camera tells its serial number
+            serial = aravis.camera_get_device_serial_number(camera)
+            self._serial = serial.decode("utf-8", "replace") or self._serial
+        self._features = AravisFeatures(aravis, camera, self._told)
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        self._drop_stream()
+        camera, self._camera = self._camera, None
+        self._features = None
+        if self._aravis is not None and camera is not None:
+            self._aravis.unref(camera)
+
+    def start(self) -> None:
+        """Let images come."""
+        aravis, camera = self._open_ones()
+        with self._told():
+            payload = aravis.camera_get_payload(camera)
+            self._stream = stream = aravis.camera_create_stream(camera, None, None)
+            for _ in range(N_BUFFERS):
+                aravis.stream_push_buffer(stream, aravis.buffer_new_allocate(payload))
+            aravis.camera_start_acquisition(camera)
+
+    def stop(self) -> None:
+        """Let no more images come."""
+        aravis, camera = self._open_ones()
+        if not self._is_gone:  # seconds would go by without an answer
+            with suppress(AravisError):
+                aravis.camera_stop_acquisition(camera)
+        self._drop_stream()
+
+    def fetch(self, timeout_s: float) -> Delivery | None:
+        """Return the next image, None where none comes in time."""
+        aravis, stream = self._aravis, self._stream
+        assert aravis is not None
+        buffer = aravis.stream_timeout_pop_buffer(stream, round(timeout_s * 1e6))
+        if buffer is None:
+            return None
+        try:
+            return _delivery(aravis, buffer)
+        finally:
+            aravis.stream_push_buffer(stream, buffer)
+
+    def probe(self) -> None:
+        """Do nothing if the camera answers."""
+        aravis, camera = self._open_ones()
+        with self._told():
+            aravis.camera_get_integer(camera, b"Width")
+        self._require_control(aravis, camera, is_new=False)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Tell what goes wrong in a sentence."""
+        try:
+            yield
+        except AravisError as error:
+            if not error.is_gone:
+                raise refused(self._serial, str(error)) from error
+            self._is_gone = True
+            raise lost(self._serial, str(error)) from error
+
+    def _open_ones(self) -> tuple[Aravis, int]:
+        assert self._aravis is not None
+        assert self._camera is not None
+        return self._aravis, self._camera
+
+    def _drop_stream(self) -> None:
+        stream, self._stream = self._stream, None
+        if self._aravis is not None and stream is not None:
+            self._aravis.unref(stream)
+
+    def _searched(self, aravis: Aravis) -> str:
+        """Return by what Aravis opens the camera with this serial number."""
+        for index in _listed(aravis):
+            known = (
+                aravis.get_device_serial_nbr(index),
+                aravis.get_device_id(index),
+            )
+            if self._place.encode() in known:
+                name: bytes = known[1]
+                return name.decode()
+        raise not_found(self._place)
+
+    def _require_control(
+        self, aravis: Aravis, camera: int, *, is_new: bool = True
+    ) -> None:
+        """Refuse a camera that another program controls."""
+        if not aravis.camera_is_gv_device(camera):
+            return
+        if aravis.gv_device_is_controller(aravis.camera_get_device(camera)):
+            return
+        if not is_new:
+            raise lost(self._serial, "another program controls it")
+        self.close()
+        raise busy(self._place)
+
+
+def _delivery(aravis: Aravis, buffer: int) -> Delivery:
+    number = aravis.buffer_get_frame_id(buffer)
+    if aravis.buffer_get_status(buffer) != SUCCESS:
+        return Delivery(np.zeros(0, np.uint8), 0, 0, number, is_complete=False)
+    size, x_padding, y_padding = c_size_t(), c_int(), c_int()
+    data = aravis.buffer_get_image_data(buffer, byref(size))
+    aravis.buffer_get_image_padding(buffer, byref(x_padding), byref(y_padding))
+    sent = (ctypes.c_uint8 * size.value).from_address(data)
+    return Delivery(
+        np.ctypeslib.as_array(sent).copy(),
+        aravis.buffer_get_image_width(buffer),
+        aravis.buffer_get_image_height(buffer),
+        number,
+        aravis.buffer_get_timestamp(buffer),
+        x_padding.value,
+    )
+
+
+def _is_address(place: str) -> bool:
+    try:
+        ip_address(place)
+    except ValueError:
+        return False
+    return True
+
+
+def _listed(aravis: Aravis) -> range:
+    """Return the numbers of all cameras that answer now."""
+    aravis.update_device_list()
+    return range(aravis.get_n_devices())
+
+
+def _find(producer: str) -> tuple[FoundDevice, ...]:
+    aravis = load_aravis()
+    found = []
+    for index in _listed(aravis):
+        texts = (
+            aravis.get_device_vendor(index),
+            aravis.get_device_model(index),
+            aravis.get_device_serial_nbr(index),
+        )
+        vendor, model, serial = ((t or b"").decode("utf-8", "replace") for t in texts)
+        place = serial or aravis.get_device_id(index).decode("utf-8", "replace")
+        found.append(FoundDevice(place, f"{vendor} {model} ({place})"))
+    return tuple(found)
+
+
+_ABSENT = sentence(
+    "aravis.absent",
+    "Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: "
+    "apt-get install libaravis-0.8-0",
+)
+
+
+def _why_absent() -> Sentence | None:
+    try:
+        load_aravis()
+    except (OSError, AttributeError):
+        return _ABSENT
+    return None
+
+
+def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
+    return DeviceCamera(AravisDevice(place.name), clock)
+
+
+ARAVIS = Source(
+    "aravis",
+    sentence("source.aravis", "GigE and USB3 Vision (Aravis)"),
+    Needs.DEVICE,
+    _camera,
+    _find,
+    _why_absent,
+)

@@ -1,0 +1,324 @@
+"""A real camera behind the one contract, whichever library drives it.
+
+The library is a `Device`: it opens and closes, hands on what arrives, and reaches the
+camera's features. What all cameras share is done here: settings, numbers and times of
+images, their counts, and grey values at full depth.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.features import (
+    EXPOSURES,
+    GAINS,
+    Features,
+    apply_settings,
+    read_caps,
+    read_settings,
+    set_nearest,
+)
+from lightpen.cameras.pixel_formats import Bytes, decoded, pixel_format_named
+from lightpen.cameras.protocol import (
+    EXPOSURE,
+    GAIN,
+    CameraSettings,
+    Caps,
+    ConfigError,
+    Frame,
+    FrameIncomplete,
+    FrameTimeout,
+    Stats,
+    TriggerMode,
+    sealed,
+)
+from lightpen.sentences import Sentence, sentence
+
+SETTLING = 0.4  # s that images with the exposure before may still come
+LAST_SHORT_NUMBER = 65_535  # of GigE Vision 1; 1 follows, as 0 is left out
+MOST_MISSED = 10_000  # at once; a larger gap is a camera that counts anew
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery:
+    """What a library delivers of one image.
+
+    Attributes
+    ----------
+    data : (N,) array
+        A copy of what was sent.
+    number : int
+        By the camera.
+    padding : int
+        Bytes at the end of each row.
+    is_complete : bool
+        Whether all of it arrived.
+    """
+
+    data: Bytes
+    width: int
+    height: int
+    number: int
+    device_ts_ns: int | None = None
+    padding: int = 0
+    is_complete: bool = True
+
+
+class Device(Protocol):
+    """A camera as a library drives it; every call is made by one thread.
+
+    All but `close` may raise `DeviceLost` while it is open.
+    """
+
+    @property
+    def serial(self) -> str:
+        """Serial number, or what else it is looked for by until it is open."""
+
+    @property
+    def features(self) -> Features:
+        """The features of the open camera."""
+
+    def open(self) -> None:
+        """Take hold of the camera.
+
+        Raises
+        ------
+        DeviceNotFound, DeviceBusy
+        """
+
+    def close(self) -> None:
+        """Let go of everything; also of a dead camera, and twice."""
+
+    def start(self) -> None:
+        """Let images come."""
+
+    def stop(self) -> None:
+        """Let no more images come, not even of a dead camera."""
+
+    def fetch(self, timeout_s: float) -> Delivery | None:
+        """Return the next image, None where none comes in time."""
+
+    def probe(self) -> None:
+        """Do nothing if the camera answers."""
+
+
+class DeviceCamera:
+    """A camera that a library drives.
+
+    Parameters
+    ----------
+    device : Device
+        Not open, and nobody else's.
+    """
+
+    def __init__(self, device: Device, clock: Clock | None = None) -> None:
+        self._device = device
+        self._clock = clock or MachineClock()
+        self._caps: Caps | None = None
+        self._settings = CameraSettings()
+        self._is_streaming = False
+        self._stats = Stats()
+        self._next_seq = 0
+        self._last_number: int | None = None  # since the start
+        self._settled_ns = 0
+        self._is_triggered = False
+        self._next_trigger_ns = 0
+
+    @property
+    def serial(self) -> str:
+        """Serial number of the device, or what else it is found by."""
+        return self._device.serial
+
+    @property
+    def caps(self) -> Caps:
+        """What the camera can do with the settings that are in force."""
+        if self._caps is None:
+            raise ValueError("The camera is not open: call `open` first.")
+        return self._caps
+
+    def open(self) -> None:
+        """Find the camera and take hold of it; nothing if it is open."""
+        if self._caps is None:
+            self._device.open()
+            self._refresh()
+
+    def close(self) -> None:
+        """Stop and let go of the camera."""
+        self.stop()
+        self._caps = None
+        self._device.close()
+
+    def configure(self, settings: CameraSettings) -> CameraSettings:
+        """Set up the camera before the start; return what is in force."""
+        self._check_open()
+        if self._is_streaming:
+            raise ValueError("`configure` needs a stopped camera.")
+        apply_settings(self._device.features, settings)
+        self._refresh()
+        return self._settings
+
+    def set_exposure(self, exposure_us: float) -> float:
+        """Set the exposure, also while images come; return what is in force, us."""
+        applied = self._set(EXPOSURES, exposure_us)
+        if applied is None:
+            raise _cannot_be_set(EXPOSURE)
+        self._settings = replace(self._settings, exposure_us=applied)
+        return applied
+
+    def set_gain(self, gain_db: float) -> float:
+        """Set the gain, also while images come; return what is in force, dB."""
+        applied = self._set(GAINS, gain_db)
+        if applied is None:
+            raise _cannot_be_set(GAIN)
+        self._settings = replace(self._settings, gain_db=applied)
+        return applied
+
+    def start(self) -> None:
+        """Let images come; nothing if they do."""
+        self._check_open()
+        if self._is_streaming:
+            return
+        self._device.start()
+        self._is_streaming = True
+        self._last_number = None
+        self._is_triggered = False
+        self._next_trigger_ns = self._settled_ns = self._clock.now_ns()
+
+    def stop(self) -> None:
+        """Let no more images come; nothing if none do."""
+        if self._is_streaming:
+            self._is_streaming = False
+            self._device.stop()
+
+    def read(self, timeout_s: float) -> Frame:
+        """Return the next complete image."""
+        self._check_open()
+        if not self._is_streaming:
+            raise ValueError("The camera delivers no images: call `start` first.")
+        delivery = self._fetch(timeout_s)
+        if delivery is None:
+            self._stats = replace(self._stats, timeouts=self._stats.timeouts + 1)
+            raise FrameTimeout(
+                sentence(
+                    "camera.no-image",
+                    "The camera {serial} sent no image for {waited:.1f} s. Check its "
+                    "cable and its trigger.",
+                    serial=self.serial,
+                    waited=timeout_s,
+                )
+            )
+        seq = self._seq(delivery.number)
+        if not self._is_whole(delivery):
+            self._stats = replace(self._stats, incomplete=self._stats.incomplete + 1)
+            raise FrameIncomplete(
+                sentence(
+                    "camera.incomplete",
+                    "Image {seq} of the camera {serial} arrived incomplete and was "
+                    "left out. Check the cable and the network.",
+                    seq=seq,
+                    serial=self.serial,
+                )
+            )
+        self._stats = replace(self._stats, delivered=self._stats.delivered + 1)
+        return self._frame(delivery, seq)
+
+    def probe(self) -> None:
+        """Do nothing if the camera answers."""
+        self._check_open()
+        self._device.probe()
+
+    def stats(self) -> Stats:
+        """Return what became of the images so far."""
+        return self._stats
+
+    def _check_open(self) -> None:
+        if self._caps is None:
+            raise ValueError("The camera is not open: call `open` first.")
+
+    def _refresh(self) -> None:
+        features = self._device.features
+        self._caps = replace(read_caps(features), has_link=True)
+        self._settings = read_settings(features, self._caps)
+
+    def _set(self, names: tuple[str, ...], value: float) -> float | None:
+        self._check_open()
+        self._settled_ns = self._clock.now_ns() + round(SETTLING * 1e9)
+        return set_nearest(self._device.features, names, value)
+
+    def _fetch(self, timeout_s: float) -> Delivery | None:
+        if self._settings.trigger is not TriggerMode.SOFTWARE:
+            return self._device.fetch(timeout_s)
+        if not self._is_triggered:
+            wait_s = (self._next_trigger_ns - self._clock.now_ns()) * 1e-9
+            self._clock.wait(min(wait_s, timeout_s))
+            if wait_s > timeout_s:
+                return None
+            rate = self._settings.frame_rate
+            period_ns = round(1e9 / rate) if rate else 0
+            self._next_trigger_ns = self._clock.now_ns() + period_ns
+            self._device.features.execute("TriggerSoftware")
+            timeout_s -= max(wait_s, 0.0)
+        delivery = self._device.fetch(max(timeout_s, 0.0))
+        self._is_triggered = delivery is None and timeout_s < 1.0
+        return delivery
+
+    def _seq(self, number: int) -> int:
+        """Return the number of an image over the life of the camera."""
+        last, self._last_number = self._last_number, number
+        step = 1
+        if last is not None:
+            step = number - last
+            if step <= 0 and last <= LAST_SHORT_NUMBER:
+                step += LAST_SHORT_NUMBER
+            if not 0 < step <= MOST_MISSED:
+                step = 1
+        self._stats = replace(self._stats, missed=self._stats.missed + step - 1)
+        seq = self._next_seq + step - 1
+        self._next_seq = seq + 1
+        return seq
+
+    def _is_whole(self, delivery: Delivery) -> bool:
+        """Return whether an image is all there, whatever the library says of it."""
+        pixel_format = pixel_format_named(self._settings.pixel_format or "")
+        caps = self.caps
+        return (
+            delivery.is_complete
+            and pixel_format is not None
+            and (delivery.width, delivery.height) == (caps.width, caps.height)
+            and len(delivery.data)
+            >= pixel_format.size(caps.width, caps.height, delivery.padding)
+        )
+
+    def _frame(self, delivery: Delivery, seq: int) -> Frame:
+        pixel_format = pixel_format_named(self._settings.pixel_format or "")
+        assert pixel_format is not None
+        now_ns = self._clock.now_ns()
+        is_settled = now_ns >= self._settled_ns
+        return Frame(
+            image=sealed(
+                decoded(
+                    delivery.data,
+                    delivery.width,
+                    delivery.height,
+                    pixel_format,
+                    delivery.padding,
+                )
+            ),
+            seq=seq,
+            host_ts_ns=now_ns,
+            device_ts_ns=delivery.device_ts_ns,
+            exposure_us=self._settings.exposure_us if is_settled else None,
+            gain_db=self._settings.gain_db if is_settled else None,
+            pixel_format=pixel_format.name,
+            bits=pixel_format.bits,
+        )
+
+
+def _cannot_be_set(what: Sentence) -> ConfigError:
+    return ConfigError(
+        sentence(
+            "camera.cannot-be-set",
+            "The {what} of this camera cannot be set. Use the aperture of the lens.",
+            what=what,
+        )
+    )

@@ -1,0 +1,98 @@
+"""The features of a camera through GenApi, as Harvesters and pypylon both have it."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from typing import Any
+
+from lightpen.cameras.protocol import Range
+
+WRITE_ONLY, READ_WRITE = 2, 4  # of EAccessMode; a command is write-only
+
+
+class GenapiFeatures:
+    """The features of an open camera.
+
+    Parameters
+    ----------
+    find : callable
+        Returns a node by its name, None where there is no such.
+    spell : callable
+        Returns the name of an attribute of a node as this library spells it.
+    access : callable
+        Returns how a node can be accessed.
+    told : callable
+        Returns what tells of refusals in sentences.
+    """
+
+    def __init__(
+        self,
+        find: Callable[[str], Any],
+        spell: Callable[[str], str],
+        access: Callable[[Any], int],
+        told: Callable[[], AbstractContextManager[None]],
+    ) -> None:
+        self._find = find
+        self._spell = spell
+        self._access = access
+        self._told = told
+
+    def has(self, name: str) -> bool:
+        """Return whether the camera has a feature, and it can be used now."""
+        with self._told():
+            node = self._find(name)
+            return node is not None and self._access(node) in (WRITE_ONLY, READ_WRITE)
+
+    def number(self, name: str) -> float:
+        """Return the value of a number."""
+        return float(self._read(name, "value"))
+
+    def limits(self, name: str) -> Range:
+        """Return the values that a number takes now."""
+        low, high = self._read(name, "min"), self._read(name, "max")
+        # What a float is rounded to is seen when it is read back.
+        step = self._read(name, "inc") if isinstance(low, int) else 0.0
+        return Range(float(low), float(high), float(step))
+
+    def set_number(self, name: str, value: float) -> None:
+        """Set a number that is within its limits."""
+        is_integer = isinstance(self._read(name, "value"), int)
+        self._write(name, round(value) if is_integer else float(value))
+
+    def choice(self, name: str) -> str:
+        """Return the entry of an enumeration that is in force."""
+        return str(self._read(name, "value"))
+
+    def choices(self, name: str) -> tuple[str, ...]:
+        """Return the entries of an enumeration that can be chosen now."""
+        return tuple(map(str, self._read(name, "symbolics")))
+
+    def choose(self, name: str, entry: str) -> None:
+        """Choose an entry of an enumeration."""
+        self._write(name, entry)
+
+    def switch_on(self, name: str) -> None:
+        """Set a truth value."""
+        self._write(name, True)
+
+    def execute(self, name: str) -> None:
+        """Execute a command."""
+        with self._told():
+            getattr(self._find(name), self._spell("execute"))()
+
+    def _read(self, name: str, what: str) -> Any:
+        with self._told():
+            return getattr(self._find(name), self._spell(what))
+
+    def _write(self, name: str, value: float | str | bool) -> None:
+        with self._told():
+            setattr(self._find(name), self._spell("value"), value)
+
+
+def refusals(genapi: Any) -> tuple[type[Exception], ...]:
+    """Return what GenApi raises where a camera answers, but not as it was asked to."""
+    return (
+        genapi.AccessException,
+        genapi.InvalidArgumentException,
+        genapi.LogicalErrorException,
+        genapi.OutOfRangeException,
+    )

@@ -1,0 +1,269 @@
+"""Cameras of any vendor through GenICam, with the vendor's GenTL producer.
+
+A producer is a file ``.cti`` that comes with the software of a camera. Harvesters runs
+it. Its quirks, each seen: it passes over producers that do not load; its waiting call
+keeps every other thread of Python from running; `update` ends a stream that runs; and a
+harvester that lost its camera finds it no more.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lightpen.cameras.clock import Clock
+from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_errors import busy, in_sentences, not_found
+from lightpen.cameras.genapi_features import GenapiFeatures, refusals
+from lightpen.cameras.protocol import DeviceNotFound
+from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
+from lightpen.formats.files import printable
+from lightpen.sentences import Sentence, sentence
+
+PRODUCERS = "GENICAM_GENTL64_PATH"  # folders, as the GenTL standard names them
+SUFFIX = ".cti"
+N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+POLL = 0.002  # s that a call may keep the other threads waiting
+PAUSE = 0.003  # s between two of them
+
+
+class GenicamDevice:
+    """A camera that a GenTL producer drives."""
+
+    def __init__(self, place: SourcePlace) -> None:
+        self._place = place
+        self._harvester: Any = None
+        self._acquirer: Any = None
+        self._features: GenapiFeatures | None = None
+
+    @property
+    def serial(self) -> str:
+        """Serial number, or what else the producer names the camera by."""
+        return self._place.name
+
+    @property
+    def features(self) -> GenapiFeatures:
+        """The features of the open camera."""
+        assert self._features is not None
+        return self._features
+
+    def open(self) -> None:
+        """Take hold of the camera."""
+        if not _is_installed():
+            raise DeviceNotFound(_ABSENT)
+        from genicam import gentl
+
+        self._harvester = harvester = _harvester(self._place.producer)
+        name = self._place.name
+        try:
+            indices = [
+                index
+                for index, info in enumerate(harvester.device_info_list)
+                if name in (info.serial_number, info.id_)
+            ]
+            if not indices:
+                raise not_found(name)
+            self._acquirer = acquirer = harvester.create(indices[0])
+        except (
+            gentl.ResourceInUseException,
+            gentl.AccessDeniedException,
+            gentl.BusyException,
+        ) as error:
+            self.close()
+            raise busy(name) from error
+        except gentl.GenericException as error:
+            self.close()
+            raise not_found(name, str(error)) from error
+        except DeviceNotFound:
+            self.close()
+            raise
+        acquirer.num_buffers = max(N_BUFFERS, acquirer.min_num_buffers)
+        nodes = acquirer.remote_device.node_map
+        self._features = GenapiFeatures(
+            lambda key: nodes.get_node(key) if nodes.has_node(key) else None,
+            lambda attribute: attribute,
+            lambda node: int(node.get_access_mode()),
+            partial(_told, name),
+        )
+
+    def close(self) -> None:
+        """Let go of the camera and the producer."""
+        self._features = None
+        acquirer, self._acquirer = self._acquirer, None
+        harvester, self._harvester = self._harvester, None
+        if acquirer is not None:
+            _quietly(acquirer.stop)
+            _quietly(acquirer.destroy)
+        if harvester is not None:
+            _quietly(harvester.reset)
+
+    def start(self) -> None:
+        """Let images come."""
+        with _told(self.serial):
+            self._acquirer.start()
+
+    def stop(self) -> None:
+        """Let no more images come."""
+        _quietly(self._acquirer.stop)
+
+    def fetch(self, timeout_s: float) -> Delivery | None:
+        """Return the next image, None where none comes in time."""
+        end = time.monotonic() + timeout_s
+        with _told(self.serial):
+            while (buffer := self._acquirer.try_fetch(timeout=POLL)) is None:
+                if time.monotonic() >= end:
+                    return None
+                time.sleep(PAUSE)
+            with buffer:
+                return _delivery(buffer.module)
+
+    def probe(self) -> None:
+        """Do nothing if the camera answers."""
+        self.features.number("Width")
+
+
+def _delivery(module: Any) -> Delivery:
+    from genicam import gentl
+
+    try:
+        device_ts_ns = module.timestamp_ns
+    except gentl.GenericException:  # not every producer has one
+        device_ts_ns = None
+    size = module.size_filled - module.image_offset
+    sent = np.frombuffer(module.raw_buffer, np.uint8, size, module.image_offset)
+    return Delivery(
+        sent.copy(),
+        module.width,
+        module.height,
+        module.frame_id,
+        device_ts_ns,
+        module.padding_x,
+        module.is_complete(),
+    )
+
+
+def _told(serial: str) -> AbstractContextManager[None]:
+    from genicam import genapi, gentl
+
+    losses = (genapi.GenericException, gentl.GenericException)
+    return in_sentences(serial, refusals(genapi), losses)
+
+
+def _quietly(act: Callable[[], object]) -> None:
+    """Do something with a camera that may be dead."""
+    from genicam import genapi, gentl
+
+    with suppress(genapi.GenericException, gentl.GenericException):
+        act()
+
+
+def _harvester(producer: str) -> Any:
+    """Return a harvester that knows the cameras of a producer, or of the system's.
+
+    Raises
+    ------
+    DeviceNotFound
+        There is no producer, or none of them loads.
+    """
+    from harvesters.core import Harvester
+
+    files = [Path(producer)] if producer else _producers()
+    if not files:
+        raise DeviceNotFound(
+            sentence(
+                "genicam.no-producer",
+                "No GenTL producer is installed: {variable} names no folder with a "
+                "file {suffix}. Install the software of the camera, or open its "
+                "file {suffix}.",
+                variable=PRODUCERS,
+                suffix=SUFFIX,
+            )
+        )
+    refusals = [_refusal(file) for file in files]
+    harvester = Harvester()
+    for file, refusal in zip(files, refusals, strict=True):
+        if refusal is None:
+            harvester.add_file(str(file))
+    if not harvester.files:
+        raise DeviceNotFound(
+            sentence(
+                "genicam.does-not-load",
+                "The GenTL producer {file} does not load: {why}. Choose the producer "
+                "of this camera, for this system and 64 bit.",
+                file=printable(str(files[0])),
+                why=refusals[0] or "",
+            )
+        )
+    harvester.update()
+    return harvester
+
+
+def _refusal(producer: Path) -> str | None:
+    """Return why a producer does not load; None where it does."""
+    from genicam import gentl
+
+    library = gentl.GenTLProducer.create_producer()
+    try:
+        library.open(str(producer))
+    except gentl.GenericException as error:
+        return str(error)
+    library.close()
+    return None
+
+
+def _producers() -> list[Path]:
+    """Return the producers that the system names."""
+    folders = [Path(each) for each in os.environ.get(PRODUCERS, "").split(os.pathsep)]
+    return sorted(
+        file for folder in folders if folder.name for file in folder.glob(f"*{SUFFIX}")
+    )
+
+
+def _find(producer: str) -> tuple[FoundDevice, ...]:
+    harvester = _harvester(producer)
+    found = tuple(
+        FoundDevice(
+            info.serial_number or info.id_,
+            f"{info.vendor} {info.model} ({info.serial_number or info.id_})",
+        )
+        for info in harvester.device_info_list
+    )
+    _quietly(harvester.reset)
+    return found
+
+
+_ABSENT = sentence(
+    "genicam.absent",
+    "Harvesters is not installed. With the GenTL producer of its vendor it drives any "
+    "GenICam camera: {python} -m pip install harvesters genicam",
+    python=sys.executable,
+)
+
+
+def _is_installed() -> bool:
+    return bool(find_spec("harvesters") and find_spec("genicam"))
+
+
+def _why_absent() -> Sentence | None:
+    return None if _is_installed() else _ABSENT
+
+
+def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
+    return DeviceCamera(GenicamDevice(place), clock)
+
+
+GENICAM = Source(
+    "genicam",
+    sentence("source.genicam", "GenICam with a vendor's GenTL producer"),
+    Needs.DEVICE_AND_PRODUCER,
+    _camera,
+    _find,
+    _why_absent,
+)

@@ -1,0 +1,156 @@
+"""Webcams through OpenCV, to try the program with: they lose images without a word."""
+
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from lightpen.cameras.clock import Clock
+from lightpen.cameras.device_camera import Delivery, DeviceCamera
+from lightpen.cameras.device_errors import lost, not_found, refused
+from lightpen.cameras.protocol import Range
+from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
+from lightpen.sentences import sentence
+
+LISTED = Path("/sys/class/video4linux")
+N_TRIED = 4  # where the system lists no cameras
+
+
+class WebcamFeatures:
+    """What is told of a webcam; nothing of it is set in units that mean anything."""
+
+    def __init__(self, first: cv2.typing.MatLike, place: str) -> None:
+        self._numbers = {"Width": first.shape[1], "Height": first.shape[0]}
+        self._format = "Mono8" if first.ndim == 2 else "BGR8"
+        self._place = place
+
+    def has(self, name: str) -> bool:
+        """Return False."""
+        return False
+
+    def number(self, name: str) -> float:
+        """Return the size of the images."""
+        return float(self._numbers[name])
+
+    def limits(self, name: str) -> Range:
+        """Return the size of the images."""
+        return Range(self.number(name), self.number(name))
+
+    def choice(self, name: str) -> str:
+        """Return the pixel format."""
+        return self._format
+
+    def choices(self, name: str) -> tuple[str, ...]:
+        """Return the pixel format."""
+        return (self._format,)
+
+    def set_number(self, name: str, value: float) -> None:
+        """Refuse."""
+        raise refused(self._place, name)
+
+    def choose(self, name: str, entry: str) -> None:
+        """Take the only pixel format there is."""
+
+    def switch_on(self, name: str) -> None:
+        """Refuse."""
+        raise refused(self._place, name)
+
+    def execute(self, name: str) -> None:
+        """Refuse."""
+        raise refused(self._place, name)
+
+
+class WebcamDevice:
+    """A webcam by its number, or whatever else OpenCV opens by a name."""
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+        self._capture: cv2.VideoCapture | None = None
+        self._features: WebcamFeatures | None = None
+        self._n_read = 0
+
+    @property
+    def serial(self) -> str:
+        """Number; what sets two webcams apart is where they are plugged in."""
+        return self._place
+
+    @property
+    def features(self) -> WebcamFeatures:
+        """What is told of the open camera."""
+        assert self._features is not None
+        return self._features
+
+    def open(self) -> None:
+        """Take hold of the camera."""
+        place = self._place
+        self._capture = capture = (
+            cv2.VideoCapture(int(place))
+            if place.isdecimal()
+            else cv2.VideoCapture(place)
+        )
+        is_read, first = capture.read()
+        if not is_read:
+            self.close()
+            raise not_found(place)
+        self._features = WebcamFeatures(first, place)
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        capture, self._capture = self._capture, None
+        if capture is not None:
+            capture.release()
+
+    def start(self) -> None:
+        """Do nothing: images come as soon as it is open."""
+
+    def stop(self) -> None:
+        """Do nothing."""
+
+    def fetch(self, timeout_s: float) -> Delivery | None:
+        """Return the next image, however long it takes."""
+        assert self._capture is not None
+        is_read, image = self._capture.read()
+        if not is_read:
+            raise lost(self._place, "it sends no image")
+        self._n_read += 1
+        height, width = image.shape[:2]
+        data = np.asarray(image, np.uint8).reshape(-1)
+        return Delivery(data, width, height, self._n_read)
+
+    def probe(self) -> None:
+        """Do nothing: `fetch` tells."""
+
+
+def _find(producer: str) -> tuple[FoundDevice, ...]:
+    if sys.platform == "linux":
+        folders = sorted(LISTED.glob("video*")) if LISTED.is_dir() else []
+        return tuple(
+            FoundDevice(folder.name.removeprefix("video"), _name(folder))
+            for folder in folders
+            if (folder / "index").read_text().strip() == "0"  # others hold no images
+        )
+    found = []
+    for number in range(N_TRIED):
+        capture = cv2.VideoCapture(number)
+        if capture.isOpened():
+            found.append(FoundDevice(str(number), str(number)))
+        capture.release()
+    return tuple(found)
+
+
+def _name(folder: Path) -> str:
+    return f"{(folder / 'name').read_text().strip()} ({folder.name})"
+
+
+def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:
+    return DeviceCamera(WebcamDevice(place.name), clock)
+
+
+WEBCAM = Source(
+    "webcam",
+    sentence("source.webcam", "Webcam, to try it"),
+    Needs.DEVICE,
+    _camera,
+    _find,
+)

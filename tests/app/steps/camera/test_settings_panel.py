@@ -1,0 +1,116 @@
+"""The settings of a camera: what it offers is shown, what is changed is asked for."""
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    Caps,
+    Range,
+    Region,
+    RegionLimits,
+    Stats,
+    TriggerMode,
+)
+from lightpen_app.look.theme import Tone
+from lightpen_app.steps.camera.setting_field import SettingField
+from lightpen_app.steps.camera.settings_panel import ChoiceField, SettingsPanel
+from lightpen_app.widgets.push_button import PushButton
+
+CAPS = Caps(
+    width=640,
+    height=480,
+    pixel_formats=("Mono8", "Mono12", "BayerRG8"),
+    frame_rate=Range(0.5, 60),
+    packet_size=Range(220, 16_000, 4),
+    regions=RegionLimits(Range(8, 2448, 8), Range(8, 2048, 8), 4, 4),
+    triggers=tuple(TriggerMode),
+    has_link=True,
+)
+SETTINGS = CameraSettings(
+    frame_rate=20.0,
+    pixel_format="Mono8",
+    region=Region(4, 8, 640, 480),
+    trigger=TriggerMode.FREE,
+    packet_size=1500,
+)
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> SettingsPanel:
+    panel = SettingsPanel()
+    qtbot.addWidget(panel)
+    panel.set_camera(CAPS, SETTINGS)
+    return panel
+
+
+def field(panel: SettingsPanel, name: str) -> SettingField:
+    fields = panel.findChildren(SettingField)
+    return next(each for each in fields if each.accessibleName() == name)
+
+
+def asked(
+    qtbot: QtBot, panel: SettingsPanel, name: str, value: float
+) -> CameraSettings:
+    with qtbot.waitSignal(panel.settings_changed) as signal:
+        field(panel, name).setValue(value)
+    settings: CameraSettings = signal.args[0]
+    return settings
+
+
+def test_the_ranges_are_those_of_the_camera(panel: SettingsPanel) -> None:
+    rate, width = field(panel, "Frame rate"), field(panel, "Region width")
+
+    assert (rate.minimum(), rate.maximum(), rate.value()) == (0.5, 60, 20)
+    assert (width.minimum(), width.maximum(), width.value()) == (8, 2448, 640)
+    assert field(panel, "Region from left").maximum() == 2448 - 640
+
+
+def test_each_change_asks_for_nothing_else(qtbot: QtBot, panel: SettingsPanel) -> None:
+    assert asked(qtbot, panel, "Frame rate", 30) == CameraSettings(frame_rate=30)
+    assert asked(qtbot, panel, "Packet size", 9000) == CameraSettings(packet_size=9000)
+    wider = asked(qtbot, panel, "Region width", 800)
+    assert wider == CameraSettings(region=Region(4, 8, 800, 480))
+
+
+def test_one_button_takes_the_whole_sensor(qtbot: QtBot, panel: SettingsPanel) -> None:
+    (whole,) = panel.findChildren(PushButton)
+    with qtbot.waitSignal(panel.settings_changed) as signal:
+        whole.click()
+
+    assert signal.args[0] == CameraSettings(region=Region(0, 0, 2448, 2048))
+
+
+def test_a_colour_format_comes_with_the_hint_that_grey_is_better(
+    panel: SettingsPanel,
+) -> None:
+    assert panel.hint().text == ""
+    panel.set_camera(CAPS, CameraSettings(pixel_format="BayerRG8"))
+
+    assert "monochrome" in panel.hint().text
+    assert panel.hint().tone is Tone.WARN
+
+
+def test_formats_and_triggers_are_chosen_by_name(
+    qtbot: QtBot, panel: SettingsPanel
+) -> None:
+    formats, triggers = panel.findChildren(ChoiceField)
+    with qtbot.waitSignal(panel.settings_changed) as signal:
+        formats.activated.emit(formats.findText("Mono12"))
+    assert signal.args[0] == CameraSettings(pixel_format="Mono12")
+    with qtbot.waitSignal(panel.settings_changed) as signal:
+        triggers.activated.emit(triggers.findText("By software"))
+    assert signal.args[0] == CameraSettings(trigger=TriggerMode.SOFTWARE)
+
+
+def test_what_became_of_the_images_is_counted(panel: SettingsPanel) -> None:
+    panel.set_stats(Stats(delivered=812, incomplete=3, missed=2, skipped=1))
+
+    for words in ("delivered: 812", "incomplete: 3", "missed: 2", "skipped: 1"):
+        assert words in panel.counts()
+
+
+def test_recorded_images_have_nothing_to_set(panel: SettingsPanel) -> None:
+    panel.set_camera(Caps(80, 60, ("Mono8",), n_images=4), CameraSettings())
+
+    assert panel.isHidden()

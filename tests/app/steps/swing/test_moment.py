@@ -1,0 +1,111 @@
+"""What the operator is told, moment by moment."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from lightpen.estimation.verdict import Grade, Verdict
+from lightpen.messages import PEN_LOST, tip_is_good
+from lightpen.model.limits import SwingLimits
+from lightpen.simulator.swings import paper_camera, paper_pen
+from lightpen.swing.shortfall import measure_shortfall
+from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState, start_swing
+from lightpen_app.steps.swing.moment import Moment, SwingWords, in_true_steps
+from lightpen_app.widgets.sign_label import Remark
+
+SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
+PASSED = Verdict(Grade.PASS, tip_is_good(0.001))
+
+
+@pytest.fixture
+def words(qapp: QApplication) -> SwingWords:
+    return SwingWords()
+
+
+def moment(state: SwingState, **more: object) -> Moment:
+    short = measure_shortfall(SETUP, state)
+    return replace(Moment(SETUP, state, short), **more)  # type: ignore[arg-type]
+
+
+def at_verdict(**more: object) -> Moment:
+    state = replace(start_swing(SETUP), phase=Phase.VERDICT, message=PASSED.reason)
+    return moment(state, verdict=PASSED, **more)
+
+
+def test_after_the_verdict_the_dial_shows_how_far_from_upright_the_pen_is(
+    words: SwingWords,
+) -> None:
+    value = words.operator_value(at_verdict())
+
+    assert "upright and still" in value.hint
+    assert value.dial is not None
+    assert value.dial.target is not None
+    assert value.dial.target.tilt == 0.0
+    assert value.keys == "Enter: see the review"
+
+
+RECORDING = replace(SETUP, is_recording=True)
+
+
+@pytest.mark.parametrize(
+    "why", [{"setup": RECORDING}, {"is_away": True}, {"is_accepted": True}]
+)
+def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
+    words: SwingWords, why: dict[str, object]
+) -> None:
+    value = words.operator_value(at_verdict(stillness=0.5, **why))
+
+    assert "upright" not in value.hint
+    assert value.state.fraction is None
+    assert value.dial is not None
+    assert value.dial.target is None
+
+
+def test_without_a_swing_nothing_is_wrong_on_the_other_steps(words: SwingWords) -> None:
+    value = words.resting_value()
+
+    assert value.instruction == "No swing yet"
+    assert value.state.word == "WAITING"
+
+
+def test_a_lost_pen_is_not_said_to_show_its_leds(words: SwingWords) -> None:
+    paused = replace(
+        start_swing(SETUP), phase=Phase.PAUSED, pause=Pause.LOST, message=PEN_LOST
+    )
+
+    lost = words.operator_value(moment(paused, seen="10 of 10 LEDs"))
+    lifted = replace(paused, pause=Pause.LIFTED)
+
+    assert (lost.state.word, lost.state.detail) == ("PEN LOST", "")
+    shown = words.operator_value(moment(lifted, seen="10 of 10 LEDs"))
+    assert shown.state.detail == "10 of 10 LEDs"
+
+
+def test_images_to_go_are_told_in_true_steps() -> None:
+    told = [in_true_steps(n_more) for n_more in (0, 1, 9, 10, 11, 16, 30, 31, 47, 240)]
+
+    assert told == [0, 1, 9, 10, 15, 20, 30, 40, 50, 240]
+
+
+def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -> None:
+    state = start_swing(SETUP)
+    vague = replace(state.kept.reached, uncertainty=0.02, floor=0.0042)
+    state = replace(state, kept=replace(state.kept, reached=vague))
+    setup = replace(SETUP, limits=SwingLimits(max_uncertainty=0.002))
+
+    told = words.warning(replace(moment(state), setup=setup))
+
+    assert "cannot get below 4.2 \N{MICRO SIGN}m with this LED file" in told.text
+    assert words.warning(moment(state)) == Remark()
+
+
+def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
+    value = words.stand(at_verdict())
+
+    assert value is not None
+    assert value.target is not None
+    np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
+    nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
+    assert words.stand(replace(at_verdict(), setup=nobody)) is None

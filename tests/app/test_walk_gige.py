@@ -1,0 +1,111 @@
+"""A whole calibration with images that come over GigE Vision, to the accepted tip."""
+
+import shutil
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tests.gige_simulator import ADDRESS, GigeSimulator
+from typing_extensions import override
+
+from lightpen.arrays import Image
+from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.protocol import CameraSettings, Region
+from lightpen.live.sources import Surroundings
+from lightpen.model.origin import Origin
+from lightpen.record.reading import open_record
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.follower import Follower
+from lightpen.simulator.scene_files import write_sample_files
+from lightpen.simulator.scenes import Scene
+from lightpen_app.work.settings import Settings, Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard
+
+SPEED = 4  # times as fast as a clock on the wall
+FRAME_RATE = 40.0
+
+
+class QuickClock(MachineClock):
+    """The machine's clock, running fast."""
+
+    is_real = True
+
+    @override
+    def now_ns(self) -> int:
+        return SPEED * time.monotonic_ns()
+
+
+def test_a_calibration_over_gige_vision_ends_in_an_accepted_tip(
+    gige: GigeSimulator,
+    small_scene: Scene,
+    settings: Settings,
+    open_wizard: "OpenWizard",
+    tmp_path: Path,
+) -> None:
+    scene, clock = small_scene, QuickClock()
+    rendered = SimulatedCamera(scene, clock)
+    rendered.open()
+    rendered.configure(CameraSettings(frame_rate=200.0))
+    rendered.start()
+
+    def seen(exposure_us: float, gain: int) -> Image:
+        rendered.set_exposure(exposure_us)
+        return rendered.read(1.0).image
+
+    gige.serve(seen)
+    files = write_sample_files(scene, tmp_path / "files")
+    measured = tmp_path / "measured"  # as for a real pen, without the simulator's mark
+    measured.mkdir()
+    camera_file = shutil.copy(files.camera, measured)
+    pen_file = shutil.copy(files.pen, measured)
+    region = Region(0, 0, *scene.camera.image_size)
+    settings.set_camera(
+        "LP01", CameraSettings(1000.0, None, FRAME_RATE, "Mono8", region, None, 16_000)
+    )
+    settings.set_station(
+        "Hall 2",
+        Station(
+            *("Ann", "LP-04", "T-10", "C-1", 10.0),
+            source="aravis",
+            source_place=ADDRESS,
+            camera_file=str(camera_file),
+            pen_file=str(pen_file),
+            max_uncertainty=0.02,
+            min_images=15,
+            max_images=80,
+        ),
+    )
+    settings.set_last_station("Hall 2")
+
+    walker = open_wizard(Surroundings(scene, clock))
+    rendered.operator.seat()
+    walker.click("Continue to the camera")
+    walker.until_tells("10 of 10 LEDs")
+    assert walker.tells("Fits the live images: 1224 x 1024")
+    assert walker.tells("incomplete: 0")
+    walker.click("Continue to the LEDs")
+    walker.until(walker.main_button().isEnabled)
+    walker.click("Continue to the swing")
+    walker.workbench.run.follower = Follower(rendered.operator)
+    walker.until(lambda: walker.says("Review"))
+    walker.workbench.run.follower = None
+    walker.until(lambda: walker.workbench.run.status.solution is not None)
+    if walker.title() != "Review":
+        walker.until(walker.main_button().isEnabled)
+        walker.click("Review")
+    walker.until(walker.main_button().isEnabled)
+    walker.click("Accept")
+    walker.until_says("IN FORCE")
+
+    result = walker.workbench.run.status.result
+    assert result is not None
+    error = np.abs(result.tip_pen - scene.tip_pen)
+    assert (error < 0.03).all()  # U is 0.02 mm at most
+    assert result.origin is Origin.LIVE
+    record = open_record(Path(result.record))
+    assert record.header.settings["camera_serial"] == "LP01"
+    assert record.header.settings["pixel_format"] == "Mono8"
+    assert record.stats.delivered >= len(record.images)

@@ -1,0 +1,54 @@
+"""A link that loses images, or carries fewer than are set, is told once."""
+
+import pytest
+
+from lightpen.cameras.link_watch import WATCHED, LinkWatch
+from lightpen.cameras.protocol import CameraFailure, CameraSettings, Stats, TriggerMode
+
+AT_20 = CameraSettings(frame_rate=20.0, trigger=TriggerMode.FREE)
+
+
+def told(
+    later: Stats, settings: CameraSettings = AT_20, seconds: float = WATCHED
+) -> CameraFailure | None:
+    """Return what is told when the counts have come to this after a while."""
+    watch, trouble = LinkWatch().after(Stats(delivered=7), 100.0, settings)
+    assert trouble is None
+    return watch.after(later, 100.0 + seconds, settings)[1]
+
+
+def test_a_link_that_carries_all_is_not_told_of() -> None:
+    assert told(Stats(delivered=67)) is None
+    assert told(Stats(delivered=66, missed=1)) is None
+
+
+@pytest.mark.parametrize("lost", [Stats(57, 10), Stats(57, 0, 10), Stats(57, 4, 6)])
+def test_images_that_get_lost_are_told_with_what_to_do(lost: Stats) -> None:
+    trouble = told(lost)
+
+    assert "loses images: of 60" in str(trouble)
+    assert "Lower the frame rate" in str(trouble)
+
+
+def test_a_frame_rate_that_is_not_reached_is_told() -> None:
+    assert "sends 10.0 images a second, not the 20.0" in str(told(Stats(37)))
+
+
+def test_a_triggered_camera_need_not_reach_its_rate() -> None:
+    assert told(Stats(37), CameraSettings(None, None, 20.0, None, None)) is not None
+    triggered = CameraSettings(frame_rate=20.0, trigger=TriggerMode.SOFTWARE)
+
+    assert told(Stats(37), triggered) is None
+
+
+def test_nothing_is_told_before_enough_was_seen() -> None:
+    assert told(Stats(7, 5), seconds=WATCHED / 2) is None
+
+
+def test_a_trouble_is_told_once() -> None:
+    watch, _ = LinkWatch().after(Stats(), 0.0, AT_20)
+    watch, first = watch.after(Stats(50, 10), WATCHED, AT_20)
+    watch, second = watch.after(Stats(100, 20), 2 * WATCHED, AT_20)
+
+    assert first is not None
+    assert second is None

@@ -1,0 +1,135 @@
+"""The table of sources: each says what it lacks, and why it cannot be opened."""
+
+import ctypes
+import os
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+import pytest
+
+from lightpen.cameras import aravis_library, basler, genicam
+from lightpen.cameras.basler import BaslerDevice
+from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.device_camera import DeviceCamera
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    DeviceNotFound,
+    FrameIncomplete,
+    ImageCamera,
+)
+from lightpen.cameras.source import SourcePlace
+from lightpen.cameras.sources import SOURCES, absent_sources, source_named
+
+TIMEOUT = 5.0  # s
+MANY = 50  # images, one of which fails
+NOWHERE = SourcePlace("none-of-this-name")
+
+
+def camera(key: str, place: SourcePlace) -> ImageCamera:
+    source = source_named(key)
+    assert source is not None
+    assert source.camera is not None
+    return source.camera(place, MachineClock())
+
+
+def read(camera: ImageCamera, n_images: int) -> None:
+    for _ in range(n_images):
+        camera.read(TIMEOUT)
+
+
+def no_module(name: str) -> ModuleSpec | None:
+    return None
+
+
+def no_library(name: str) -> ctypes.CDLL:
+    raise OSError(name)
+
+
+def test_every_source_has_a_key_of_its_own() -> None:
+    keys = [source.key for source in SOURCES]
+
+    assert len(set(keys)) == len(keys) == 6
+    assert [source_named(key) for key in keys] == list(SOURCES)
+    assert source_named("of a later version") is None
+
+
+def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(genicam, "find_spec", no_module)
+    monkeypatch.setattr(basler, "find_spec", no_module)
+    monkeypatch.setattr(ctypes, "CDLL", no_library)
+    aravis_library.load_aravis.cache_clear()
+    try:
+        absent = absent_sources()
+        told = {key: str(why_absent) for key, why_absent in absent.items()}
+        for key in absent:
+            with pytest.raises(DeviceNotFound, match="is not installed"):
+                camera(key, NOWHERE).open()
+    finally:
+        aravis_library.load_aravis.cache_clear()
+
+    assert set(told) == {"aravis", "genicam", "basler"}
+    assert "apt-get install libaravis-0.8-0" in told["aravis"]
+    assert "pip install harvesters genicam" in told["genicam"]
+    assert "pip install pypylon" in told["basler"]
+
+
+def test_a_serial_number_that_no_camera_has_is_told(genicam: SourcePlace) -> None:
+    place = SourcePlace(NOWHERE.name, genicam.producer)
+    with pytest.raises(DeviceNotFound, match="no camera none-of-this-name"):
+        camera("genicam", place).open()
+
+
+def test_the_cameras_of_a_producer_are_found(genicam: SourcePlace) -> None:
+    source = source_named("genicam")
+    assert source is not None
+    found = source.find(genicam.producer)
+
+    assert [device.place for device in found] == ["0", "1", "2"]
+    assert "Viky" in found[0].label
+
+
+def test_a_producer_that_does_not_load_is_told_with_its_message(
+    genicam: SourcePlace, tmp_path: Path
+) -> None:
+    producer = tmp_path / "vendor.cti"
+    producer.write_bytes(b"no library")
+    source = source_named("genicam")
+    assert source is not None
+    with pytest.raises(DeviceNotFound, match=r"vendor\.cti does not load: .*file too"):
+        source.find(str(producer))
+
+
+def test_producers_are_found_where_the_system_says(
+    genicam: SourcePlace, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    source = source_named("genicam")
+    assert source is not None
+    monkeypatch.delenv("GENICAM_GENTL64_PATH", raising=False)
+    with pytest.raises(DeviceNotFound, match="GENICAM_GENTL64_PATH"):
+        source.find("")
+    folders = (str(tmp_path), str(Path(genicam.producer).parent))
+    monkeypatch.setenv("GENICAM_GENTL64_PATH", os.pathsep.join(folders))
+
+    assert len(source.find("")) == 3
+
+
+def test_a_webcam_that_is_not_there_is_told() -> None:
+    with pytest.raises(DeviceNotFound, match="no camera none-of-this-name"):
+        camera("webcam", NOWHERE).open()
+
+
+def test_pylons_failed_images_are_left_out_and_counted(basler: SourcePlace) -> None:
+    device = BaslerDevice(basler.name)
+    seen = DeviceCamera(device)
+    seen.open()
+    seen.configure(CameraSettings(frame_rate=50.0))
+    seen.start()
+    seen.read(TIMEOUT)
+    device.features.execute("ForceFailedBuffer")
+    with pytest.raises(FrameIncomplete, match="incomplete"):
+        read(seen, MANY)
+    seen.close()
+
+    assert seen.stats().incomplete == 1
