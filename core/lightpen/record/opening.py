@@ -47,8 +47,8 @@ def swing_folder(path: Path) -> Path:
     raise FileError(
         sentence(
             "opening.no-swing",
-            "{path} is neither a recorded swing nor a result. Open the file "
-            "swing.lightpen in the folder of a swing, or a file in the folder results.",
+            "{path} is neither a recorded swing nor a result. Open the folder of a "
+            "swing, a file in it, or a file in the folder results.",
             path=printable(str(path)),
         )
     )

@@ -3638,6 +3638,10 @@
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
+        <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
+        <translation>{path} 既不是摆动记录，也不是校准结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
+    </message>
+    <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
         <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
@@ -4576,10 +4580,6 @@
     <message>
         <source>{path} is damaged. Restore it from a copy.</source>
         <translation>{path} 已损坏。请用备份恢复。</translation>
-    </message>
-    <message>
-        <source>{path} is neither a recorded swing nor a result. Open the file swing.lightpen in the folder of a swing, or a file in the folder results.</source>
-        <translation>{path} 既不是摆动记录，也不是校准结果。请打开摆动记录文件夹中的 swing.lightpen，或 results 文件夹中的文件。</translation>
     </message>
     <message>
         <source>{path} is no record of a calibration. Give what the command calibrate wrote, or an accepted result.</source>
