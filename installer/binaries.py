@@ -62,7 +62,7 @@ def unmet_needs(folder: Path) -> list[str]:
 def missing_exports(folder: Path) -> list[str]:
     """Return what is asked of the C++ runtime that will be loaded and is not in it."""
     missing = []
-    for name in ("vcruntime140.dll", "vcruntime140_1.dll"):
+    for name in ("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll"):
         library = pefile.PE(str(folder / "runtime" / name))
         has = {symbol.name for symbol in library.DIRECTORY_ENTRY_EXPORT.symbols}
         library.close()

@@ -49,6 +49,7 @@ from installer.runtime import RuntimeFileError
 from installer.sbom import Component, bill_of_materials
 
 KILOBYTE = 1024
+CAMERAS = {"genicam", "harvesters"}
 
 
 class BuildError(Exception):
@@ -98,9 +99,7 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     work.mkdir()
 
     distribution = download_runtime()
-    pins = windows_pins(
-        (ROOT / "requirements.lock").read_text("utf-8"), runtime.VERSION
-    )
+    pins = shipped_pins()
     wheels = download_wheels(pins)
     own = build_wheel(work, moment)
     _say("Putting the files together")
@@ -128,6 +127,20 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
     setup = out / f"Lightpen-{version}-setup.exe"
     pack(folder, work, setup, version, Packing.QUICK if fast else Packing.SMALL, sign)
     return setup
+
+
+def shipped_pins() -> tuple[Pin, ...]:
+    """Return what is bundled: all that the program needs, and the extra "genicam".
+
+    An installed program cannot be added to, and without the extra it would have no
+    industrial camera. It is tested with the versions of requirements-dev.lock.
+    """
+    program, development = (
+        windows_pins((ROOT / name).read_text("utf-8"), runtime.VERSION)
+        for name in ("requirements.lock", "requirements-dev.lock")
+    )
+    extra = (pin for pin in development if pin.name in CAMERAS)
+    return (*program, *extra)
 
 
 def project_version() -> str:

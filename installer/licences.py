@@ -66,6 +66,8 @@ def _part(folder: Path) -> Part:
     )
     files = (path for path in folder.rglob("*") if path.is_file())
     texts = sorted(path for path in files if NAMES.match(path.name))
+    # Of the libraries that are in those of the package.
+    texts += sorted((folder.parent / metadata["Name"] / "licenses").glob("*.txt"))
     texts += [INSTALLER / "texts" / name for name in ADDED.get(metadata["Name"], ())]
     return Part(
         name=metadata["Name"],

@@ -14,7 +14,7 @@ from installer.pruning import is_kept
 
 PACKAGES = "runtime/Lib/site-packages"
 # The C++ runtime that is loaded first must be the newest that anything was linked with.
-CPP_RUNTIME = ("vcruntime140.dll", "vcruntime140_1.dll")
+CPP_RUNTIME = ("vcruntime140.dll", "vcruntime140_1.dll", "msvcp140.dll")
 CPP_BRINGERS = ("PySide6", "shiboken6")
 FILE_LIST = "files.sha256"
 # Without a commit, as in an unpacked source archive: the first day that ZIP can state.
@@ -45,9 +45,9 @@ def place_of(name: str) -> str | None:
 def promote_cpp_runtime(folder: Path) -> None:
     """Let the runtime have the newest C++ library that anything brings along."""
     for name in CPP_RUNTIME:
-        places = [folder / PACKAGES / each / name for each in CPP_BRINGERS]
         own = folder / "runtime" / name
-        newest = max([own, *filter(Path.exists, places)], key=file_version)
+        places = [own, *(folder / PACKAGES / each / name for each in CPP_BRINGERS)]
+        newest = max(filter(Path.exists, places), key=file_version)
         if newest != own:
             shutil.copyfile(newest, own)
 

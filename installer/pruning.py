@@ -24,7 +24,7 @@ DROPPED = (
     # Of the C++ runtime, what nothing here loads.
     "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
     "*/vcomp140.dll",
-    "numpy/f2py/*", "numpy/_pyinstaller/*", "pyqtgraph/examples/*",
+    "harvesters/test/*", "numpy/f2py/*", "numpy/_pyinstaller/*", "pyqtgraph/examples/*",
     "cv2/LICENSE*",  # a copy of that beside the metadata
     "*.dist-info/RECORD",  # lists what is no longer there
 )  # fmt: skip

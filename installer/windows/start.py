@@ -18,6 +18,9 @@ def start() -> int:
         if getattr(sys, name) is None:
             nowhere = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
             setattr(sys, name, nowhere)
+    if sys.platform == "win32":
+        # Packages find the C++ library there that they are linked with.
+        os.add_dll_directory(sys.prefix)
     try:
         from lightpen_app.__main__ import main
     except (ImportError, OSError, SyntaxError, ValueError, EOFError):

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from installer import runtime
+from installer.build import shipped_pins
 from installer.locked import windows_pins
 
 LOCK = """\
@@ -41,6 +42,10 @@ def test_another_python_gets_other_versions() -> None:
 def test_what_is_not_pinned_by_hash_is_refused(entry: str) -> None:
     with pytest.raises(ValueError, match="numpy of the lock file is not pinned"):
         windows_pins(entry, "3.13.2")
+
+
+def test_the_installed_program_can_use_industrial_cameras() -> None:
+    assert {"numpy", "genicam", "harvesters"} <= {pin.name for pin in shipped_pins()}
 
 
 def test_the_lock_file_itself_gives_one_version_of_each() -> None:
