@@ -107,17 +107,11 @@ def compare_tips(trial: Trial, there: Mapping[str, Any]) -> None:
 
 
 def try_start(trial: Trial) -> None:
-    """Start the program twice, and take the time until its window serves.
-
-    The files of the simulated camera are written by a job that the running window
-    starts: then it has been shown, and its events are seen to.
-    """
-    sample = trial.data / "simulated" / "pen.json"
+    """Start the program twice, and take the time until its window serves."""
     for attempt in ("first", "second"):
-        sample.unlink(missing_ok=True)
         began = time.monotonic()
         process = trial.start_window()
-        is_open = await_so(sample.exists)
+        is_open = trial.await_window()
         seconds = time.monotonic() - began
         is_soon = attempt == "first" or seconds <= START_LIMIT_S
         trial.expect(f"{attempt} start, {seconds:.1f} s", is_open and is_soon)

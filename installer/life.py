@@ -9,7 +9,7 @@ from typing import Any
 
 from installer.payload import FILE_LIST
 from installer.places import IS_WINDOWS
-from installer.trial import CLASSES, IMAGE, UNINSTALL, Trial, await_so
+from installer.trial import CLASSES, IMAGE, UNINSTALL, Trial, await_so, last_option
 
 from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import open_record
@@ -124,15 +124,13 @@ def try_double_click(trial: Trial) -> None:
 
 def try_refusals(trial: Trial) -> None:
     """See that a program that runs and a folder of others are left alone."""
-    sample = trial.data / "simulated" / "pen.json"
-    sample.unlink(missing_ok=True)
     process = trial.start_window()
-    trial.expect("the window opens", await_so(sample.exists))
+    trial.expect("the window opens", trial.await_window())
     status = trial.machine.run([trial.machine.windows_path(trial.setup), "/S"]).status
     trial.expect("no installation while it runs", status == RUNNING, status)
     # In its place, as it tells its status only then.
-    place = f"_?={trial.machine.windows_path(trial.folder)}"
-    status = trial.machine.run([trial.program("uninstall.exe"), "/S", place]).status
+    place = last_option("_?", trial.machine.windows_path(trial.folder))
+    status = trial.machine.run([trial.program("uninstall.exe"), "/S", *place]).status
     trial.expect("no removal while it runs", status == RUNNING, status)
     trial.end_programs()
     process.wait()
@@ -153,15 +151,14 @@ def try_upgrade(trial: Trial, newer: Path, version: str, newer_version: str) -> 
     stale = trial.folder / "runtime/Lib/site-packages/lightpen/stale.py"
     stale.touch()
     (trial.folder / NOTES).write_text("mine")
-    settings = trial.data / "lightpen.json"
     trial.data.mkdir(exist_ok=True)
-    settings.write_text("{}")
+    trial.settings.write_text("{}")
     outcome = trial.install(setup=newer)
     trial.expect("upgrades", outcome.status == 0, outcome)
     look_over(trial, newer_version)
     trial.expect("no stale module", not stale.exists())
     trial.expect("the user's own file stays", (trial.folder / NOTES).exists())
-    trial.expect("settings stay", settings.read_text() == "{}")
+    trial.expect("settings stay", trial.settings.read_text() == "{}")
     refused = trial.install()
     now = trial.value(UNINSTALL, "DisplayVersion")
     is_kept = refused.status == NEWER and now == newer_version
@@ -191,7 +188,7 @@ def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -
 
     trial.install()
     trial.data.mkdir(exist_ok=True)
-    (trial.data / "lightpen.json").write_text("{}")
+    trial.settings.write_text("{}")
     trial.uninstall("/PURGE")
     trial.expect("the user's data go when asked", not trial.data.exists())
     _expect_nothing_left(trial, files, registry)

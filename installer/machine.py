@@ -94,6 +94,7 @@ class WineMachine(Prefix):
             path = self.windows_path(home / folder)
             words = ["reg", "add", SHELL_KEY, "/v", place, "/d", path, "/f"]
             self.run(words).require_success()
+        (home / TEMPORARY).mkdir()
         for variable in ("TEMP", "TMP"):
             self._set_variable(variable, self.windows_path(home / TEMPORARY))
         self.await_end()

@@ -60,8 +60,7 @@ class Trial:
             Another folder than the usual one, as Windows names it.
         """
         path = self.machine.windows_path(setup or self.setup)
-        # NSIS takes the rest of the line, which must not be quoted: word by word.
-        target = f"/D={place}".split(" ") if place else []
+        target = last_option("/D", place) if place else []
         outcome = self.machine.run([path, "/S", *options, *target])
         self.machine.await_end()
         return outcome
@@ -80,9 +79,28 @@ class Trial:
         """Run the command line."""
         return self.machine.run([self.program(CONSOLE), *words], folder=folder)
 
+    @property
+    def settings(self) -> Path:
+        """Return the file of the user's settings."""
+        return self.data / "lightpen.json"
+
     def start_window(self) -> "subprocess.Popen[bytes]":
-        """Open the program's window, seen nowhere."""
+        """Open the program's window for a user who has set nothing, seen nowhere."""
+        for file in (self.settings, self._sample):
+            file.unlink(missing_ok=True)
         return self.machine.start([self.program()])
+
+    def await_window(self) -> bool:
+        """Wait until the window serves, and return whether it came to that.
+
+        The files of the simulated camera are written by a job that the running window
+        starts: then it has been shown, and its events are seen to.
+        """
+        return await_so(self._sample.exists)
+
+    @property
+    def _sample(self) -> Path:
+        return self.data / "simulated" / "pen.json"
 
     def end_programs(self) -> None:
         """End the program whose window is open."""
@@ -108,6 +126,14 @@ class Trial:
         for each in (file, file.with_suffix(".png")):
             each.unlink(missing_ok=True)
         return report
+
+
+def last_option(name: str, place: str) -> list[str]:
+    """Return the words of an option of NSIS that takes the rest of the line.
+
+    That must not be quoted, as one word with blanks would be.
+    """
+    return f"{name}={place}".split(" ")
 
 
 def await_so(is_so: Callable[[], bool], timeout_s: float = PATIENCE_S) -> bool:
