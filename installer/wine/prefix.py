@@ -1,7 +1,7 @@
 """Windows on Linux: a Wine prefix that Windows' Python, NumPy and Qt run in.
 
-Debian's Wine 8 lacks a few functions of Windows: three small libraries stand in for
-them. They are for builds and tests; nothing of them is installed.
+Debian's Wine 8 lacks some functions of Windows, or has them otherwise: three small
+libraries stand in for them. They are for builds and tests; none is installed.
 """
 
 import os
@@ -93,7 +93,9 @@ class Prefix:
     @classmethod
     def for_builds(cls) -> Self:
         """Return the one in the user's cache, made if need be."""
-        state = sha256(Path(__file__).read_bytes()).hexdigest()[:12]
+        sources = sorted(path for path in HERE.iterdir() if path.is_file())
+        contents = b"".join(path.read_bytes() for path in sources)
+        state = sha256(contents).hexdigest()[:12]
         prefix = cls(cache() / f"prefix-{state}")
         if not (prefix.folder / "made").exists():
             shutil.rmtree(prefix.folder, ignore_errors=True)
@@ -219,7 +221,7 @@ class Prefix:
         (system / "ucrtwine.dll").write_bytes(renamed)
         exports = self.folder / "ucrtbase.def"
         exports.write_text(_exports(builtin), encoding="ascii")
-        sources: list[str | Path] = ["complex.c", exports]
+        sources: list[str | Path] = ["complex.c", "locking.c", exports]
         _compile(system / "ucrtbase.dll", sources, "-O2", "-static-libgcc")
         bare = ("-Os", "-nostdlib", "-e", "DllMainCRTStartup")
         for name in ("mscms", "icuuc"):
@@ -227,8 +229,8 @@ class Prefix:
 
 
 def _exports(builtin: Path) -> str:
-    """Return what the C runtime exports, the complex functions from our own."""
-    own = {name + kind for name in COMPLEX for kind in ("", "f", "l")}
+    """Return what the C runtime exports, some functions from our own."""
+    own = {"_locking", *(name + kind for name in COMPLEX for kind in ("", "f", "l"))}
     names = [
         symbol.name.decode("ascii")
         for symbol in pefile.PE(str(builtin)).DIRECTORY_ENTRY_EXPORT.symbols
