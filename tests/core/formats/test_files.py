@@ -86,7 +86,7 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
 
 
 def test_a_name_too_long_for_the_disk_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(FileError, match=r"cannot be read|does not exist"):
         read_bytes(tmp_path / ("n" * 5000), CAMERA_FILE, LIMIT)
 
 
