@@ -25,7 +25,8 @@ from installer.places import ROOT
 # Of the tools in requirements-dev.lock, what the tests import.
 TOOLS = {
     *("hypothesis", "sortedcontainers", "filelock", "fonttools", "iniconfig"),
-    *("packaging", "pluggy", "pygments", "pytest", "pytest-qt", "pytest-timeout"),
+    *("execnet", "packaging", "pluggy", "pygments", "pytest", "pytest-qt"),
+    *("pytest-timeout", "pytest-xdist"),
 }
 USUAL = ("tests/core", "-q", "-p", "no:cacheprovider")
 PATHS_FILE = runtime.LIBRARY.replace(".zip", "._pth")

@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Timer
 
 import pytest
 from hypothesis import given
@@ -161,6 +162,14 @@ def test_writing_replaces_the_old_file(tmp_path: Path) -> None:
     write_whole(path, b"new")
     assert path.read_bytes() == b"new"
     assert names_in(tmp_path) == ["cam.yaml"]
+
+
+def test_a_file_that_somebody_reads_for_a_moment_is_replaced(tmp_path: Path) -> None:
+    path = file(tmp_path, b"old")
+    reader = path.open("rb")
+    Timer(0.2, reader.close).start()
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new"
 
 
 @posix_only
