@@ -28,6 +28,7 @@ from installer.places import IS_WINDOWS
 from installer.trial import Trial, await_so
 
 DISPLAY = 93
+CHINESE_LOCALE = Path("/usr/share/i18n/locales/zh_CN")  # of the package locales
 NEWER = "999.0.0"
 START_LIMIT_S = 8.0
 TIP_LIMIT = 1e-6  # mm between the tips of Linux and Windows
@@ -72,6 +73,7 @@ def try_all(trial: Trial, payload: Path) -> None:
     bad_conditions.try_no_right(trial)
     bad_conditions.try_full_disk(trial)
     bad_conditions.try_other_folder(trial)
+    try_chinese(trial)
     life.try_installation(trial, version)
     compare_tips(trial, life.try_self_test(trial, "offscreen"))
     with _screen(trial) as seen:
@@ -104,6 +106,16 @@ def compare_tips(trial: Trial, there: Mapping[str, Any]) -> None:
     pairs = zip(there["tip"]["found_mm"], here["tip"]["found_mm"], strict=True)
     apart = max(abs(one - other) for one, other in pairs)
     trial.expect(f"its tip is that found here, to {apart:.1e} mm", apart <= TIP_LIMIT)
+
+
+def try_chinese(trial: Trial) -> None:
+    """Install where Windows is in Chinese, if that language is to be had here."""
+    if IS_WINDOWS or not CHINESE_LOCALE.exists():
+        print("skip a Chinese Windows: this computer has no locale for it")
+        return
+    with TemporaryDirectory() as folder:
+        machine = trial.machine.in_chinese(Path(folder))
+        life.try_chinese(replace(trial, machine=machine))
 
 
 def try_start(trial: Trial) -> None:

@@ -56,6 +56,15 @@ def look_over(trial: Trial, version: str) -> None:
     trial.expect("nothing for all users", not system, system)
 
 
+def try_chinese(trial: Trial) -> None:
+    """Install on a Chinese Windows, and remove it again."""
+    trial.install()
+    links = [path.name for path in _menu(trial).glob("*.lnk")]
+    trial.expect("speaks Chinese", "Lightpen 命令行.lnk" in links, links)
+    trial.uninstall()
+    trial.expect("and is removed", not trial.folder.exists())
+
+
 def try_self_test(trial: Trial, platform: str) -> dict[str, Any]:
     """Run the self-test, and return its report."""
     there = replace(trial, machine=trial.machine.with_platform(platform))

@@ -13,8 +13,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Protocol, Self
 
+from installer.launchers import tool
 from installer.places import IS_WINDOWS
-from installer.wine.prefix import Outcome, Prefix
+from installer.wine.prefix import CHINESE, Outcome, Prefix
 
 VOLATILE = ("/Temp/", "/Recent/", "/Microsoft/", "/windows/")
 WORD = "lightpen"
@@ -68,6 +69,9 @@ class Machine(Protocol):
     def with_platform(self, platform: str) -> Self:
         """Return the machine with Qt drawing through a platform of that name."""
 
+    def in_chinese(self, locales: Path) -> Self:
+        """Return the machine with a Chinese Windows, by a folder for its locale."""
+
     def open_document(self, path: Path) -> None:
         """Open a file as a double click does."""
 
@@ -110,6 +114,12 @@ class WineMachine(Prefix):
         """
         self._set_variable(PLATFORM, platform)
         return self
+
+    def in_chinese(self, locales: Path) -> Self:
+        """Return the machine with a Chinese Windows, by a folder for its locale."""
+        words = ["-i", "zh_CN", "-f", "UTF-8", str(locales / CHINESE)]
+        subprocess.run([tool("localedef"), *words], check=True)
+        return replace(self, locales=locales)
 
     def open_document(self, path: Path) -> None:
         """Open a file as a double click does."""
@@ -205,6 +215,10 @@ class OwnMachine:
     def with_platform(self, platform: str) -> Self:
         """Return the machine with Qt drawing through a platform of that name."""
         return replace(self, platform=platform)
+
+    def in_chinese(self, locales: Path) -> Self:
+        """Return the machine as it is: its language is the user's."""
+        return self
 
     def open_document(self, path: Path) -> None:
         """Open a file as a double click does."""

@@ -5,14 +5,15 @@ libraries stand in for them. They are for builds and tests; none is installed.
 """
 
 import os
-import shutil
 import subprocess
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from getpass import getuser
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Self
 
 import pefile
@@ -43,6 +44,7 @@ COMPLEX = (
     *("ccosh", "cexp", "cimag", "clog", "conj", "cpow", "cproj", "creal", "csin"),
     *("csinh", "csqrt", "ctan", "ctanh"),
 )
+CHINESE = "zh_CN.UTF-8"
 LONGEST = 1800.0  # s
 
 
@@ -84,11 +86,14 @@ class Prefix:
         Name of the folder of the user's files.
     display : str
         X server for programs with windows; none unless given.
+    locales : Path or None
+        Folder with the locale `CHINESE`, in whose language Windows then is.
     """
 
     folder: Path
     user: str = field(default_factory=getuser)
     display: str = ""
+    locales: Path | None = None
 
     @classmethod
     def for_builds(cls) -> Self:
@@ -96,12 +101,14 @@ class Prefix:
         sources = sorted(path for path in HERE.iterdir() if path.is_file())
         contents = b"".join(path.read_bytes() for path in sources)
         state = sha256(contents).hexdigest()[:12]
-        prefix = cls(cache() / f"prefix-{state}")
-        if not (prefix.folder / "made").exists():
-            shutil.rmtree(prefix.folder, ignore_errors=True)
-            prefix.make()
-            (prefix.folder / "made").touch()
-        return prefix
+        folder = cache() / f"prefix-{state}"
+        if not folder.exists():
+            with TemporaryDirectory(prefix="prefix-", dir=cache()) as name:
+                prefix = cls(Path(name) / "made")
+                prefix.make()
+                with suppress(OSError):  # another build was faster
+                    prefix.folder.rename(folder)
+        return cls(folder)
 
     @property
     def drive(self) -> Path:
@@ -144,6 +151,7 @@ class Prefix:
                 (self.home / name).unlink()
                 (self.home / name).mkdir()
         self._stand_in(builtin)
+        self.await_end()
 
     def start(
         self, words: Sequence[str], folder: Path | None = None
@@ -200,10 +208,15 @@ class Prefix:
             "WINEPREFIX": str(self.folder),
             "WINEARCH": "win64",
             "WINEDEBUG": "-all",
-            "LC_ALL": "C.UTF-8",  # or no letters of other languages in names
             "LIGHTPEN_NO_DIALOG": "1",
+            **self._language(),
             **({"DISPLAY": self.display} if self.display else {}),
         }
+
+    def _language(self) -> dict[str, str]:
+        if self.locales is not None:
+            return {"LC_ALL": CHINESE, "LOCPATH": str(self.locales)}
+        return {"LC_ALL": "C.UTF-8"}  # or no letters of other languages in names
 
     def _override(self, library: str, order: str) -> None:
         words = ["reg", "add", OVERRIDES, "/v", library, "/d", order, "/f"]
