@@ -20,7 +20,7 @@ from installer.downloads import download_wheels
 from installer.locked import windows_pins
 from installer.machine import fresh_machine
 from installer.payload import unpack_wheels
-from installer.places import ROOT
+from installer.places import IS_WINDOWS, ROOT
 
 # Of the tools in requirements-dev.lock, what the tests import.
 TOOLS = {
@@ -52,7 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         paths.unlink()  # its content would be that of the payload
         paths.write_text(runtime.PATHS + "\r\n".join([*places, ""]), newline="")
         python = machine.windows_path(folder / "runtime" / "python.exe")
-        words = [python, "-B", "-m", "pytest", *(options.words or USUAL)]
+        plugins = () if IS_WINDOWS else ("-p", "installer.wine.without_copyfile2")
+        words = [python, "-B", "-m", "pytest", *plugins, *(options.words or USUAL)]
         process = machine.start(words, ROOT)
         if process.stdout is not None:
             for line in process.stdout:  # told as it comes: it takes many minutes

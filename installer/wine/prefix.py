@@ -98,7 +98,7 @@ class Prefix:
     @classmethod
     def for_builds(cls) -> Self:
         """Return the one in the user's cache, made if need be."""
-        sources = sorted(path for path in HERE.iterdir() if path.is_file())
+        sources = [Path(__file__), *sorted(HERE.glob("*.c"))]
         contents = b"".join(path.read_bytes() for path in sources)
         state = sha256(contents).hexdigest()[:12]
         folder = cache() / f"prefix-{state}"
