@@ -894,8 +894,8 @@ def test_output_that_fails_is_told_even_without_a_standard_output(
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lightpen.cli.write_pen", fail)
-    monkeypatch.setattr("lightpen.cli.read_raw_pen", lambda *_: None)
+    monkeypatch.setattr("lightpen.commands.pen.write_pen", fail)
+    monkeypatch.setattr("lightpen.commands.pen.read_raw_pen", lambda *_: None)
     monkeypatch.setattr("sys.stdout", None)
 
     assert main(["pen", "in.csv", "out.csv"]) == 2

@@ -65,8 +65,7 @@ PATH = re.compile(r"\S*/\S*")
 TOO_SLOW = "This computer is too slow"  # an error of the core, for the clock is hasty
 WORD = re.compile(r"[A-Za-z]{2,}")
 SAME_EVERYWHERE = {
-    "Mono",
-    *("LED", "LEDs", "px", "mm", "dB", "ms", "fx", "fy"),
+    *("Mono", "LED", "LEDs", "px", "mm", "dB", "ms", "fx", "fy"),
     *("CSV", "JSON", "PNG", "OpenCV", "ROS", "Kalibr", "MATLAB"),
     *("Enter", "Space", "Delete", "Insert", "Home", "Shift", "Tab"),
     *("Lightpen", "Qt"),

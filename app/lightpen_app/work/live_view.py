@@ -31,7 +31,7 @@ from lightpen.detection.aim import Aim
 from lightpen.live.looking import Live, LiveImage
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
-from lightpen.simulator.hand import Doing, Operator
+from lightpen.simulator.hand import Operator
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
@@ -220,9 +220,9 @@ class LiveView(QObject):
     def show_pen(self) -> None:
         """Let the simulated operator bring the pen, so that there is something to see.
 
-        Only while he does nothing else.
+        Only while nothing else is asked of him.
         """
-        if self._operator is not None and self._operator.doing is Doing.ABSENT:
+        if self._operator is not None and self._operator.is_free:
             self._operator.seat()
 
     def configure(self, settings: CameraSettings) -> None:

@@ -35,6 +35,7 @@ from lightpen.cameras.protocol import (
 from lightpen.sentences import Sentence, sentence
 
 SETTLING = 0.4  # s that images with the exposure before may still come
+LOST_TRIGGER = 1.0  # s beyond the exposure without an image; it is given again
 LAST_SHORT_NUMBER = 65_535  # of GigE Vision 1; 1 follows, as 0 is left out
 MOST_MISSED = 10_000  # at once; a larger gap is a camera that counts anew
 
@@ -121,8 +122,8 @@ class DeviceCamera:
         self._next_seq = 0
         self._last_number: int | None = None  # since the start
         self._settled_ns = 0
-        self._is_triggered = False
         self._next_trigger_ns = 0
+        self._lost_ns = 0  # until then the image of the last trigger is waited for
 
     @property
     def serial(self) -> str:
@@ -159,17 +160,13 @@ class DeviceCamera:
 
     def set_exposure(self, exposure_us: float) -> float:
         """Set the exposure, also while images come; return what is in force, us."""
-        applied = self._set(EXPOSURES, exposure_us)
-        if applied is None:
-            raise _cannot_be_set(EXPOSURE)
+        applied = self._set(EXPOSURE, EXPOSURES, exposure_us)
         self._settings = replace(self._settings, exposure_us=applied)
         return applied
 
     def set_gain(self, gain_db: float) -> float:
         """Set the gain, also while images come; return what is in force, dB."""
-        applied = self._set(GAINS, gain_db)
-        if applied is None:
-            raise _cannot_be_set(GAIN)
+        applied = self._set(GAIN, GAINS, gain_db)
         self._settings = replace(self._settings, gain_db=applied)
         return applied
 
@@ -181,8 +178,8 @@ class DeviceCamera:
         self._device.start()
         self._is_streaming = True
         self._last_number = None
-        self._is_triggered = False
-        self._next_trigger_ns = self._settled_ns = self._clock.now_ns()
+        now_ns = self._clock.now_ns()
+        self._next_trigger_ns = self._lost_ns = self._settled_ns = now_ns
 
     def stop(self) -> None:
         """Let no more images come; nothing if none do."""
@@ -240,27 +237,49 @@ class DeviceCamera:
         self._caps = replace(read_caps(features), has_link=True)
         self._settings = read_settings(features, self._caps)
 
-    def _set(self, names: tuple[str, ...], value: float) -> float | None:
+    def _set(self, what: Sentence, names: tuple[str, ...], value: float) -> float:
         self._check_open()
         self._settled_ns = self._clock.now_ns() + round(SETTLING * 1e9)
-        return set_nearest(self._device.features, names, value)
+        applied = set_nearest(self._device.features, names, value)
+        if applied is None:
+            raise ConfigError(
+                sentence(
+                    "camera.cannot-be-set",
+                    "The {what} of this camera cannot be set. Use the aperture of the "
+                    "lens.",
+                    what=what,
+                )
+            )
+        return applied
 
     def _fetch(self, timeout_s: float) -> Delivery | None:
         if self._settings.trigger is not TriggerMode.SOFTWARE:
             return self._device.fetch(timeout_s)
-        if not self._is_triggered:
-            wait_s = (self._next_trigger_ns - self._clock.now_ns()) * 1e-9
-            self._clock.wait(min(wait_s, timeout_s))
-            if wait_s > timeout_s:
+        now_ns = self._clock.now_ns()
+        deadline_ns = now_ns + round(timeout_s * 1e9)
+        while True:
+            if now_ns >= self._lost_ns:
+                trigger_ns = min(self._next_trigger_ns, deadline_ns)
+                self._clock.wait((trigger_ns - now_ns) * 1e-9)
+                if self._next_trigger_ns > deadline_ns:
+                    return None
+                self._trigger()
+            until_ns = min(self._lost_ns, deadline_ns)
+            wait_s = (until_ns - self._clock.now_ns()) * 1e-9
+            delivery = self._device.fetch(max(wait_s, 0.0))
+            now_ns = self._clock.now_ns()
+            if delivery is not None:
+                self._lost_ns = now_ns
+                return delivery
+            if now_ns >= deadline_ns:
                 return None
-            rate = self._settings.frame_rate
-            period_ns = round(1e9 / rate) if rate else 0
-            self._next_trigger_ns = self._clock.now_ns() + period_ns
-            self._device.features.execute("TriggerSoftware")
-            timeout_s -= max(wait_s, 0.0)
-        delivery = self._device.fetch(max(timeout_s, 0.0))
-        self._is_triggered = delivery is None and timeout_s < 1.0
-        return delivery
+
+    def _trigger(self) -> None:
+        now_ns = self._clock.now_ns()
+        rate, exposure_us = self._settings.frame_rate, self._settings.exposure_us
+        self._next_trigger_ns = now_ns + (round(1e9 / rate) if rate else 0)
+        self._lost_ns = now_ns + round(1e9 * LOST_TRIGGER + 1e3 * (exposure_us or 0.0))
+        self._device.features.execute("TriggerSoftware")
 
     def _seq(self, number: int) -> int:
         """Return the number of an image over the life of the camera."""
@@ -312,13 +331,3 @@ class DeviceCamera:
             pixel_format=pixel_format.name,
             bits=pixel_format.bits,
         )
-
-
-def _cannot_be_set(what: Sentence) -> ConfigError:
-    return ConfigError(
-        sentence(
-            "camera.cannot-be-set",
-            "The {what} of this camera cannot be set. Use the aperture of the lens.",
-            what=what,
-        )
-    )

@@ -149,6 +149,12 @@ class Operator:
                 return Doing.ABSENT if self._place is AWAY else Doing.LIFTED
             return Doing.SEATED if self._goal is not None else Doing.SWINGING
 
+    @property
+    def is_free(self) -> bool:
+        """Whether the pen is away and nothing is asked for."""
+        with self._lock:
+            return self._place is AWAY and not self._route and not self._wishes
+
     def seat(self) -> None:
         """Bring the pen to the cone, put its tip in and hold it still."""
         self.touch(SEAT)

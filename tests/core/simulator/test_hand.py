@@ -123,6 +123,21 @@ def test_the_pen_is_absent_then_approaches_and_then_sits_in_the_cone() -> None:
     assert np.abs(np.diff(offsets(seen), axis=0)).max() < 300 * PERIOD + 2  # mm
 
 
+def test_an_operator_who_was_asked_for_something_is_free_no_more() -> None:
+    scene = Scene(seated=False)
+    assert scene.operator.is_free
+
+    scene.operator.swing()
+    assert scene.doing() is Doing.ABSENT
+    assert not scene.operator.is_free
+    scene.watch(8)
+    assert not scene.operator.is_free
+
+    scene.operator.leave()
+    scene.watch(8)
+    assert scene.operator.is_free
+
+
 def test_a_pen_that_is_away_shows_no_led_in_the_image() -> None:
     scene = Scene()
     scene.operator.lean(MAX_TILT, np.pi, 0)  # to the side from which it is in longest

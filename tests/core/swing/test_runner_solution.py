@@ -316,14 +316,22 @@ def test_a_swing_that_is_captured_is_set_aside_for_good(
 # Accepting, or not
 
 
-def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
+@pytest.fixture
+def other(
     in_force: "Station", swung: Callable[..., Path], rewrite_header: Callable[..., None]
+) -> Path:
+    """The record of another swing, that of the one in force as it was taken."""
+    folder = in_force.records / "other"
+    shutil.copytree(swung(), folder)
+    rewrite_header(folder, {"max_uncertainty_mm": 1.0})
+    return folder
+
+
+def test_the_tip_before_stays_in_force_until_the_new_one_is_accepted(
+    in_force: "Station", other: Path
 ) -> None:
     first = in_force.status.result
     assert first is not None
-    other = in_force.records / "other"
-    shutil.copytree(swung(), other)
-    rewrite_header(other, {"max_uncertainty_mm": 1.0})
     in_force.go_on(other)
     in_force.solve()
     assert in_force.status.result is None
@@ -402,13 +410,10 @@ def test_what_was_accepted_can_be_taken_back_and_accepted_again(
 
 
 def test_a_result_of_another_swing_is_taken_back_and_this_one_stays(
-    in_force: "Station", swung: Callable[..., Path], rewrite_header: Callable[..., None]
+    in_force: "Station", other: Path
 ) -> None:
     first = in_force.status.result
     assert first is not None
-    other = in_force.records / "other"
-    shutil.copytree(swung(), other)
-    rewrite_header(other, {"max_uncertainty_mm": 1.0})
     in_force.go_on(other)
     in_force.runner.take_back(first, "Ben")
     in_force.wait_until(lambda: in_force.status.taken_back is first)

@@ -7,7 +7,6 @@ import numpy as np
 from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
-    QFocusEvent,
     QKeyEvent,
     QMouseEvent,
     QPainter,
@@ -131,16 +130,6 @@ class LeaningDial(PostureDial):
             painter.setPen(QPen(QColor(colors_of(self.palette()).accent), 2))
             middle, rim, _ = self._places()
             painter.drawEllipse(middle, 1.02 * rim, 1.02 * rim)
-
-    @override
-    def focusInEvent(self, event: QFocusEvent) -> None:
-        super().focusInEvent(event)
-        self.update()
-
-    @override
-    def focusOutEvent(self, event: QFocusEvent) -> None:
-        super().focusOutEvent(event)
-        self.update()
 
     @override
     def _retranslate(self) -> None:

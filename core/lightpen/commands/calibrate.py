@@ -1,0 +1,380 @@
+"""``lightpen calibrate``: find the tip from a swing."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.commands.calibrate_options import (
+    add_calibrate_options,
+    assumptions_of,
+    separation_of,
+)
+from lightpen.commands.console import (
+    lacking,
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.detection.moments import observe_rig_centers, observe_rig_images
+from lightpen.detection.observations import (
+    Observations,
+    observe_centers,
+    observe_images,
+)
+from lightpen.errors import UsageError
+from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
+from lightpen.estimation.report import calibration_record
+from lightpen.estimation.second_cone import SecondSwing
+from lightpen.estimation.summary import calibration_text
+from lightpen.estimation.verdict import judge
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
+from lightpen.formats.images import find_images
+from lightpen.formats.observation_files import read_centers
+from lightpen.formats.pairing import pair_images
+from lightpen.formats.pen_files import read_pen
+from lightpen.formats.rig_files import read_rig
+from lightpen.formats.simulated_files import is_simulated
+from lightpen.model.camera import Camera
+from lightpen.model.limits import SwingLimits
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.record.reading import (
+    is_record,
+    missing_parts,
+    open_record,
+    record_files,
+    recorded_limits,
+    unacknowledged_images,
+)
+from lightpen.record.solving import record_inputs, solve_record
+from lightpen.sentences import Sentence, sentence
+
+MAX_NAMED = 3  # images; of more the first is named
+RIG_NEEDED = sentence(
+    "cli.rig-needed", "Those of several cameras need --rig FILE in place of --camera."
+)
+
+
+def add_calibrate(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen calibrate``."""
+    parser.set_defaults(run=_calibrate)
+    add_calibrate_options(parser)
+
+
+@dataclass(frozen=True, eq=False)
+class _Calibrated:
+    """A calibration and what it was made from; hashes are read when asked for."""
+
+    calibration: Calibration
+    nominal_tip: FloatArray | None
+    limits: SwingLimits
+    origin: Origin | None
+    inputs: Callable[[], Inputs]
+
+
+@printing
+def _calibrate(options: argparse.Namespace) -> None:
+    if bool(options.images) == (options.centers is not None):
+        raise UsageError(
+            sentence(
+                "cli.images-or-centers",
+                "Give either IMAGES or --centers FILE.csv.",
+            )
+        )
+    inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
+    require_other_file(options.json, *inputs)
+    if len(options.images) == 1 and is_record(Path(options.images[0])):
+        calibrated = _from_record(options)
+    elif options.rig is not None:
+        calibrated = _from_rig(options)
+    else:
+        calibrated = _from_observations(options)
+    calibration = calibrated.calibration
+    verdict = judge(calibration, calibrated.limits)
+    text = calibration_text(
+        *(calibration, options.method, calibrated.nominal_tip, verdict),
+        calibrated.origin,
+    )
+    print(shown(text))
+    if options.json is not None:
+        record = calibration_record(
+            calibration, calibrated.inputs(), options.method, calibrated.limits
+        )
+        write_record(options.json, record)
+
+
+def _from_record(options: argparse.Namespace) -> _Calibrated:
+    folder = Path(options.images[0])
+    own = {
+        "--camera": options.camera,
+        "--rig": options.rig,
+        "--pen": options.pen,
+        "--units": options.units,
+        "--led-diameter": options.led_diameter,
+        "--nominal-tip": options.nominal_tip,
+        "--camera-sigma": options.camera_sigma,
+        "--scale-sigma": options.scale_sigma,
+        "--temperature": options.temperature,
+        "--temperature-sigma": options.temperature_sigma,
+        "--form-error": options.form_error,
+        "--center-bias": options.center_bias,
+        "--second-cone": options.second_cone,
+        "--distance": options.distance,
+        "--distance-sigma": options.distance_sigma,
+    }
+    given = [name for name, value in own.items() if value is not None]
+    if given:
+        raise UsageError(
+            sentence(
+                "cli.record-brings-its-own",
+                "{folder} is the record of a swing, which brings its own. Leave out "
+                "{options}.",
+                folder=str(folder),
+                options=", ".join(given),
+            )
+        )
+    record = open_record(folder)
+    require_other_file(options.json, *record_files(record))
+    _note_unacknowledged(unacknowledged_images(record))
+    with progress("Finding LEDs") as report:
+        solution = solve_record(record, report)
+    return _Calibrated(
+        solution.calibration,
+        solution.source.pen.nominal_tip,
+        recorded_limits(record),
+        solution.source.origin,
+        lambda: record_inputs(solution.source),
+    )
+
+
+def _note_unacknowledged(names: Sequence[str]) -> None:
+    """Tell of images that take no part because no journal names them."""
+    if not names:
+        return
+    if len(names) == 1:
+        note = sentence(
+            "record.image-unacknowledged",
+            "{image} is in the folder but not in the journal; it was not acknowledged "
+            "and takes no part.",
+            image=names[0],
+        )
+    elif len(names) <= MAX_NAMED:
+        note = sentence(
+            "record.images-unacknowledged",
+            "{images} are in the folder but not in the journal; they were not "
+            "acknowledged and take no part.",
+            images=", ".join(names),
+        )
+    else:
+        note = sentence(
+            "record.many-images-unacknowledged",
+            "{n_images} images, the first {first}, are in the folder but not in the "
+            "journal; they were not acknowledged and take no part.",
+            n_images=len(names),
+            first=names[0],
+        )
+    _note(note)
+
+
+def _note(note: Sentence) -> None:
+    print(shown(f"lightpen: {note}"), file=sys.stderr)
+
+
+def _lacking(option: str, images: Sequence[str]) -> UsageError:
+    """Return that an option is missing, and why the images are not a record."""
+    missing = missing_parts(Path(images[0])) if len(images) == 1 else ()
+    if not missing:
+        return lacking(option)
+    return UsageError(
+        sentence(
+            "cli.part-of-record-missing",
+            "{option} FILE is missing. Only a record needs none, and {folder} is "
+            "not a whole one: it lacks {missing}. Restore what it lacks from a "
+            "copy, or give --camera FILE and --pen FILE.",
+            option=option,
+            folder=images[0],
+            missing=", ".join(missing),
+        )
+    )
+
+
+def _from_observations(options: argparse.Namespace) -> _Calibrated:
+    for name, file in (("--camera", options.camera), ("--pen", options.pen)):
+        if file is None:
+            raise _lacking(name, options.images)
+    camera = read_camera(options.camera)
+    pen = _read_pen(options)
+    separation = separation_of(options)
+    if options.centers is not None:
+        _require_one_each(options.centers, 1, RIG_NEEDED)
+        given = [str(options.centers[0])]
+    else:
+        if len(options.images) > 1 and any(Path(p).is_dir() for p in options.images):
+            _require_one_each(options.images, 1, RIG_NEEDED)
+        given = options.images
+    observe = partial(
+        _observe, options.json, camera, pen, is_centers=options.centers is not None
+    )
+    observations, files = observe(given)
+    second = None
+    if separation is not None:
+        others, more_files = observe([options.second_cone])
+        second, files = SecondSwing(others, separation), files + more_files
+    origin = _origin(options.camera, options.pen, *files)
+    return _Calibrated(
+        calibrate(camera, pen, observations, assumptions_of(options), second),
+        pen.nominal_tip,
+        SwingLimits(),
+        origin,
+        lambda: Inputs(
+            camera=hashed(options.camera),
+            pen=hashed(options.pen),
+            observations=all_hashed(files),
+            nominal_tip=pen.nominal_tip,
+            origin=origin,
+        ),
+    )
+
+
+def _origin(*files: Path) -> Origin:
+    """Return what a calibration from files is of."""
+    return Origin.SIMULATED if any(map(is_simulated, files)) else Origin.RECORDED
+
+
+def _read_pen(options: argparse.Namespace) -> Pen:
+    nominal_tip = None if options.nominal_tip is None else np.array(options.nominal_tip)
+    return read_pen(options.pen, options.units, options.led_diameter, nominal_tip)
+
+
+def _from_rig(options: argparse.Namespace) -> _Calibrated:
+    if options.camera is not None:
+        raise UsageError(
+            sentence(
+                "cli.rig-and-camera",
+                "The rig file names the files of its cameras. Leave out --camera.",
+            )
+        )
+    if options.second_cone is not None:
+        raise UsageError(
+            sentence(
+                "cli.rig-and-second-cone",
+                "A second cone is taken up with a single camera only. Leave out "
+                "--second-cone, --distance and --distance-sigma.",
+            )
+        )
+    if options.pen is None:
+        raise _lacking("--pen", ())
+    rig_file = read_rig(options.rig)
+    rig = rig_file.rig
+    pen = _read_pen(options)
+    in_order = sentence(
+        "cli.one-of-each-camera",
+        "The rig has {n_cameras} cameras: give one for each, in the order of its file "
+        "({names}), and a pattern in quotation marks.",
+        n_cameras=rig.n_cameras,
+        names=", ".join(rig.names),
+    )
+    if options.centers is not None:
+        _require_one_each(options.centers, rig.n_cameras, in_order)
+        centers = [read_centers(file, pen.n_leds) for file in options.centers]
+        files: tuple[Path, ...] = tuple(options.centers)
+        pairing = pair_images([list(map(str, c.frames)) for c in centers], rig.names)
+        observations = observe_rig_centers(centers, pairing, rig, pen)
+    else:
+        _require_one_each(options.images, rig.n_cameras, in_order)
+        _require_other_names(options.images, rig.names)
+        sources = [find_images(place) for place in options.images]
+        files = tuple(file for source in sources for file in source.files)
+        require_other_file(options.json, *files, *rig_file.camera_files)
+        pairing = pair_images([source.names for source in sources], rig.names)
+        with progress("Finding LEDs") as report:
+            observations = observe_rig_images(sources, pairing, rig, pen, report)
+    if pairing.by_order:
+        _note(
+            sentence(
+                "rig.paired-by-order",
+                "The names of the images do not tell which are of the same moment: the "
+                "first of each camera are taken as one moment, and so on.",
+            )
+        )
+    origin = _origin(options.rig, options.pen, *rig_file.camera_files, *files[:1])
+    return _Calibrated(
+        calibrate_rig(rig, pen, observations, assumptions_of(options)),
+        pen.nominal_tip,
+        SwingLimits(),
+        origin,
+        lambda: Inputs(
+            camera=hashed(rig_file.camera_files[0]),
+            pen=hashed(options.pen),
+            observations=all_hashed(files),
+            nominal_tip=pen.nominal_tip,
+            rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
+            origin=origin,
+        ),
+    )
+
+
+def _require_one_each(
+    given: Sequence[str | Path], n_cameras: int, why: Sentence
+) -> None:
+    """Refuse another number of places than of cameras, and one that is given twice."""
+    if len(given) != n_cameras:
+        raise UsageError(
+            sentence(
+                "cli.other-number",
+                "Folders or files given: {n_given}. {why}",
+                n_given=len(given),
+                why=why,
+            )
+        )
+    places = [os.path.realpath(place) for place in given]
+    if len(set(places)) < len(places):
+        raise UsageError(
+            sentence("cli.place-twice", "A place is given twice. {why}", why=why)
+        )
+
+
+def _require_other_names(places: Sequence[str], names: Sequence[str]) -> None:
+    """Refuse folders that are called as the cameras, but in another order."""
+    folders = [Path(place).name.casefold() for place in places]
+    cameras = [name.casefold() for name in names]
+    if folders != cameras and sorted(folders) == sorted(cameras):
+        raise UsageError(
+            sentence(
+                "cli.other-order",
+                "The folders {folders} are in another order than the cameras of the "
+                "rig file, {names}. Give them in the order of the file.",
+                folders=", ".join(map(str, places)),
+                names=", ".join(names),
+            )
+        )
+
+
+def _observe(
+    record: Path | None,
+    camera: Camera,
+    pen: Pen,
+    given: Sequence[str],
+    *,
+    is_centers: bool,
+) -> tuple[Observations, tuple[Path, ...]]:
+    """Return what images or a file of centres show, and the files of it."""
+    if is_centers:
+        path = Path(given[0])
+        require_other_file(record, path)
+        centers = read_centers(path, pen.n_leds)
+        return observe_centers(centers, camera, pen), (path,)
+    source = find_images(*given)
+    require_other_file(record, *source.files)
+    with progress("Finding LEDs") as report:
+        return observe_images(source, camera, pen, report), source.files

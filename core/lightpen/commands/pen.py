@@ -1,0 +1,34 @@
+"""``lightpen pen``: put measured LEDs into the pen frame."""
+
+import argparse
+from pathlib import Path
+
+from lightpen.commands.arguments import add_pen_options
+from lightpen.commands.console import are_same, printing, shown
+from lightpen.errors import UsageError
+from lightpen.formats.pen_files import read_raw_pen, write_pen
+from lightpen.sentences import sentence
+
+
+def add_pen(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen pen``."""
+    parser.set_defaults(run=_pen)
+    parser.add_argument("raw", type=Path, metavar="RAW.csv")
+    parser.add_argument("out", type=Path, metavar="OUT.csv")
+    add_pen_options(parser)
+
+
+@printing
+def _pen(options: argparse.Namespace) -> None:
+    if are_same(options.raw, options.out):
+        raise UsageError(
+            sentence(
+                "cli.pen-over-raw",
+                "{out} would replace the measured LEDs that it is made from. Give the "
+                "pen file another name.",
+                out=str(options.out),
+            )
+        )
+    raw = read_raw_pen(options.raw, options.units, options.led_diameter)
+    write_pen(raw, options.out)
+    print(shown(f"{raw.n_leds} LEDs in the pen frame are in {options.out}."))

@@ -1,0 +1,149 @@
+"""``lightpen simulate``: write a simulated swing."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from lightpen.commands.arguments import finite, whole_number
+from lightpen.commands.console import printing, progress, shown
+from lightpen.model.pen import DISC_DIAMETER
+
+MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
+MAX_RIG = 4  # simulated cameras
+MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
+MIN_BLUR, MAX_BLUR = 0.3, 8.0  # px, of simulated optics
+MAX_RENDERED = 30_000  # images
+
+
+def add_simulate(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen simulate``."""
+    parser.set_defaults(run=_simulate)
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder to write")
+    parser.add_argument("--images", type=_n_images, default=60, metavar="N")
+    parser.add_argument("--seed", type=whole_number, default=0, metavar="S")
+    parser.add_argument(
+        "--scene", choices=("clean", "hard"), default="clean", help="what goes wrong"
+    )
+    parser.add_argument(
+        "--swing",
+        choices=("field", "cone", "operator", "one-axis", "upright"),
+        default="field",
+        help="how the pen moves",
+    )
+    parser.add_argument(
+        "--leds",
+        choices=("even", "hot-spot", "dome", "ring", "halo", "ghost"),
+        default="even",
+        help="how the LEDs look inside and round their rims",
+    )
+    parser.add_argument(
+        "--led-diameter", type=_led_diameter, default=DISC_DIAMETER, metavar="MM"
+    )
+    parser.add_argument(
+        "--blur",
+        type=_blur,
+        default=0.8,
+        metavar="PX",
+        help="standard deviation of the optics' blur",
+    )
+    parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
+    parser.add_argument(
+        "--cameras",
+        type=int,
+        choices=range(1, MAX_RIG + 1),
+        default=1,
+        help="in a row, each turned to the pen; of several OUT gets a folder each, and "
+        "rig.json",
+    )
+    parser.add_argument(
+        "--baseline",
+        type=_baseline,
+        default=1000.0,
+        metavar="MM",
+        help="from the first of several cameras to the last",
+    )
+    parser.add_argument(
+        "--pen",
+        choices=("paper", "six", "eight", "near-symmetric", "fanned"),
+        default="paper",
+        help="layout of the LEDs",
+    )
+
+
+def _led_diameter(text: str) -> float:
+    diameter = finite(text)
+    if not MIN_LED_DIAMETER <= diameter <= MAX_LED_DIAMETER:
+        raise argparse.ArgumentTypeError(
+            f"{text} mm is no diameter from {MIN_LED_DIAMETER:g} to "
+            f"{MAX_LED_DIAMETER:g} mm."
+        )
+    return diameter
+
+
+def _blur(text: str) -> float:
+    sigma = finite(text)
+    if not MIN_BLUR <= sigma <= MAX_BLUR:
+        raise argparse.ArgumentTypeError(
+            f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
+        )
+    return sigma
+
+
+def _baseline(text: str) -> float:
+    baseline = finite(text)
+    if not MIN_BASELINE <= baseline <= MAX_BASELINE:
+        raise argparse.ArgumentTypeError(
+            f"{text} mm is no baseline from {MIN_BASELINE:g} to {MAX_BASELINE:g} mm."
+        )
+    return baseline
+
+
+def _n_images(text: str) -> int:
+    number = whole_number(text)
+    if number == 0:
+        raise argparse.ArgumentTypeError("at least one image is needed.")
+    if number > MAX_RENDERED:
+        raise argparse.ArgumentTypeError(f"at most {MAX_RENDERED} images are rendered.")
+    return number
+
+
+@printing
+def _simulate(options: argparse.Namespace) -> None:
+    # Imported here as the simulator is not needed to calibrate.
+    from lightpen.simulator.sample_pens import SAMPLE_PENS
+    from lightpen.simulator.sample_rigs import row_of_cameras
+    from lightpen.simulator.scene_files import write_rig_scene, write_scene
+    from lightpen.simulator.scenes import LEDS, SCENES, Scene
+    from lightpen.simulator.sensor import Sensor
+
+    looks = LEDS[options.leds]
+
+    scene = Scene(
+        n_images=options.images,
+        seed=options.seed,
+        swing=options.swing,
+        disturbances=SCENES[options.scene],
+        sensor=Sensor(bits=options.bits),
+        faces=looks.faces,
+        optics=replace(looks.optics, psf_sigma=options.blur),
+        pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
+    )
+    with progress("Rendering") as report:
+        if options.cameras == 1:
+            x, y, z = write_scene(scene, options.out, report)
+            written = f"{scene.n_images} images, camera.yaml"
+        else:
+            rig = row_of_cameras(options.cameras, options.baseline)
+            x, y, z = write_rig_scene(scene, rig, options.out, report)
+            folders = ", ".join(rig.names)
+            written = (
+                f"{scene.n_images} images of each camera (folders {folders}), their "
+                "camera files, rig.json"
+            )
+    print(
+        shown(
+            f"{written}, leds.csv and the true answer (truth.json) are in "
+            f"{options.out}.\nThe true tip is {x:.4f} {y:.4f} {z:.4f} mm in the "
+            "frame of leds.csv."
+        )
+    )

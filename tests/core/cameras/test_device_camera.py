@@ -1,0 +1,39 @@
+"""A camera that a library drives, when what it is told does not arrive."""
+
+import pytest
+
+from lightpen.cameras.basler import BASLER
+from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.genapi_features import GenapiFeatures
+from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
+from lightpen.cameras.source import SourcePlace
+
+TRIGGERED = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
+
+
+def test_a_trigger_that_never_reached_the_camera_is_given_again(
+    basler: SourcePlace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    commands: list[str] = []
+    execute = GenapiFeatures.execute
+
+    def lose_the_first(features: GenapiFeatures, name: str) -> None:
+        commands.append(name)
+        if len(commands) > 1:
+            execute(features, name)
+
+    monkeypatch.setattr(GenapiFeatures, "execute", lose_the_first)
+    assert BASLER.camera is not None
+    camera = BASLER.camera(basler, MachineClock())
+    camera.open()
+    try:
+        camera.configure(TRIGGERED)
+        camera.start()
+        with pytest.raises(FrameTimeout):
+            camera.read(0.3)
+        assert commands == ["TriggerSoftware"]
+
+        assert camera.read(5.0).seq == 0
+        assert commands == ["TriggerSoftware"] * 2
+    finally:
+        camera.close()
