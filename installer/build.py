@@ -44,7 +44,7 @@ from installer.payload import (
     unpack_wheels,
     write_file_list,
 )
-from installer.places import INSTALLER, ROOT
+from installer.places import INSTALLER, IS_WINDOWS, ROOT
 from installer.runtime import RuntimeFileError
 from installer.sbom import Component, bill_of_materials
 
@@ -219,11 +219,9 @@ def pack(
         "SIZE_KB": str(size),
         "SLASH": os.sep,
         **({"SIGN": sign} if sign else {}),
-        # The installer of 64 bits runs where Wine has no 32; that of 32 says on an
-        # old Windows what is missing.
-        **(
-            {} if packing is Packing.SMALL else {"QUICK": "", "TARGET": "amd64-unicode"}
-        ),
+        # Debian's NSIS makes installers of 64 bits, which run where Wine has no 32.
+        **({} if IS_WINDOWS else {"TARGET": "amd64-unicode"}),
+        **({} if packing is Packing.SMALL else {"QUICK": ""}),
         **({"STORED": ""} if packing is Packing.STORED else {}),
     }
     options = [f"-D{name}={value}" for name, value in defined.items()]
