@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from email.message import Message
 from email.parser import HeaderParser
 from pathlib import Path
 
@@ -18,6 +19,7 @@ RULE = "=" * 78
 # Qt for Python names the LGPL and leaves its text out; it refers to that of the GPL.
 LGPL = ("LGPL-3.0.txt", "GPL-3.0.txt")
 ADDED = {"PySide6_Essentials": LGPL, "shiboken6": LGPL}
+LICENCE = "License :: "  # of the classifiers of PyPI
 NAMES = re.compile("(licen[cs]e|copying|notice|authors)", re.IGNORECASE)
 
 
@@ -72,13 +74,16 @@ def _part(folder: Path) -> Part:
     return Part(
         name=metadata["Name"],
         version=metadata["Version"],
-        licence=_licence(metadata.get("License-Expression"), metadata.get("License")),
+        licence=_licence(metadata),
         texts=tuple(texts),
     )
 
 
-def _licence(expression: str | None, text: str | None) -> str:
-    return (expression or text or "see below").strip().splitlines()[0]
+def _licence(metadata: Message) -> str:
+    classifiers = metadata.get_all("Classifier", [])
+    classified = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith(LICENCE)]
+    stated = metadata.get("License-Expression") or metadata.get("License")
+    return (stated or ", ".join(classified) or "see below").strip().splitlines()[0]
 
 
 def _read(path: Path) -> str:

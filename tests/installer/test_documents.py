@@ -44,6 +44,16 @@ def test_a_part_without_a_licence_is_noticed(tmp_path: Path) -> None:
     assert unlicensed(parts_of(tmp_path, PYTHON)) == ["CPython", "nameless"]
 
 
+def test_a_licence_can_be_stated_by_a_classifier_alone(tmp_path: Path) -> None:
+    classifier = "Classifier: License :: OSI Approved :: BSD License"
+    metadata = distribution(tmp_path, "colour", "") / "METADATA"
+    metadata.write_text(f"Name: colour\nVersion: 1.0\n{classifier}\n\nText", "utf-8")
+
+    (_, part) = parts_of(tmp_path, PYTHON)
+
+    assert part.licence == "BSD License"
+
+
 def test_the_list_of_parts_names_each_with_its_digest() -> None:
     bill = json.loads(bill_of_materials("0.1.0", [NUMPY], 0))
 
