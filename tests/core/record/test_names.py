@@ -62,3 +62,4 @@ def test_whatever_the_names_the_folder_can_be_made(tmp_path: Path, name: str) ->
 
     assert folder.parent == tmp_path
     assert len(folder.name.encode()) < 250
+    assert not folder.name.endswith(".")  # which Windows would leave out
