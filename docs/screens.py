@@ -72,6 +72,7 @@ N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 REFRESH_MS = 200  # of the plots
 COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
+PAUSE = 0.01  # s between two looks at what is waited for
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,7 @@ class Stage:
 
     def _wait_until(self, condition: Callable[[], bool]) -> None:
         while not condition():
+            time.sleep(PAUSE)  # the work that is waited for needs the processor, too
             self._settle()
 
     def _settle(self) -> None:

@@ -98,6 +98,12 @@ class _Cover(NamedTuple):
     leds: frozenset[int]
 
 
+class _Wish(NamedTuple):
+    due: float  # s
+    act: Callable[[], None]
+    moves: bool  # the pen, not the hand before it
+
+
 class Operator:
     """A simulated operator who holds a pen of ``n_leds`` LEDs.
 
@@ -123,7 +129,7 @@ class Operator:
         self._turn_tremor = Tremor(self._rng)
         self._tip_tremor = Tremor(self._rng)
         self._lock = Lock()
-        self._wishes: list[tuple[float, Callable[[], None]]] = []
+        self._wishes: list[_Wish] = []
         self._n_steps = int(clock.now_ns() * 1e-9 / STEP)
         self._lean, self._lean_rate = UPRIGHT.copy(), np.zeros(3)
         self._seat = SEAT  # where the tip rests when it is put down
@@ -151,9 +157,10 @@ class Operator:
 
     @property
     def is_free(self) -> bool:
-        """Whether the pen is away and nothing is asked for."""
+        """Whether the pen is away and nobody asked for it."""
         with self._lock:
-            return self._place is AWAY and not self._route and not self._wishes
+            is_wanted = any(wish.moves for wish in self._wishes)
+            return self._place is AWAY and not self._route and not is_wanted
 
     def seat(self) -> None:
         """Bring the pen to the cone, put its tip in and hold it still."""
@@ -236,11 +243,11 @@ class Operator:
             raise ValueError(
                 f"`leds` must be from 1 to {len(self._all_leds)}, got {sorted(hidden)}."
             )
-        self._wish(partial(self._cover, seconds, hidden))
+        self._wish(partial(self._cover, seconds, hidden), moves=False)
 
     def uncover(self) -> None:
         """Take the hand away from the LEDs."""
-        self._wish(self._uncover)
+        self._wish(self._uncover, moves=False)
 
     def held(self, times: FloatArray) -> Held:
         """Return how the pen is held; later calls must not ask for earlier times.
@@ -270,19 +277,21 @@ class Operator:
                 not self._route and self._place is AWAY,
             )
 
-    def _wish(self, act: Callable[[], None], delay: float = 0.0) -> None:
+    def _wish(
+        self, act: Callable[[], None], delay: float = 0.0, *, moves: bool = True
+    ) -> None:
         due = self._clock.now_ns() * 1e-9 + delay
         with self._lock:
-            self._wishes.append((due, act))
-            self._wishes.sort(key=lambda wish: wish[0])
+            self._wishes.append(_Wish(due, act, moves))
+            self._wishes.sort(key=lambda wish: wish.due)
 
     def _advance(self, n_steps: int) -> None:
         patience = round(PATIENCE / STEP)
         self._n_steps = max(self._n_steps, n_steps - patience)
         while self._n_steps < n_steps:
             self._n_steps += 1
-            while self._wishes and self._wishes[0][0] <= self._time:
-                self._wishes.pop(0)[1]()
+            while self._wishes and self._wishes[0].due <= self._time:
+                self._wishes.pop(0).act()
             self._move_tip()
             self._move_lean()
             self._moments.append(_Moment(self._lean, self._offset))

@@ -155,8 +155,7 @@ class SwingRunner:
 
     def shut_down(self) -> None:
         """Do what was commanded, leave the swing to be resumed, and end."""
-        self._queue.ask(self._course.abandon)
-        self._queue.end()
+        self._queue.end(self._course.abandon)
 
     def await_end(self, timeout_s: float) -> bool:
         """Wait for the end after `shut_down` and return whether it came."""

@@ -104,9 +104,12 @@ class SerialQueue:
         task.run(run, f"{self._name} task")
         return task
 
-    def end(self) -> None:
-        """Do what was asked for so far, and end; running tasks are cancelled."""
-        self.ask(self._end)
+    def end(self, last: Act = lambda: None) -> None:
+        """Do what was asked for so far and the last, and end.
+
+        Nothing comes between that and the end. Running tasks are cancelled.
+        """
+        self.ask(partial(self._end, last))
 
     def await_end(self, timeout_s: float) -> bool:
         """Wait until the thread and all tasks have ended; return whether they have."""
@@ -137,10 +140,13 @@ class SerialQueue:
             if not self._ending.is_set():
                 self._begin(after_bug=act is not self._on_bug)
 
-    def _end(self) -> None:
-        self._ending.set()
-        for task in self._tasks:
-            task.cancel()
+    def _end(self, last: Act) -> None:
+        try:
+            last()
+        finally:
+            self._ending.set()
+            for task in self._tasks:
+                task.cancel()
 
 
 class Task:

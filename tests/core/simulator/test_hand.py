@@ -127,6 +127,8 @@ def test_an_operator_who_was_asked_for_something_is_free_no_more() -> None:
     scene = Scene(seated=False)
     assert scene.operator.is_free
 
+    scene.operator.uncover()
+    assert scene.operator.is_free
     scene.operator.swing()
     assert scene.doing() is Doing.ABSENT
     assert not scene.operator.is_free

@@ -98,6 +98,28 @@ def test_what_is_asked_for_before_the_end_is_done_and_nothing_after_it(
     assert diary.entries == [True, "before"]
 
 
+def test_nothing_comes_between_the_last_act_and_the_end(
+    queue: SerialQueue, diary: Diary
+) -> None:
+    may_go_on = threading.Event()
+    queue.ask(lambda: diary.note(may_go_on.wait(TIMEOUT)))
+    queue.end(lambda: queue.ask(diary.noting("late")))
+    queue.ask(diary.noting("later"))
+    may_go_on.set()
+    assert queue.await_end(TIMEOUT)
+
+    assert diary.entries == [True]
+
+
+def test_a_bug_of_the_last_act_does_not_keep_the_queue_from_its_end(
+    queue: SerialQueue, crashes: "SimpleQueue[type[BaseException]]"
+) -> None:
+    queue.end(fail)
+
+    assert queue.await_end(TIMEOUT)
+    assert crashes.get(timeout=TIMEOUT) is ZeroDivisionError
+
+
 def test_nobody_waits_for_what_is_asked_after_the_end(
     queue: SerialQueue, diary: Diary
 ) -> None:

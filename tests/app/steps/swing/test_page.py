@@ -639,7 +639,12 @@ def test_finishing_early_says_what_is_missing_and_can_be_declined(
     keep_on(qtbot, capturing)
 
 
-def test_closing_the_window_asks_and_names_the_images(capturing: Desk) -> None:
+def test_closing_the_window_asks_and_names_the_images(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    capturing.run.runner.pause()
+    until(qtbot, lambda: capturing.state.phase is Phase.PAUSED)
+
     assert (
         f"kept so far ({capturing.state.n_kept}) are safe" in capturing.page.unsaved()
     )
