@@ -3,16 +3,15 @@
 import re
 import shutil
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from installer.payload import FILE_LIST
 from installer.places import IS_WINDOWS
 from installer.trial import CLASSES, IMAGE, UNINSTALL, Trial, await_so, last_option
 
 from lightpen.record.reading import OPENER, open_record
 from lightpen.record.writing import RecordWriter
+from lightpen_app.self_test.installed_files import FILE_LIST, damaged_files
 from lightpen_app.self_test.swing import NAMES, record_swing
 
 RUNNING, NEWER, FOREIGN = 5, 6, 7  # exit status of the installer
@@ -197,14 +196,10 @@ def try_removal(trial: Trial, files: frozenset[str], registry: frozenset[str]) -
     _expect_nothing_left(trial, files, registry)
 
 
-def damaged(trial: Trial) -> list[str]:
+def damaged(trial: Trial) -> tuple[str, ...]:
     """Return the installed files that are not as they were built."""
     files = trial.folder / FILE_LIST
-    if not files.exists():
-        return [FILE_LIST]
-    lines = files.read_text("utf-8").splitlines()
-    entries = [line.split("  ", maxsplit=1) for line in lines]
-    return [name for digest, name in entries if _digest(trial.folder / name) != digest]
+    return damaged_files(files) if files.exists() else (FILE_LIST,)
 
 
 def _expect_nothing_left(
@@ -240,7 +235,3 @@ def _show_classes_to_wine(trial: Trial) -> None:
         there = rf"HKLM\Software\Classes\{name}"
         copy = ["reg", "copy", rf"{CLASSES}\{name}", there, "/s", "/f"]
         trial.machine.run(copy)
-
-
-def _digest(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest() if path.is_file() else "missing"
