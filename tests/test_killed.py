@@ -19,10 +19,10 @@ from lightpen.record.solving import solve_record
 from lightpen.record.unfinished import find_unfinished
 from lightpen.simulator.swings import PAPER_TIP
 
-N_KILLS = 20
+N_KILLS = 12
 STARTING = 0.6  # s in which a swing is begun or resumed
 KEEPING = 0.05  # s in which an image is kept
-FEWEST = 30  # images in all, or the test has not tested much
+FEWEST = 18  # images in all, or the test has not tested much
 
 # Starts the wizard's swing without its window, in a new process for each line that it
 # reads, and tells what was acknowledged. It forks, as importing takes a second.
@@ -31,6 +31,7 @@ import os, sys, time
 from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication
+import lightpen.simulator.camera
 from lightpen.simulator.hand import Operator
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.simulator.camera import SimulatedCamera
@@ -46,6 +47,7 @@ from lightpen_app.work.workbench import Workbench
 from lightpen_app.work.settings import Settings
 
 SPEED = 8
+lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1")
 ENDLESS = SwingLimits(min_images=100_000, max_images=100_000)
 

@@ -117,7 +117,7 @@ def test_a_calibration_gives_the_same_tip_in_any_locale(
     script: Callable[..., CompletedProcess[str]],
     tmp_path: Path,
 ) -> None:
-    folder = scene("--images", "20", "--seed", "3")
+    folder = scene("--images", "8", "--seed", "3")
     words = ("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv")
     tips = {}
     for name in LOCALES:
