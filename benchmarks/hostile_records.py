@@ -32,7 +32,7 @@ from lightpen.record.archive import Archive
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import HEADER, open_record, record_files, source
+from lightpen.record.reading import HEADER, OPENER, open_record, record_files, source
 from lightpen.record.results import Result
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter
@@ -110,7 +110,8 @@ def unnamed_flips(data: Data, n_flips: int) -> tuple[int, int]:
         not _is_named(lambda: data.archive.in_force(NAMES.pen, NAMES.tip), data.result)
         for _ in _flips([data.result], n_flips, rng)
     )
-    files = record_files(open_record(data.swing))
+    record = record_files(open_record(data.swing))
+    files = [file for file in record if file.name != OPENER]  # nothing reads that one
     n_record = sum(
         not _is_named(lambda: _read_all(data.swing), file)
         for file in _flips(files, n_flips, rng)

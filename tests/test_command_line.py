@@ -836,12 +836,56 @@ def test_simulating_onto_a_file_is_refused(lightpen: Run, tmp_path: Path) -> Non
 # The window and the output
 
 
+class WitnessingDesktop:
+    """Notes what is opened, or raises what goes wrong with it."""
+
+    def __init__(self, trouble: OSError | None = None) -> None:
+        self.opened: list[Path | None] = []
+        self._trouble = trouble
+
+    def show_window(self, swing: Path | None) -> int:
+        if self._trouble is not None:
+            raise self._trouble
+        self.opened.append(swing)
+        return 0
+
+    def play_demo(self) -> int:
+        raise NotImplementedError
+
+    def test_itself(self, report: Path) -> int:
+        raise NotImplementedError
+
+    def install_entry(self) -> int:
+        raise NotImplementedError
+
+    def remove_entry(self) -> int:
+        raise NotImplementedError
+
+
 def test_what_the_window_cannot_read_is_not_taken_for_output_that_fails() -> None:
-    def show_window(plays_demo: bool) -> int:
-        raise FileNotFoundError("a font")
+    desktop = WitnessingDesktop(FileNotFoundError("a font"))
 
     with pytest.raises(FileNotFoundError, match="a font"):
-        main([], show_window)
+        main([], desktop)
+
+
+@pytest.mark.parametrize("words", [["open", "{0}"], ["{0}"]])
+def test_a_file_alone_is_opened_in_the_window(tmp_path: Path, words: list[str]) -> None:
+    file = tmp_path / "swing.lightpen"
+    file.touch()
+    desktop = WitnessingDesktop()
+
+    assert main([word.format(file) for word in words], desktop) == 0
+    assert desktop.opened == [file]
+
+
+def test_a_word_that_is_neither_command_nor_file_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["calibrte"], WitnessingDesktop())
+
+    assert "invalid choice: 'calibrte'" in capsys.readouterr().err
 
 
 def test_output_that_fails_is_told_even_without_a_standard_output(

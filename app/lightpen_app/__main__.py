@@ -1,7 +1,53 @@
-"""Start of the program: its window, its demo, or a command."""
+"""Start of the program: its window, its demo, its test of itself, or a command."""
 
 import os
 import sys
+from pathlib import Path
+
+SELF_TEST = "--self-test"
+
+
+class Starts:
+    """What can be started beside the commands; each is imported when it is wanted.
+
+    Commands start faster without the window's libraries.
+    """
+
+    def show_window(self, swing: Path | None) -> int:
+        """Open the window; with what leads to a recorded swing, show that."""
+        from lightpen.formats.decoding import keep_freed_memory
+        from lightpen_app.application import run
+        from lightpen_app.wizard_pages import make_pages
+
+        keep_freed_memory()
+        return run(make_pages, swing)
+
+    def play_demo(self) -> int:
+        """Play a calibration with a simulated operator."""
+        from lightpen.formats.decoding import keep_freed_memory
+        from lightpen_app.application import run_demo
+        from lightpen_app.wizard_pages import make_pages
+
+        keep_freed_memory()
+        return run_demo(make_pages)
+
+    def test_itself(self, report: Path) -> int:
+        """Try what the program needs, and write a report."""
+        from lightpen_app.self_test.run import test_program
+
+        return test_program(report)
+
+    def install_entry(self) -> int:
+        """Put the program into the menu of the desktop."""
+        from lightpen_app.desktop_entry import install_entry
+
+        return install_entry()
+
+    def remove_entry(self) -> int:
+        """Take it out of the menu again."""
+        from lightpen_app.desktop_entry import remove_entry
+
+        return remove_entry()
 
 
 def main() -> int:
@@ -9,19 +55,12 @@ def main() -> int:
     # Before numpy is imported: the matrices are many and small; threads would only
     # wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if len(sys.argv) == 3 and sys.argv[1] == SELF_TEST:
+        # A damaged file is to be named, also one that all commands need.
+        return Starts().test_itself(Path(sys.argv[2]))
     from lightpen.cli import main as run
 
-    return run(show_window=_show_window)
-
-
-def _show_window(plays_demo: bool) -> int:
-    # Commands start faster without the window's libraries.
-    from lightpen.formats.decoding import keep_freed_memory
-    from lightpen_app.application import run, run_demo
-    from lightpen_app.wizard_pages import make_pages
-
-    keep_freed_memory()
-    return run_demo(make_pages) if plays_demo else run(make_pages)
+    return run(desktop=Starts())
 
 
 if __name__ == "__main__":

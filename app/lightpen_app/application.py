@@ -131,8 +131,13 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     return application
 
 
-def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
+def run(make_pages: MakePages, swing: Path | None = None) -> int:
     """Show the wizard until its window closes, and return the exit status.
+
+    Parameters
+    ----------
+    swing : Path, optional
+        What leads to a swing that is to be shown, see `lightpen.record.opening`.
 
     Raises
     ------
@@ -147,28 +152,31 @@ def run(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
                 "screen, or give a command; lightpen --help lists them.",
             )
         )
-    application = make_application(arguments)
+    application = make_application(sys.argv)
     with EndSignals(application) as signals:
         settings = Settings(settings_file())
         folder = data_folder(settings.preferences())
         wizard = Wizard(application, make_pages, settings, folder)
+        if swing is not None:
+            open_swing = partial(wizard.workbench.swing_wanted.emit, swing)
+            QTimer.singleShot(0, open_swing)
         status = _shown(application, wizard, signals)
     return _ended(wizard, status)
 
 
-def run_demo(make_pages: MakePages, arguments: Sequence[str] = sys.argv) -> int:
+def run_demo(make_pages: MakePages) -> int:
     """Play the demo, and return the exit status.
 
     Without a display it is played unseen, in a time of its own that waits for a machine
     too slow for it; what happens is printed, and at the end the tip. Settings and
     records of the user are left alone.
     """
-    is_seen = has_display()
+    is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
     around = Surroundings(clock=MachineClock() if is_seen else SkippingClock())
     if not is_seen:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         qInstallMessageHandler(_tell_but_hints)
-    application = make_application(arguments)
+    application = make_application(sys.argv)
     with (
         EndSignals(application) as signals,
         TemporaryDirectory(prefix="lightpen-demo-") as folder,

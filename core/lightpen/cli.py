@@ -6,15 +6,17 @@ Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable i
 import argparse
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from io import TextIOWrapper
-from typing import NoReturn, TypeAlias
+from pathlib import Path
+from typing import NoReturn
 
 import cv2
 
 from lightpen.commands.calibrate import add_calibrate
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
+from lightpen.commands.desktop import Desktop, add_desktop, add_open
 from lightpen.commands.pen import add_pen
 from lightpen.commands.pen_health import add_improve_pen
 from lightpen.commands.pivot import add_pivot
@@ -38,25 +40,22 @@ ADVICE = {
 }
 
 
-ShowWindow: TypeAlias = Callable[[bool], int]
-
-
-def main(
-    arguments: Sequence[str] | None = None, show_window: ShowWindow | None = None
-) -> int:
+def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None) -> int:
     """Run the command line and return the exit status.
 
     Parameters
     ----------
     arguments : sequence of str, optional
         Those of the process unless given.
-    show_window : callable, optional
-        Opens the program's window, or its demo if its argument is True, and returns
-        the exit status. Without it a command must be given.
+    desktop : Desktop, optional
+        Without it a command must be given.
     """
     given = sys.argv[1:] if arguments is None else arguments
+    parser, commands = _parser(desktop)
+    if desktop is not None and _is_file_to_open(given, commands):
+        given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
-    options = _parser(show_window).parse_args(
+    options = parser.parse_args(
         [f" {text}" if NEGATIVE_NUMBER.match(text) else text for text in given]
     )
     for stream in (sys.stdout, sys.stderr):
@@ -89,8 +88,11 @@ class _Parser(argparse.ArgumentParser):
         super().error(shown(message))
 
 
-def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
-    has_window = show_window is not None
+def _parser(
+    desktop: Desktop | None,
+) -> tuple[argparse.ArgumentParser, Collection[str]]:
+    """Return the parser, and the names of its commands."""
+    has_window = desktop is not None
     parser = _Parser(
         prog="lightpen",
         description="Calibrate the probe tip of a light pen."
@@ -99,14 +101,10 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
         "unreadable input.",
     )
     parser.add_argument("--version", action="version", version=version("lightpen"))
-    if show_window is not None:
-        parser.set_defaults(run=lambda options: show_window(options.demo))
-        parser.add_argument(
-            "--demo",
-            action="store_true",
-            help="play a whole calibration with a simulated operator",
-        )
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
+    if desktop is not None:
+        add_desktop(parser, desktop)
+        add_open(commands.add_parser("open", help="show a recorded swing"), desktop)
     add_calibrate(commands.add_parser("calibrate", help="find the tip from a swing"))
     add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
     add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
@@ -123,4 +121,9 @@ def _parser(show_window: ShowWindow | None) -> argparse.ArgumentParser:
     add_improve_pen(
         commands.add_parser("improve-pen", help="a better LED file by several swings")
     )
-    return parser
+    return parser, commands.choices
+
+
+def _is_file_to_open(given: Sequence[str], commands: Collection[str]) -> bool:
+    """Return whether there is nothing but a file, as icons hand it over."""
+    return len(given) == 1 and given[0] not in commands and Path(given[0]).exists()

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QTimer
@@ -17,6 +16,7 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 import lightpen_app.work.workbench
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
+from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import write_pen
 from lightpen.live.sources import Surroundings, camera_of
 from lightpen.record.folder_archive import RESULTS, SIMULATED
@@ -146,7 +146,7 @@ def give_path(walker: "Walker", name: str, path: Path) -> None:
 
 def picture_in(folder: Path) -> Path:
     path = folder / "picture.png"
-    cv2.imwrite(str(path), np.zeros((8, 8), np.uint8))
+    path.write_bytes(encode_png(np.zeros((8, 8), np.uint8)))
     return path
 
 

@@ -78,6 +78,8 @@ class Workbench(QObject):
         So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
+    swing_wanted(Path)
+        What leads to a recorded swing was opened from outside the program.
     relieved(str)
         A sentence of `troubled` whose cause is gone.
     cameras_found(tuple of FoundDevice)
@@ -88,6 +90,7 @@ class Workbench(QObject):
     changed = Signal()
     subject_changed = Signal(object)
     others_counted = Signal(int)
+    swing_wanted = Signal(object)
     troubled = Signal(str)
     relieved = Signal(str)
     cameras_found = Signal(object)

@@ -43,8 +43,8 @@ class BaslerDevice:
 
     def open(self) -> None:
         """Take hold of the camera."""
-        if not _is_installed():
-            raise DeviceNotFound(_ABSENT)
+        if (why_absent := _why_absent()) is not None:
+            raise DeviceNotFound(why_absent)
         from pypylon import genicam, pylon
 
         try:
@@ -157,20 +157,21 @@ def _find(producer: str) -> tuple[FoundDevice, ...]:
     )
 
 
-_ABSENT = sentence(
-    "basler.absent",
-    "pypylon is not installed. It drives Basler cameras: {python} -m pip install "
-    "pypylon",
-    python=sys.executable,
-)
-
-
-def _is_installed() -> bool:
-    return find_spec("pypylon") is not None
-
-
 def _why_absent() -> Sentence | None:
-    return None if _is_installed() else _ABSENT
+    if find_spec("pypylon") is not None:
+        return None
+    if find_spec("pip") is None:  # as in the program that the Windows installer brings
+        return sentence(
+            "basler.not-part",
+            "pypylon is not part of this program. Basler cameras also work as GenICam "
+            "cameras, with the GenTL producer of pylon.",
+        )
+    return sentence(
+        "basler.absent",
+        "pypylon is not installed. It drives Basler cameras: {python} -m pip install "
+        "pypylon",
+        python=sys.executable,
+    )
 
 
 def _camera(place: SourcePlace, clock: Clock) -> DeviceCamera:

@@ -79,13 +79,20 @@ if sys.platform == "win32":
     import msvcrt
 
     def _lock(descriptor: int, shared: bool) -> None:
-        os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        _set_locking(descriptor, msvcrt.LK_NBLCK)
 
     def unlock(descriptor: int) -> None:
         """Let others lock a file."""
+        _set_locking(descriptor, msvcrt.LK_UNLCK)
+
+    def _set_locking(descriptor: int, mode: int) -> None:
+        # What is locked begins where the file is at, and so does what is written next.
+        place = os.lseek(descriptor, 0, os.SEEK_CUR)
         os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_UNLCK, 1)
+        try:
+            msvcrt.locking(descriptor, mode, 1)
+        finally:
+            os.lseek(descriptor, place, os.SEEK_SET)
 else:
     import fcntl
 

@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
-from lightpen.formats.part_files import part_of, sweep_parts
+from lightpen.formats.part_files import part_of, renamed, sweep_parts
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
@@ -381,13 +381,13 @@ def _replace(target: Path, data: bytes) -> None:
     with part_of(target, data) as part:
         if mode is not None:
             part.chmod(mode)
-        part.replace(target)
+        renamed(part.replace, target)
 
 
 def _name_anew(part: Path, target: Path) -> None:
     """Give a file its name, unless another has it."""
     if os.name != "posix":
-        part.rename(target)  # Windows refuses to replace a file
+        renamed(part.rename, target)  # Windows refuses to replace a file
         return
     try:
         target.hardlink_to(part)

@@ -2,18 +2,18 @@
 
 A part is locked as long as it is written, so that one whose lock can be had was left
 behind by a program that was killed. Windows lets no open file be renamed, and some
-disks know no locks: there a part is known by its age.
+disks know no locks: there a part that was left is known by its age.
 """
 
 import contextlib
 import os
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
 
-from lightpen.formats.file_locks import locked
+from lightpen.formats.file_locks import PAUSE, locked
 
 PATIENCE = 2.0  # s for one who sweeps to let go
 LONGEST_WRITE = 60.0  # s, after which a part that cannot be locked is taken as left
@@ -43,6 +43,29 @@ def part_of(target: Path, data: bytes) -> Iterator[Path]:
             part.unlink(missing_ok=True)
 
 
+def renamed(rename: Callable[[Path], object], target: Path) -> None:
+    """Give a part its name; on Windows, wait for those who look into it meanwhile.
+
+    Scanners for viruses open what was just written, others the file that is replaced,
+    and both keep Windows from renaming.
+
+    Raises
+    ------
+    OSError
+        It cannot be renamed.
+    """
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        try:
+            rename(target)
+        except PermissionError:
+            if os.name != "nt" or time.monotonic() >= deadline:
+                raise
+            time.sleep(PAUSE)
+        else:
+            return
+
+
 def sweep_parts(folder: Path) -> None:
     """Remove what writes that were killed have left in a folder, where that can be."""
     with contextlib.suppress(OSError):  # they do no harm where they are
@@ -66,11 +89,10 @@ def _own_part(folder: Path) -> tuple[Path, IO[bytes]]:
 
 
 def _sweep(part: Path) -> None:
-    with part.open("rb") as stream:
-        if os.name == "posix":
-            with contextlib.suppress(OSError):  # a disk without locks
-                if locked(stream.fileno()):
-                    part.unlink()  # nobody else can lock it meanwhile
-                return
+    if os.name == "posix":
+        with part.open("rb") as stream, contextlib.suppress(OSError):  # without locks
+            if locked(stream.fileno()):
+                part.unlink()  # nobody else can lock it meanwhile
+            return
     if time.time() - part.stat().st_mtime > LONGEST_WRITE:
         part.unlink()

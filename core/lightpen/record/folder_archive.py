@@ -77,7 +77,7 @@ class FolderArchive:
         """Let the result before be in force; see `lightpen.record.archive.Archive`."""
         names = result.names
         file = self._newest(names.pen, names.tip, result.is_simulated)
-        if file is None or not _is_same(self._read(file), result):
+        if file is None or not _is_same(self.read(file), result):
             raise FileError(
                 sentence(
                     "results.not-in-force",
@@ -94,7 +94,7 @@ class FolderArchive:
     ) -> Result | None:
         """Return the last accepted result of a pen and a tip, or None."""
         file = self._newest(pen, tip, is_simulated)
-        return None if file is None else self._read(file)
+        return None if file is None else self.read(file)
 
     def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
         """Return the tips of a pen that have a result in force, the newest first."""
@@ -113,7 +113,7 @@ class FolderArchive:
                 place = heading.record
                 with suppress(FileError, ValueError):  # a name that no file can have
                     if place is not None and self._located(place) == folder.absolute():
-                        return self._read(file)
+                        return self.read(file)
         return None
 
     def _root(self, is_simulated: bool) -> Path:
@@ -194,7 +194,14 @@ class FolderArchive:
         files = [path for path in paths if path.suffix == ".json" and _number(path)]
         return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
 
-    def _read(self, file: Path) -> Result:
+    def read(self, file: Path) -> Result:
+        """Return the result in a file of the archive.
+
+        Raises
+        ------
+        FileError
+            It cannot be read.
+        """
         result = parse_result(read_bytes(file, WHAT, LIMIT), file, self._located)
         if result.origin is not None:
             return result

@@ -9,7 +9,7 @@ from lightpen.formats.part_files import sweep_parts
 from lightpen.record.folder_archive import RECORDS, RESULTS
 from lightpen.record.journal import JOURNAL, ends_in_verdict
 from lightpen.record.lock import is_locked
-from lightpen.record.reading import HEADER, IMAGES
+from lightpen.record.reading import HEADER, IMAGES, OPENER
 
 OLDEST = 1.0  # s; after it nobody is between making a folder and locking its journal
 
@@ -43,7 +43,7 @@ def _has_never_begun(folder: Path) -> bool:
     """Return whether a record was being made here, and is not any more."""
     names = {path.name for path in folder.iterdir()}
     others = {name for name in names if not name.startswith(("camera.", "pen."))}
-    if HEADER in names or not others <= {JOURNAL, IMAGES}:
+    if HEADER in names or not others <= {JOURNAL, IMAGES, OPENER}:
         return False
     if IMAGES in names and any((folder / IMAGES).iterdir()):
         return False

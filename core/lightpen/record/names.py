@@ -38,4 +38,5 @@ def folder_name(names: Names, now: datetime) -> str:
     """
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
     words = (f"{now:%Y%m%d-%H%M%S}", pen, tip)
-    return UNFIT.sub("-", "_".join(filter(None, words)))
+    # Windows leaves dots at the end of a name out, and then finds the folder no more.
+    return UNFIT.sub("-", "_".join(filter(None, words))).rstrip(".")

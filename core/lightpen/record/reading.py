@@ -9,6 +9,7 @@ A record is a folder:
 ``pen.*``            copy of the pen file
 ``images/*.png``     the kept images, lossless, numbered from 1
 ``journal.jsonl``    what happened, see `lightpen.record.journal`
+``swing.lightpen``   opens the swing in the program; holds nothing that is needed
 ==================== ===================================================================
 
 `lightpen.record.writing` puts an image on the disk before its line, and its line
@@ -73,6 +74,7 @@ from lightpen.record.names import Names
 from lightpen.sentences import Sentence, sentence
 
 HEADER, IMAGES = "header.json", "images"
+OPENER = "swing.lightpen"  # by its suffix the system knows the program
 FORMAT = 2
 FIRST_WITH_CHECKSUMS = 2
 HEADER_LIMIT = MEGABYTE
@@ -331,7 +333,7 @@ def record_files(record: Record) -> tuple[Path, ...]:
     """Return all files that a record consists of."""
     header = record.header
     names = (
-        *(HEADER, JOURNAL),
+        *(HEADER, JOURNAL, OPENER),
         *(copy_name("camera", header.camera), copy_name("pen", header.pen)),
     )
     images = (image.file for image in record.images)

@@ -41,6 +41,7 @@ from lightpen.record.reading import (
     FORMAT,
     HEADER,
     IMAGES,
+    OPENER,
     FileCopy,
     FileEntry,
     Header,
@@ -51,6 +52,8 @@ from lightpen.record.reading import (
     open_record,
 )
 from lightpen.sentences import sentence
+
+OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
 
 
 class RecordWriter:
@@ -99,6 +102,7 @@ class RecordWriter:
             write_whole(folder / copy_name("camera", header.camera), header.camera.data)
             write_whole(folder / copy_name("pen", header.pen), header.pen.data)
             write_whole(folder / HEADER, _header_bytes(header))
+            write_whole(folder / OPENER, OPENER_TEXT)
             _sync_folder(folder)
             _sync_folder(folder.parent)
             stack.pop_all()

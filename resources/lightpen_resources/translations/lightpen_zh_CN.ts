@@ -2774,6 +2774,10 @@
         <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
     </message>
     <message>
+        <source>Desktop entries are of Linux. On Windows the installer makes the entry of the start menu.</source>
+        <translation>桌面条目仅适用于 Linux。在 Windows 上，开始菜单项由安装程序创建。</translation>
+    </message>
+    <message>
         <source>Diameter of the discs: {flaw}</source>
         <translation>发光面直径：{flaw}</translation>
     </message>
@@ -3438,6 +3442,10 @@
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
     </message>
     <message>
+        <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
+        <translation>校准结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
+    </message>
+    <message>
         <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
         <translation>未参与合并的摆动 {swing} 不支持新的 LED 文件：新文件的残差为 {after:.4f} px，旧文件为 {before:.4f} px。旧文件同样好，或光笔在此期间有变化。</translation>
     </message>
@@ -3618,6 +3626,10 @@
         <translation>未安装 pypylon。它驱动 Basler 相机：{python} -m pip install pypylon</translation>
     </message>
     <message>
+        <source>pypylon is not part of this program. Basler cameras also work as GenICam cameras, with the GenTL producer of pylon.</source>
+        <translation>本程序不包含 pypylon。Basler 相机也可借助 pylon 的 GenTL 生产者作为 GenICam 相机使用。</translation>
+    </message>
+    <message>
         <source>rig file</source>
         <translation>相机组文件</translation>
     </message>
@@ -3628,6 +3640,10 @@
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
+    </message>
+    <message>
+        <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
+        <translation>{path} 既不是摆动记录，也不是校准结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
     </message>
     <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
@@ -4548,6 +4564,10 @@
     <message>
         <source>{other} was made with another pen file than {first}. Give calibrations of one pen with one pen file.</source>
         <translation>{other} 所用的光笔文件与 {first} 不同。请给出同一支光笔、同一光笔文件的标定结果。</translation>
+    </message>
+    <message>
+        <source>{path} cannot be changed: {reason}. Make sure that it is yours to write.</source>
+        <translation>无法更改 {path}：{reason}。请确认您有写入权限。</translation>
     </message>
     <message>
         <source>{path} cannot be written: it is a folder. Name a file.</source>

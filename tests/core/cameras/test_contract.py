@@ -31,6 +31,7 @@ from lightpen.cameras.worker import (
     ConnectionChanged,
     WorkerEvent,
 )
+from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
@@ -61,7 +62,7 @@ def simulated_without_waiting(_: Path, __: object) -> ImageCamera:
 def replayed_folder(folder: Path, _: object) -> ImageCamera:
     for i in range(N_RECORDED):
         image = np.full((SMALL.height, SMALL.width), i, np.uint8)
-        cv2.imwrite(str(folder / f"frame_{i}.png"), image)
+        (folder / f"frame_{i}.png").write_bytes(encode_png(image))
     return ReplayCamera(str(folder), frame_rate=200)
 
 
@@ -88,13 +89,15 @@ def of_stack(stack: str) -> Callable[[Path, pytest.FixtureRequest], ImageCamera]
     return make
 
 
-def webcam(folder: Path, _: object) -> ImageCamera:
+def webcam(folder: Path, request: pytest.FixtureRequest) -> ImageCamera:
     """OpenCV on a file in place of a webcam, which no test machine has."""
+    # By its name alone: on Windows, OpenCV opens no path with letters of others.
+    request.getfixturevalue("monkeypatch").chdir(folder)
     source = source_named("webcam")
     assert source is not None
     assert source.camera is not None
-    replayed_folder(folder, _)
-    return source.camera(SourcePlace(str(folder / "frame_%d.png")), MachineClock())
+    replayed_folder(folder, request)
+    return source.camera(SourcePlace("frame_%d.png"), MachineClock())
 
 
 SOURCES = (

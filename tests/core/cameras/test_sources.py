@@ -41,6 +41,10 @@ def no_module(name: str) -> ModuleSpec | None:
     return None
 
 
+def pip_alone(name: str) -> ModuleSpec | None:
+    return ModuleSpec(name, None) if name == "pip" else None
+
+
 def no_library(name: str) -> ctypes.CDLL:
     raise OSError(name)
 
@@ -57,7 +61,7 @@ def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(genicam, "find_spec", no_module)
-    monkeypatch.setattr(basler, "find_spec", no_module)
+    monkeypatch.setattr(basler, "find_spec", pip_alone)
     monkeypatch.setattr(ctypes, "CDLL", no_library)
     aravis_library.load_aravis.cache_clear()
     try:
@@ -73,6 +77,14 @@ def test_a_library_that_is_not_installed_is_a_line_that_says_what_to_install(
     assert "apt-get install libaravis-0.8-0" in told["aravis"]
     assert "pip install harvesters genicam" in told["genicam"]
     assert "pip install pypylon" in told["basler"]
+
+
+def test_where_nothing_can_be_installed_another_way_to_the_camera_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(basler, "find_spec", no_module)
+
+    assert "also work as GenICam cameras" in str(absent_sources()["basler"])
 
 
 def test_a_serial_number_that_no_camera_has_is_told(genicam: SourcePlace) -> None:
@@ -97,7 +109,8 @@ def test_a_producer_that_does_not_load_is_told_with_its_message(
     producer.write_bytes(b"no library")
     source = source_named("genicam")
     assert source is not None
-    with pytest.raises(DeviceNotFound, match=r"vendor\.cti does not load: .*file too"):
+    why = "Failed to load CTI file" if os.name == "nt" else "file too"
+    with pytest.raises(DeviceNotFound, match=rf"vendor\.cti does not load: .*{why}"):
         source.find(str(producer))
 
 

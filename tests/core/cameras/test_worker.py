@@ -2,7 +2,6 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from typing_extensions import override
@@ -38,6 +37,7 @@ from lightpen.cameras.worker import (
     WorkerEvent,
     is_too_slow,
 )
+from lightpen.formats.decoding import encode_png
 from lightpen.model.camera import Camera
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
@@ -256,7 +256,7 @@ def frame(seq: int) -> Frame:
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     for i in range(N_IMAGES):
-        cv2.imwrite(str(tmp_path / f"{i}.png"), np.full((4, 4), i, np.uint8))
+        (tmp_path / f"{i}.png").write_bytes(encode_png(np.full((4, 4), i, np.uint8)))
     return tmp_path
 
 

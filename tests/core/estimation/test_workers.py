@@ -1,7 +1,6 @@
 """Tests of `lightpen.estimation.workers`: processes here, and a real Dask cluster."""
 
 from collections.abc import Iterator
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,8 @@ import pytest
 
 from lightpen.errors import Cancelled, UsageError
 from lightpen.estimation.workers import cluster_workers, local_workers
+
+NO_CLUSTER = "needs the extra cluster, which the Windows installer leaves out"
 
 
 def square(number: int) -> int:
@@ -22,7 +23,7 @@ def touch_file(place: str) -> None:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """Return the address of a cluster of two processes on this machine."""
-    distributed: Any = import_module("distributed")
+    distributed: Any = pytest.importorskip("distributed", reason=NO_CLUSTER)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None
     ) as cluster:
@@ -65,6 +66,7 @@ def test_a_dask_cluster_does_the_same(scheduler: str) -> None:
 def test_a_scheduler_that_does_not_answer_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    pytest.importorskip("distributed", reason=NO_CLUSTER)
     monkeypatch.setattr("lightpen.estimation.workers.CONNECTING", 0.5)
 
     with (

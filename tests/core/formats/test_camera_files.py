@@ -116,11 +116,18 @@ def assert_same(found: Camera, expected: Camera, atol: float = 0.0) -> None:
 
 
 def opencv_file(path: Path, entries: dict[str, Any]) -> Path:
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    # In memory: on Windows, OpenCV opens no path with letters of other languages.
+    flags = cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY
+    storage = cv2.FileStorage(path.suffix, flags)
     for name, value in entries.items():
         storage.write(name, value)
-    storage.release()
+    path.write_text(storage.releaseAndGetString(), encoding="utf-8")
     return path
+
+
+def read_by_opencv(path: Path) -> cv2.FileStorage:
+    flags = cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY
+    return cv2.FileStorage(path.read_text(encoding="utf-8"), flags)
 
 
 @pytest.mark.parametrize(
@@ -181,7 +188,7 @@ def test_files_of_opencv_give_what_opencv_reads(tmp_path: Path, suffix: str) -> 
             "distCoeffs": distortion,
         },
     )
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    storage = read_by_opencv(path)
     expected_matrix = storage.getNode("cameraMatrix").mat()
     expected_distortion = storage.getNode("distCoeffs").mat().ravel()
     storage.release()
@@ -597,7 +604,7 @@ def test_opencv_reads_what_is_written(
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "for_opencv.yaml"
     write_camera(expected, path)
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    storage = read_by_opencv(path)
     assert storage.getNode("image_width").real() == expected.width
     assert storage.getNode("image_height").real() == expected.height
     np.testing.assert_array_equal(

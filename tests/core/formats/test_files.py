@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from threading import Timer
 
 import pytest
 from hypothesis import given
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE
+from lightpen.formats.file_locks import locked, unlock
 from lightpen.formats.files import (
     create_whole,
     printable,
@@ -85,7 +87,7 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
 
 
 def test_a_name_too_long_for_the_disk_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="cannot be read"):
+    with pytest.raises(FileError, match=r"cannot be read|does not exist"):
         read_bytes(tmp_path / ("n" * 5000), CAMERA_FILE, LIMIT)
 
 
@@ -160,6 +162,14 @@ def test_writing_replaces_the_old_file(tmp_path: Path) -> None:
     write_whole(path, b"new")
     assert path.read_bytes() == b"new"
     assert names_in(tmp_path) == ["cam.yaml"]
+
+
+def test_a_file_that_somebody_reads_for_a_moment_is_replaced(tmp_path: Path) -> None:
+    path = file(tmp_path, b"old")
+    reader = path.open("rb")
+    Timer(0.2, reader.close).start()
+    write_whole(path, b"new")
+    assert path.read_bytes() == b"new"
 
 
 @posix_only
@@ -345,6 +355,18 @@ def test_a_new_file_on_a_full_disk_is_none(tmp_path: Path) -> None:
     )
     assert "the file would be larger than allowed" in result
     assert names_in(tmp_path) == []
+
+
+def test_a_lock_leaves_a_file_where_its_writer_was(tmp_path: Path) -> None:
+    path = tmp_path / "locked"
+    with path.open("wb") as stream:
+        assert locked(stream.fileno())
+        stream.write(b"first ")
+        stream.flush()
+        unlock(stream.fileno())
+        stream.write(b"second")
+
+    assert path.read_bytes() == b"first second"
 
 
 def test_the_digest_is_that_of_the_content(tmp_path: Path) -> None:

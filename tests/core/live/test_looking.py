@@ -24,6 +24,7 @@ from lightpen.cameras.worker import (
 )
 from lightpen.detection.aim import Aim
 from lightpen.detection.spots import Spots, detect_spots, have_moved
+from lightpen.formats.decoding import encode_png
 from lightpen.live.looking import Live, LiveImage
 from lightpen.record.reading import open_record
 from lightpen.simulator.sample_pens import SAMPLE_PENS
@@ -219,7 +220,7 @@ def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
 ) -> None:
     monkeypatch.setattr("lightpen.live.looking.LIVELY_NS", 300_000_000)
     monkeypatch.setattr("lightpen.live.looking.UNHURRIED", TIMEOUT)
-    cv2.imwrite(str(tmp_path / "still.png"), PAINTED)
+    (tmp_path / "still.png").write_bytes(encode_png(PAINTED))
     camera = ReplayCamera(str(tmp_path), loops=True)
     live = Live(camera, CameraSettings(), screen, station.runner)
     live.start()

@@ -201,7 +201,7 @@ def test_programs_that_accept_at_once_take_one_number_each(
     ]
     for rival in rivals:  # all of them wait, then all of them start
         assert rival.stdout is not None
-        assert rival.stdout.readline() == b"ready\n"
+        assert rival.stdout.readline().rstrip() == b"ready"
     for rival in rivals:
         assert rival.stdin is not None
         rival.stdin.write(b"go\n")

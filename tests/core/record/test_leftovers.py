@@ -29,11 +29,17 @@ def age(folder: Path) -> None:
     os.utime(folder, (then, then))
 
 
+def leave(part: Path) -> None:
+    """Leave a torn part behind, long ago: by its age Windows knows that it was left."""
+    part.write_bytes(b"torn")
+    os.utime(part, (0, 0))
+
+
 def test_parts_of_killed_writes_are_removed(swing: Path, tmp_path: Path) -> None:
     (tmp_path / RESULTS).mkdir()
     parts = [folder / PART for folder in (tmp_path / RESULTS, swing, swing / "images")]
     for part in parts:
-        part.write_bytes(b"torn")
+        leave(part)
     before = open_record(swing)
 
     sweep_leftovers(tmp_path)
@@ -60,7 +66,7 @@ def test_a_swing_that_never_began_is_removed(swing: Path, tmp_path: Path) -> Non
     for name in ("header.json", "images/000001.png"):
         (swing / name).unlink()
     (swing / "journal.jsonl").write_bytes(b"")
-    (swing / PART).write_bytes(b"a torn header")
+    leave(swing / PART)
     age(swing)
 
     sweep_leftovers(tmp_path)

@@ -12,6 +12,7 @@ from typing_extensions import override
 
 from lightpen.model.origin import Origin
 from lightpen.record.acceptance import conclude_accepted
+from lightpen.record.opening import swing_folder
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result
 from lightpen.record.unfinished import (
@@ -62,6 +63,7 @@ class StartPage(Rearranged, Page):
         self._search: Job | None = None
         self._work: Job | None = None
         self._resumed: Path | None = None
+        self._reviewed: Path | None = None
 
         # Widgets: the order of making them is the order of the Tab key
         self._names = NamesForm()
@@ -115,6 +117,7 @@ class StartPage(Rearranged, Page):
         self._last.take_back_requested.connect(self._on_take_back_requested)
         workbench.others_counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
+        workbench.swing_wanted.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.troubled.connect(self._on_run_troubled)
 
@@ -378,17 +381,40 @@ class StartPage(Rearranged, Page):
         operator = self._workbench.preparation.names.operator
         self._workbench.run.runner.take_back(result, operator)
 
+    def _on_swing_wanted(self, path: Path) -> None:
+        self._interrupted.set_waiting(self.tr("The swing is being read."))
+        self._work = self._started(
+            lambda _: read_resumable(swing_folder(path)), self._on_wanted_read
+        )
+        self._work.failed.connect(self._on_work_failed)
+        self._work.crashed.connect(self._on_work_crashed)
+
+    def _on_wanted_read(self, swing: Resumable) -> None:
+        """Go on with an interrupted swing; show the tip of one that has a verdict."""
+        if swing.record.verdict is None:
+            self._on_swing_read(swing)
+            return
+        self._interrupted.set_waiting("")
+        self._take_over(swing)
+        self._reviewed = swing.record.folder
+        runner = self._workbench.run.runner
+        runner.go_on(swing)
+        runner.finish()
+
     def _on_run_changed(self) -> None:
         status = self._workbench.run.status
         if status.taken_back is not self._taken_back:
             self._taken_back = status.taken_back
             self._look_up_last()
+        if status.solution is not None and status.record_folder == self._reviewed:
+            self._reviewed = None
+            self.step_requested.emit("review")
         if self._resumed is not None and status.record_folder == self._resumed:
             self._resumed = None
             self.step_requested.emit("swing")
 
     def _on_run_troubled(self) -> None:
-        self._resumed = None
+        self._resumed = self._reviewed = None
 
     def _on_discard_requested(self, folder: Path) -> None:
         self._interrupted.set_waiting(self.tr("The swing is being discarded."))

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
-import cv2
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -16,6 +15,7 @@ from typing_extensions import override
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
+from lightpen.formats.decoding import encode_png
 from lightpen.live.sources import Surroundings, sample_files
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
@@ -223,7 +223,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> P
     camera.open()
     camera.start()
     for number in range(16):
-        cv2.imwrite(str(folder / f"{number:03}.png"), camera.read(1.0).image)
+        image = camera.read(1.0).image
+        (folder / f"{number:03}.png").write_bytes(encode_png(image))
     camera.close()
     return folder
 

@@ -1,0 +1,98 @@
+"""What a self-test finds, as it is written."""
+
+import json
+import platform
+import sys
+import time
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from threading import Lock
+
+
+class SelfTestError(Exception):
+    """Something is not as the program needs it; the text says what."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """What one check found.
+
+    Attributes
+    ----------
+    found : str
+        What is there, or what is wrong with it.
+    """
+
+    name: str
+    ok: bool
+    found: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Tip:
+    """The tip that the wizard found, and the true one, pen frame, mm.
+
+    Attributes
+    ----------
+    found_mm, true_mm, expanded_uncertainty_mm : list of float
+        x, y, z.
+    """
+
+    found_mm: list[float]
+    true_mm: list[float]
+    expanded_uncertainty_mm: list[float]
+
+
+@dataclass
+class Report:
+    """Grows with each check, and can be written at any time, from any thread."""
+
+    file: Path
+    checks: list[Check] = field(default_factory=list)
+    tip: Tip | None = None
+    screenshot: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    is_complete: bool = False
+    _lock: Lock = field(default_factory=Lock)
+
+    @property
+    def ok(self) -> bool:
+        """Whether all was tried and all is well."""
+        return self.is_complete and all(check.ok for check in self.checks)
+
+    @contextmanager
+    def check(self, name: str) -> Iterator[list[str]]:
+        """Try something; its body appends what it finds.
+
+        What goes wrong is noted before it is raised again.
+        """
+        found: list[str] = []
+        began = time.monotonic()
+        ok = False
+        try:
+            yield found
+            ok = True
+        finally:
+            if not ok:
+                found = [traceback.format_exc()]
+            seconds = round(time.monotonic() - began, 3)
+            self.checks.append(Check(name, ok, "; ".join(found), seconds))
+
+    def write(self) -> None:
+        """Write what is known by now."""
+        entries = {
+            "ok": self.ok,
+            "system": platform.platform(),
+            "executable": sys.executable,
+            "versions": self.versions,
+            "checks": [asdict(check) for check in self.checks],
+            "tip": None if self.tip is None else asdict(self.tip),
+            "screenshot": self.screenshot,
+        }
+        with self._lock:
+            text = json.dumps(entries, indent=1, ensure_ascii=False)
+            self.file.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,112 @@
+"""What a self-test tries, in its order.
+
+Only modules of Python itself are imported before the files are found to be whole.
+"""
+
+import importlib
+import os
+import sys
+from contextlib import ExitStack
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Timer
+
+from lightpen_app.self_test.installed_files import damaged_files, file_list
+from lightpen_app.self_test.report import Report, SelfTestError, Tip
+
+LONGEST = 600.0  # s, after which something hangs
+UNWRITTEN, HUNG = 2, 3  # exit status
+NEAR = 0.005  # mm from the true tip
+MODULES = ("numpy", "cv2", "msgspec", "yaml", "PySide6.QtWidgets", "PySide6.QtSvg",
+           "pyqtgraph", "lightpen.cli", "lightpen_app.application",
+           "lightpen_app.wizard_pages")  # fmt: skip
+OPTIONAL = ("harvesters.core", "pypylon.pylon")  # drive cameras
+
+
+def test_program(file: Path) -> int:
+    """Try all that the program needs, write a report, and return the exit status.
+
+    The report is written whatever happens, beside it a picture of the wizard.
+    """
+    report = Report(file)
+    try:
+        report.write()
+    except OSError as error:
+        _say(f"{file} cannot be written: {error.strerror}. Name another file.")
+        return UNWRITTEN
+    watchdog = Timer(LONGEST, _give_up, [report])
+    watchdog.daemon = True
+    watchdog.start()
+    with ExitStack() as stack:
+        stack.callback(report.write)
+        stack.callback(watchdog.cancel)
+        folder = Path(stack.enter_context(TemporaryDirectory(prefix="lightpen-试 ")))
+        try:
+            _test_all(report, folder)
+        except SelfTestError as failed:
+            _say(str(failed))
+    return 0 if report.ok else 1
+
+
+def _test_all(report: Report, folder: Path) -> None:
+    with report.check("files") as found:
+        found.append(_checked_files())
+    with report.check("imports") as found:
+        there = (name for name in OPTIONAL if find_spec(name.partition(".")[0]))
+        names = (*MODULES, *there)
+        for name in names:
+            importlib.import_module(name)
+        found.append(", ".join(names))
+    # All below needs what was just imported.
+    from lightpen_app.self_test.desk import Desk
+
+    with report.check("window system") as found:
+        desk = Desk(folder)
+        report.versions.update(desk.versions())
+        found.append(desk.platform())
+    with report.check("fonts") as found:
+        found.append(desk.tested_fonts())
+    with report.check("record") as found:
+        found.append(desk.tested_record())
+    with report.check("wizard") as found:
+        picture = report.file.with_suffix(".png")
+        found.append(desk.walked_wizard(picture))
+        report.screenshot = str(picture)
+    with report.check("result") as found:
+        found.append(desk.tested_result())
+    with report.check("tip") as found:
+        report.tip = tip = desk.tip()
+        found.append(_judged(tip))
+    report.is_complete = True
+
+
+def _checked_files() -> str:
+    files = file_list()
+    if not files.is_file():
+        return "not put here by an installer: no list to check them by"
+    damaged = damaged_files(files)
+    if damaged:
+        raise SelfTestError(
+            f"Damaged or missing: {', '.join(damaged)}. Install the program again."
+        )
+    return f"as they were built, by {files}"
+
+
+def _judged(tip: Tip) -> str:
+    pairs = zip(tip.found_mm, tip.true_mm, strict=True)
+    distance = sum((found - true) ** 2 for found, true in pairs) ** 0.5
+    if distance > NEAR:
+        raise SelfTestError(f"The tip is {distance:.6f} mm from the true one.")
+    return f"{distance:.6f} mm from the true one"
+
+
+def _say(text: str) -> None:
+    if sys.stderr is not None:  # as it is without a console on Windows
+        sys.stderr.write(f"lightpen: {text}\n")
+
+
+def _give_up(report: Report) -> None:
+    """End a process that hangs, from the thread of the watchdog."""
+    report.write()
+    os._exit(HUNG)

@@ -1,0 +1,54 @@
+"""What is opened from outside the program: a swing, by any file that leads to it.
+
+A record is a folder, and no system opens a folder with a program of its own choice: in
+each lies a small file whose name does. A result leads to the swing that it comes from.
+"""
+
+from pathlib import Path
+
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.record.folder_archive import RESULTS, SIMULATED, FolderArchive
+from lightpen.record.reading import is_record
+from lightpen.sentences import sentence
+
+
+def swing_folder(path: Path) -> Path:
+    """Return the folder of the swing that a path leads to.
+
+    Parameters
+    ----------
+    path : Path
+        The folder itself, a file in it, or a result.
+
+    Raises
+    ------
+    FileError
+        It leads to no swing, or the result or its swing cannot be read.
+    """
+    place = path.absolute()
+    for folder in (place, place.parent):
+        if is_record(folder):
+            return folder
+    if place.parent.name == RESULTS and place.suffix == ".json":
+        data = place.parents[2 if place.parents[1].name == SIMULATED else 1]
+        recorded = FolderArchive(data).read(place).record
+        if is_record(recorded):
+            return recorded
+        raise FileError(
+            sentence(
+                "opening.swing-moved",
+                "The swing of the result {file} is not in {folder}. Copy it back "
+                "there, then open the result again.",
+                file=printable(str(path)),
+                folder=printable(str(recorded)),
+            )
+        )
+    raise FileError(
+        sentence(
+            "opening.no-swing",
+            "{path} is neither a recorded swing nor a result. Open the folder of a "
+            "swing, a file in it, or a file in the folder results.",
+            path=printable(str(path)),
+        )
+    )

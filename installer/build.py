@@ -1,0 +1,311 @@
+"""Build ``Lightpen-<version>-setup.exe``: ``python installer/build.py``.
+
+Puts a Windows CPython, the wheels of requirements.lock and the program itself together
+in a folder, always the same byte for byte, and packs it with NSIS. Nothing is run at
+installation but the installer. See installer/README.md.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from enum import Enum, auto
+from hashlib import sha256
+from pathlib import Path
+from time import monotonic
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from installer import runtime
+from installer.binaries import missing_exports, unmet_needs
+from installer.bytecode import compile_modules
+from installer.downloads import PIP, download_runtime, download_wheels
+from installer.launchers import (
+    CONSOLE,
+    WINDOW,
+    ToolMissingError,
+    build_launchers,
+    icon,
+    numbers_of,
+    tool,
+)
+from installer.licences import Part, licence_text, parts_of, unlicensed
+from installer.locked import Pin, windows_pins
+from installer.payload import (
+    EARLIEST,
+    PACKAGES,
+    add_start,
+    all_files,
+    promote_cpp_runtime,
+    set_times,
+    unpack_wheels,
+    write_file_list,
+)
+from installer.places import INSTALLER, IS_WINDOWS, ROOT
+from installer.runtime import RuntimeFileError
+from installer.sbom import Component, bill_of_materials
+
+KILOBYTE = 1024
+CAMERAS = {"genicam", "harvesters"}
+
+
+class BuildError(Exception):
+    """What was put together is not fit to be installed."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build, and return the exit status."""
+    options = _parser().parse_args(arguments)
+    began = monotonic()
+    try:
+        setup = build(
+            options.out.absolute(), options.version, options.sign, options.fast
+        )
+    except (BuildError, RuntimeFileError, ToolMissingError) as error:
+        print(f"build.py: {error}", file=sys.stderr)
+        return 1
+    megabytes = setup.stat().st_size / 1e6
+    print(f"{setup}: {megabytes:.1f} MB in {monotonic() - began:.0f} s")
+    return 0
+
+
+def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> Path:
+    """Build the installer into a folder, and return its file.
+
+    Parameters
+    ----------
+    version : str
+        That of pyproject.toml unless given, as the tests of upgrades do.
+    sign : str
+        Command that signs the file whose path is put after it; none leaves them
+        unsigned.
+    fast : bool
+        Pack quickly, not small.
+
+    Raises
+    ------
+    BuildError, RuntimeFileError, ToolMissingError
+        It cannot be built.
+    """
+    version = version or project_version()
+    moment = commit_time()
+    out.mkdir(parents=True, exist_ok=True)
+    folder, work = out / "payload", out / "work"
+    for each in (folder, work):
+        shutil.rmtree(each, ignore_errors=True)
+    work.mkdir()
+
+    distribution = download_runtime()
+    pins = shipped_pins()
+    wheels = download_wheels(pins)
+    own = build_wheel(work, moment)
+    _say("Putting the files together")
+    runtime.unpack(distribution, folder / "runtime")
+    unpack_wheels([*wheels, own], folder / PACKAGES)
+    promote_cpp_runtime(folder)
+    add_start(folder)
+    build_launchers(folder, version)
+    for name in (WINDOW, CONSOLE):
+        sign_file(sign, folder / name)
+    _say("Compiling the modules")
+    compile_modules(folder)
+    parts = parts_of(folder / PACKAGES, _runtime_part(folder))
+    _require_fit(folder, parts, pins)
+    text = licence_text(parts)
+    (folder / "LICENCES.txt").write_text(text, encoding="utf-8-sig", newline="\r\n")
+    bill = bill_of_materials(
+        version, _components(distribution, pins, wheels, parts), moment
+    )
+    (folder / "sbom.cdx.json").write_bytes(bill)
+    (out / f"Lightpen-{version}.cdx.json").write_bytes(bill)
+    write_file_list(folder)
+    set_times(folder, moment)
+    _say("Packing")
+    setup = out / f"Lightpen-{version}-setup.exe"
+    pack(folder, work, setup, version, Packing.QUICK if fast else Packing.SMALL, sign)
+    return setup
+
+
+def shipped_pins() -> tuple[Pin, ...]:
+    """Return what is bundled: all that the program needs, and the extra "genicam".
+
+    An installed program cannot be added to, and without the extra it would have no
+    industrial camera. It is tested with the versions of requirements-dev.lock.
+    """
+    program, development = (
+        windows_pins((ROOT / name).read_text("utf-8"), runtime.VERSION)
+        for name in ("requirements.lock", "requirements-dev.lock")
+    )
+    extra = (pin for pin in development if pin.name in CAMERAS)
+    return (*program, *extra)
+
+
+def project_version() -> str:
+    """Return the version in pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    return str(project["version"])
+
+
+def commit_time() -> int:
+    """Return when the commit was made, s since 1970; it stands for all times."""
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if given:
+        return int(given)
+    outcome = subprocess.run(
+        ["git", "log", "-1", "--format=%ct"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return int(outcome.stdout) if outcome.returncode == 0 else EARLIEST
+
+
+def build_wheel(work: Path, moment: int) -> Path:
+    """Build the wheel of the program, and return its file."""
+    _say("Building the wheel")
+    subprocess.run(
+        [*PIP, "wheel", "--quiet", "--no-deps", "--wheel-dir", work, ROOT],
+        env=os.environ | {"SOURCE_DATE_EPOCH": str(moment)},
+        check=True,
+    )
+    (wheel,) = work.glob("*.whl")
+    return wheel
+
+
+def sign_file(sign: str, path: Path) -> None:
+    """Have a file signed, if a command for it is given."""
+    if sign:
+        subprocess.run(f'{sign} "{path}"', shell=True, check=True)
+
+
+class Packing(Enum):
+    """How the files are packed: as small as can be, quickly, or as they are."""
+
+    SMALL = auto()
+    QUICK = auto()
+    STORED = auto()
+
+
+def pack(
+    folder: Path,
+    work: Path,
+    setup: Path,
+    version: str,
+    packing: Packing,
+    sign: str = "",
+) -> None:
+    """Pack the folder into the installer.
+
+    Parameters
+    ----------
+    work : Path
+        Folder for what is only needed meanwhile.
+    setup : Path
+        File to write.
+    """
+    ico = work / "lightpen.ico"
+    ico.write_bytes(icon())
+    size = sum(path.stat().st_size for path in all_files(folder)) // KILOBYTE
+    defined = {
+        "VERSION": version,
+        "NUMBERS": numbers_of(version).replace(",", "."),
+        "PAYLOAD": str(folder),
+        "OUTFILE": str(setup),
+        "ICON": str(ico),
+        "SIZE_KB": str(size),
+        "SLASH": os.sep,
+        **({"SIGN": sign} if sign else {}),
+        # Debian's NSIS makes installers of 64 bits, which run where Wine has no 32.
+        **({} if IS_WINDOWS else {"TARGET": "amd64-unicode"}),
+        **({} if packing is Packing.SMALL else {"QUICK": ""}),
+        **({"STORED": ""} if packing is Packing.STORED else {}),
+    }
+    options = [f"-D{name}={value}" for name, value in defined.items()]
+    script = INSTALLER / "windows" / "lightpen.nsi"
+    makensis = tool("makensis", r"C:\Program Files (x86)\NSIS\makensis.exe")
+    subprocess.run([makensis, "-V2", "-WX", *options, script], check=True)
+
+
+def _require_fit(folder: Path, parts: Sequence[Part], pins: Sequence[Pin]) -> None:
+    """Refuse what would not run on a bare Windows, or lacks a licence."""
+    troubles = [*unmet_needs(folder), *missing_exports(folder)]
+    troubles += [f"{name} brings no licence." for name in unlicensed(parts)]
+    there = {part.name.lower().replace("_", "-") for part in parts}
+    troubles += [f"{p.name} is missing." for p in pins if p.name.lower() not in there]
+    if troubles:
+        raise BuildError("\n".join(troubles))
+
+
+def _runtime_part(folder: Path) -> Part:
+    licence = folder / "runtime" / "LICENSE.txt"
+    return Part("CPython", runtime.VERSION, "PSF-2.0", (licence,))
+
+
+def _components(
+    distribution: Path,
+    pins: Sequence[Pin],
+    wheels: Sequence[Path],
+    parts: Sequence[Part],
+) -> list[Component]:
+    licences = {part.name.lower().replace("_", "-"): part.licence for part in parts}
+    files = {path.name.split("-")[0].lower().replace("_", "-"): path for path in wheels}
+    python = Component(
+        "CPython",
+        runtime.VERSION,
+        distribution.name,
+        _digest(distribution),
+        f"pkg:generic/python@{runtime.VERSION}",
+        "PSF-2.0",
+    )
+    return [
+        python,
+        *(
+            Component(
+                pin.name,
+                pin.version,
+                files[pin.name.lower()].name,
+                _digest(files[pin.name.lower()]),
+                f"pkg:pypi/{pin.name.lower()}@{pin.version}",
+                licences[pin.name.lower()],
+            )
+            for pin in pins
+        ),
+    ]
+
+
+def _digest(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description="Build the Windows installer.")
+    parser.add_argument(
+        "--out", type=Path, default=ROOT / "dist" / "windows", metavar="FOLDER"
+    )
+    parser.add_argument(
+        "--fast", action="store_true", help="pack quickly, not small, for tests"
+    )
+    parser.add_argument(
+        "--version",
+        default="",
+        help="other than that of pyproject.toml, for tests of upgrades",
+    )
+    parser.add_argument(
+        "--sign",
+        default=os.environ.get("LIGHTPEN_SIGN", ""),
+        metavar="COMMAND",
+        help="signs the file whose path is put after it (LIGHTPEN_SIGN)",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,54 @@
+"""Which files of the wheels are installed: those that Lightpen can come to use.
+
+Qt alone is half of all; its parts for other kinds of programs, development files and
+the tests of libraries are left out. Each rule names what it drops.
+"""
+
+import re
+from fnmatch import fnmatchcase
+
+QT_MODULES = {
+    *("Core", "Gui", "Network", "OpenGL", "OpenGLWidgets", "PrintSupport"),
+    *("Svg", "SvgWidgets", "Test", "Widgets"),
+}
+QT_PLUGINS = ("generic/*", "iconengines/*", "imageformats/*", "platforms/*", "styles/*")
+QT_TRANSLATIONS = ("qtbase_en.qm", "qtbase_zh_CN.qm")
+DROPPED = (
+    "*.pyi", "*.pxd", "*.h", "*.hpp", "*.lib", "*/tests/*",  # to develop and test
+    "PySide6/*.exe", "PySide6/doc/*", "PySide6/glue/*", "PySide6/include/*",
+    "PySide6/lib/*", "PySide6/metatypes/*", "PySide6/qml/*", "PySide6/resources/*",
+    "PySide6/scripts/*", "PySide6/typesystems/*",
+    "PySide6/opengl32sw.dll",  # draws OpenGL in software; nothing here uses OpenGL
+    "PySide6/pyside6qml*", "PySide6/plugins/platforms/qdirect2d.dll",
+    "PySide6/plugins/imageformats/qpdf.dll", "PySide6/plugins/imageformats/qtiff.dll",
+    # Of the C++ runtime, what nothing here loads.
+    "*/concrt140.dll", "*/vcamp140.dll", "*/vccorlib140.dll",
+    "*/vcomp140.dll",
+    "harvesters/test/*", "numpy/f2py/*", "numpy/_pyinstaller/*", "pyqtgraph/examples/*",
+    "cv2/LICENSE*",  # a copy of that beside the metadata
+    "*.dist-info/RECORD",  # lists what is no longer there
+)  # fmt: skip
+KEPT = ("numpy/testing/*",)
+
+
+def is_kept(name: str) -> bool:
+    """Return whether a file of a wheel is installed.
+
+    Parameters
+    ----------
+    name : str
+        Its path in the folder of packages, with slashes.
+    """
+    if (module := re.match(r"PySide6/Qt6?(\w+)\.(dll|pyd)$", name)) is not None:
+        return module[1] in QT_MODULES
+    if name.startswith("PySide6/plugins/") and not _fits(
+        name.removeprefix("PySide6/plugins/"), QT_PLUGINS
+    ):
+        return False
+    if name.startswith("PySide6/translations/"):
+        return name.rpartition("/")[2] in QT_TRANSLATIONS
+    return _fits(name, KEPT) or not _fits(name, DROPPED)
+
+
+def _fits(name: str, patterns: tuple[str, ...]) -> bool:
+    return any(fnmatchcase(name, pattern) for pattern in patterns)

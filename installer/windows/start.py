@@ -1,0 +1,44 @@
+"""What the launchers run, within the runtime that lies beside it."""
+
+import ctypes
+import os
+import sys
+import traceback
+from contextlib import suppress
+from pathlib import Path
+
+LOG = Path(os.environ.get("LOCALAPPDATA", ".")) / "lightpen" / "crashes"
+QUIET = "LIGHTPEN_NO_DIALOG"  # set where nobody could close a dialog
+
+
+def start() -> int:
+    """Run the program; where it cannot even begin, say so in a window."""
+    # Without a console there are no streams, and what prints must not fail by that.
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            nowhere = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
+            setattr(sys, name, nowhere)
+    if sys.platform == "win32":
+        # Packages find the C++ library there that they are linked with.
+        os.add_dll_directory(sys.prefix)
+    try:
+        from lightpen_app.__main__ import main
+    except (ImportError, OSError, SyntaxError, ValueError, EOFError):
+        return _complain(traceback.format_exc())
+    return main()
+
+
+def _complain(trace: str) -> int:
+    """Say that the program is damaged: an import that fails has no other cause."""
+    sys.stderr.write(trace)
+    text = "Lightpen cannot start: its files are damaged. Install it again.\n\n" + trace
+    with suppress(OSError):  # the window says it all the same
+        LOG.mkdir(parents=True, exist_ok=True)
+        (LOG / "start.txt").write_text(text, encoding="utf-8")
+    if sys.platform == "win32" and not os.environ.get(QUIET):
+        ctypes.windll.user32.MessageBoxW(None, text[-1500:], "Lightpen", 0x10)
+    return 3
+
+
+if __name__ == "__main__":
+    sys.exit(start())
