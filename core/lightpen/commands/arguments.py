@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 from lightpen.formats.pen_files import UNITS
@@ -39,6 +40,22 @@ def not_negative(text: str) -> float:
     if number < 0:
         raise argparse.ArgumentTypeError(f"{text} is not a number of 0 or more.")
     return number
+
+
+def number_from(
+    lowest: float, highest: float, what: str, unit: str
+) -> Callable[[str], float]:
+    """Return what reads a number within limits, both of them included."""
+
+    def number_of(text: str) -> float:
+        number = finite(text)
+        if not lowest <= number <= highest:
+            raise argparse.ArgumentTypeError(
+                f"{text} {unit} is no {what} from {lowest:g} to {highest:g} {unit}."
+            )
+        return number
+
+    return number_of
 
 
 def add_pen_options(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import above_zero, add_pen_options, finite
+from lightpen.commands.arguments import above_zero, add_pen_options, finite, number_from
 from lightpen.errors import UsageError
 from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import METHODS
@@ -12,7 +12,7 @@ from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.sentences import sentence
 
 LARGEST_SHARE = 0.1
-COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
+TEMPERATURES = (-50.0, 100.0)  # degrees C, of a pen
 
 
 def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +57,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--temperature",
-        type=_temperature,
+        type=number_from(*TEMPERATURES, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
         help="of the pen during the swing, which makes it larger than its file says",
     )
@@ -101,15 +101,6 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the record")
-
-
-def _temperature(text: str) -> float:
-    number = finite(text)
-    if not COLDEST <= number <= WARMEST:
-        raise argparse.ArgumentTypeError(
-            f"{text} is no temperature from {COLDEST:g} to {WARMEST:g} degrees Celsius."
-        )
-    return number
 
 
 def _share(text: str) -> float:

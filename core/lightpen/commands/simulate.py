@@ -4,14 +4,14 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import finite, whole_number
+from lightpen.commands.arguments import number_from, whole_number
 from lightpen.commands.console import printing, progress, shown
 from lightpen.model.pen import DISC_DIAMETER
 
-MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
+LED_DIAMETERS = (2.0, 12.0)  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
-MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
-MIN_BLUR, MAX_BLUR = 0.3, 8.0  # px, of simulated optics
+BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
+BLURS = (0.3, 8.0)  # px, of simulated optics
 MAX_RENDERED = 30_000  # images
 
 
@@ -37,11 +37,14 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         help="how the LEDs look inside and round their rims",
     )
     parser.add_argument(
-        "--led-diameter", type=_led_diameter, default=DISC_DIAMETER, metavar="MM"
+        "--led-diameter",
+        type=number_from(*LED_DIAMETERS, "diameter", "mm"),
+        default=DISC_DIAMETER,
+        metavar="MM",
     )
     parser.add_argument(
         "--blur",
-        type=_blur,
+        type=number_from(*BLURS, "blur", "px"),
         default=0.8,
         metavar="PX",
         help="standard deviation of the optics' blur",
@@ -57,7 +60,7 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--baseline",
-        type=_baseline,
+        type=number_from(*BASELINES, "baseline", "mm"),
         default=1000.0,
         metavar="MM",
         help="from the first of several cameras to the last",
@@ -68,34 +71,6 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         default="paper",
         help="layout of the LEDs",
     )
-
-
-def _led_diameter(text: str) -> float:
-    diameter = finite(text)
-    if not MIN_LED_DIAMETER <= diameter <= MAX_LED_DIAMETER:
-        raise argparse.ArgumentTypeError(
-            f"{text} mm is no diameter from {MIN_LED_DIAMETER:g} to "
-            f"{MAX_LED_DIAMETER:g} mm."
-        )
-    return diameter
-
-
-def _blur(text: str) -> float:
-    sigma = finite(text)
-    if not MIN_BLUR <= sigma <= MAX_BLUR:
-        raise argparse.ArgumentTypeError(
-            f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
-        )
-    return sigma
-
-
-def _baseline(text: str) -> float:
-    baseline = finite(text)
-    if not MIN_BASELINE <= baseline <= MAX_BASELINE:
-        raise argparse.ArgumentTypeError(
-            f"{text} mm is no baseline from {MIN_BASELINE:g} to {MAX_BASELINE:g} mm."
-        )
-    return baseline
 
 
 def _n_images(text: str) -> int:
