@@ -11,6 +11,7 @@ from lightpen.model.pen import DISC_DIAMETER
 MIN_LED_DIAMETER, MAX_LED_DIAMETER = 2.0, 12.0  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 MIN_BASELINE, MAX_BASELINE = 50.0, 1500.0  # mm, between simulated cameras
+LARGEST_SHIFT = 10.0  # px, of simulated images
 MIN_BLUR, MAX_BLUR = 0.3, 8.0  # px, of simulated optics
 MAX_RENDERED = 30_000  # images
 
@@ -63,6 +64,18 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         help="from the first of several cameras to the last",
     )
     parser.add_argument(
+        "--lamp",
+        action="store_true",
+        help="a fixed lamp in view, which tells whether the camera stands still",
+    )
+    parser.add_argument(
+        "--camera-turn",
+        type=_shift,
+        default=0.0,
+        metavar="PX",
+        help="how far the image shifts during the swing, as the camera turns",
+    )
+    parser.add_argument(
         "--pen",
         choices=("paper", "six", "eight", "near-symmetric", "fanned"),
         default="paper",
@@ -87,6 +100,15 @@ def _blur(text: str) -> float:
             f"{text} px is no blur from {MIN_BLUR:g} to {MAX_BLUR:g} px."
         )
     return sigma
+
+
+def _shift(text: str) -> float:
+    shift = finite(text)
+    if not 0 <= shift <= LARGEST_SHIFT:
+        raise argparse.ArgumentTypeError(
+            f"{text} px is no shift from 0 to {LARGEST_SHIFT:g} px."
+        )
+    return shift
 
 
 def _baseline(text: str) -> float:
@@ -126,6 +148,8 @@ def _simulate(options: argparse.Namespace) -> None:
         sensor=Sensor(bits=options.bits),
         faces=looks.faces,
         optics=replace(looks.optics, psf_sigma=options.blur),
+        has_lamp=options.lamp,
+        camera_turn=options.camera_turn,
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
     with progress("Rendering") as report:

@@ -40,6 +40,7 @@ from lightpen.estimation.unknowns import (
     NO_COMPONENTS,
     Columns,
     Components,
+    Forms,
     Unknowns,
     inverse,
 )
@@ -110,6 +111,17 @@ class Bundle:
         moves = self.unknowns.basis @ self.values[self.columns.leds]
         return np.asarray(moves.reshape(-1, 3))
 
+    @property
+    def drift(self) -> float:
+        """How far apart the farthest two places of the cone are by its drift, mm."""
+        at, unknowns = self.columns, self.unknowns
+        first = (at.drift.start - at.seat[0].start) // N_CONE
+        n_forms = (at.drift.stop - at.drift.start) // N_CONE
+        by_form = self.values[at.drift].reshape(-1, N_CONE)
+        places = unknowns.forms[:, first : first + n_forms] @ by_form
+        apart = np.linalg.norm(places[:, None] - places, axis=2)
+        return float(apart.max())
+
     def part(self, *kinds: slice) -> FloatArray:
         """Return what stands in tip and cone for some unknowns, (6, 6).
 
@@ -140,7 +152,7 @@ def fit_bundle(
     pixels: FloatArray,
     start: BundleState,
     priors: Priors,
-    lean: FloatArray,
+    forms: Forms,
     inflation: float = 1.0,
     places: FloatArray | None = None,
 ) -> Bundle:
@@ -152,8 +164,8 @@ def fit_bundle(
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     start : BundleState
         With cameras and pen as their files have them.
-    lean : (N, F) array
-        Forms in which the seat may follow the pen's lean, each of mean square 1.
+    forms : Forms
+        In which the seat may follow the pen's lean, and the cone drift.
     inflation : float
         How many times the variance of the noise counts beside the priors, as it does
         not average out.
@@ -165,7 +177,7 @@ def fit_bundle(
     CalibrationError
         The iteration does not settle.
     """
-    unknowns = Unknowns.of(start, priors, lean)
+    unknowns = Unknowns.of(start, priors, forms)
     at = unknowns.columns
     state, taken_up = start, np.zeros(unknowns.number)
     if places is not None:

@@ -210,6 +210,7 @@ def _observed(trials: Trials, pixels: FloatArray) -> Observations:
         translations=trials.cone_cam - shifts,
         areas=np.full(pixels.shape[:2], np.nan),
         edge_widths=np.full(n_images, np.nan),
+        lamps=np.zeros((n_images, 0, 2)),
         reasons=(Reason.NONE,) * n_images,
         details=(None,) * n_images,
     )

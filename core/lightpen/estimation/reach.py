@@ -15,7 +15,14 @@ from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import BundleState, eliminate, views_at
 from lightpen.estimation.priors import priors_of
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
-from lightpen.estimation.unknowns import FORMS, NO_COMPONENTS, Unknowns, inverse
+from lightpen.estimation.unknowns import (
+    FORMS,
+    NO_COMPONENTS,
+    Forms,
+    Unknowns,
+    drift_forms,
+    inverse,
+)
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -73,8 +80,8 @@ class Reach:
         """
         rig = rig_of(camera)
         state = BundleState(rig, pen, np.zeros(3), np.zeros(3), np.empty((0, 3, 3)))
-        lean = np.empty((0, sum(FORMS)))
-        unknowns = Unknowns.of(state, priors_of(rig, pen, USUAL), lean)
+        forms = Forms(np.empty((0, sum(FORMS))), drift_forms(0))
+        unknowns = Unknowns.of(state, priors_of(rig, pen, USUAL), forms)
         mixing = unknowns.mixing
         n = mixing.shape[1]
         prior = unknowns.prior_information(NO_COMPONENTS)[:n, :n]

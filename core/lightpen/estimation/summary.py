@@ -4,6 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.lamp_report import lamp_lines
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.report import (
     METHODS,
@@ -52,6 +53,7 @@ def calibration_text(
         "",
         *_origin_lines(origin),
         *_image_lines(calibration),
+        *lamp_lines(calibration),
         "",
         *_quality_lines(calibration, chosen),
     ]

@@ -23,7 +23,7 @@ from lightpen.arrays import FloatArray
 SIGNIFICANT = 10.83  # chi-square, 1 degree of freedom, at 0.001
 COUNTED = 2.71  # the same at 0.1: enough to be counted in the uncertainty
 FITTED = 6.63  # the same at 0.01: enough to be fitted
-NONE_SHARE = 0.5  # of swings in which errors of a kind are as good as none
+NONE_SHARE = 0.7  # of swings in which errors of a kind are as good as none
 SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
 SEEN = 1e-9  # of the largest eigenvalue; what is less is not seen at all
 MAX_PASSES = 60

@@ -68,6 +68,7 @@ class _Frame(Struct):
     used: bool
     leds: list[_SeenLed]
     edge_width_px: Length | None = None
+    lamps_px: list[tuple[Length | None, Length | None]] = []
 
 
 class _Record(Struct):
@@ -145,6 +146,8 @@ class CalibrationFile:
         Of the LEDs in the images, px^2; NaN where not known.
     edge_widths : (N,) array
         Of the rims of the LEDs in each image, px; NaN where not known.
+    lamps : (N, K, 2) array
+        Fixed lamps in each image, px; NaN where not seen.
     is_of_rig : bool
         Whether several cameras looked; the frames are then of all of them.
     has_checksum : bool
@@ -172,6 +175,7 @@ class CalibrationFile:
     pixels: FloatArray
     areas: FloatArray
     edge_widths: FloatArray
+    lamps: FloatArray
     is_of_rig: bool
     has_checksum: bool
 
@@ -219,7 +223,7 @@ def _calibration(
     try:
         record = in_shape(tree, _Record)
         instrument = _instrument(record)
-        seen = _seen(record)
+        seen, lamps = _seen(record), _lamps(record)
     except DamagedError as error:
         raise _other(path) from error
     return CalibrationFile(
@@ -250,6 +254,7 @@ def _calibration(
         edge_widths=np.array(
             [f.edge_width_px for f in record.frames], dtype=np.float64
         ),
+        lamps=lamps,
         is_of_rig=record.rig is not None,
         has_checksum=is_checked,
     )
@@ -283,6 +288,16 @@ def _seen(record: _Record) -> FloatArray:
             area = math.nan if led.area_px2 is None else led.area_px2
             seen[i, led.led - 1] = led.x_px, led.y_px, area
     return seen
+
+
+def _lamps(record: _Record) -> FloatArray:
+    """Return where images show fixed lamps, (N, K, 2), px."""
+    if record.rig is not None:  # each camera has its own, and none is solved again
+        return np.zeros((len(record.frames), 0, 2))
+    if len({len(frame.lamps_px) for frame in record.frames}) > 1:
+        raise DamagedError("Images show different numbers of fixed lamps.")
+    lamps = np.array([frame.lamps_px for frame in record.frames], dtype=np.float64)
+    return lamps.reshape(len(record.frames), -1, 2)
 
 
 def _other(path: Path) -> UsageError:
