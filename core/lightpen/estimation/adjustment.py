@@ -112,14 +112,14 @@ def adjust(
         # Noise that lasts contradicts a file by chance more often.
         factor = correlation.factor
         allowed, contradictions, freed, correlation = all_allowed(factor)
-    held = _held_to_files(allowed, freed)
+    held = held_to_files(allowed, freed)
     bundle = allowed
     if held is not freed:
         bundle = fit(held, inflation=factor)
     return Adjustment(bundle, allowed, freed, contradictions, correlation)
 
 
-def _held_to_files(bundle: Bundle, priors: Priors) -> Priors:
+def held_to_files(bundle: Bundle, priors: Priors) -> Priors:
     """Return priors that allow an assumed camera no more than its images show."""
     cameras = list(priors.cameras)
     for c, place in enumerate(bundle.columns.cameras):

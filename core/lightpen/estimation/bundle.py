@@ -32,6 +32,7 @@ from lightpen.estimation.linearised import (
     BundleState,
     CameraView,
     Eliminated,
+    NormalEquations,
     eliminate,
     views_at,
 )
@@ -215,7 +216,8 @@ def fit_bundle(
                 if components.jitter.covariance is None
                 else eliminate(views, used, weight_sigma)
             )
-            jitter = _jitter(unknowns, alone, used, step, shifts, covariance)
+            seen = used.any(axis=(1, 2))
+            jitter = jitter_of(unknowns, alone, seen, values - taken_up, covariance)
             components = components._replace(jitter=jitter)
         if n_pass in (1, FINDING_PASSES):
             used = gate(_together(residuals)).reshape(used.shape)
@@ -323,19 +325,27 @@ def _n_eliminated(
     return float(N_TURN * n_images + freedom.sum())
 
 
-def _jitter(
+def jitter_of(
     unknowns: Unknowns,
-    each: Eliminated,
-    used: BoolArray,
-    step: FloatArray,
-    shifts: FloatArray,
+    each: NormalEquations,
+    seen: BoolArray,
+    change: FloatArray,
     covariance: FloatArray,
 ) -> Jitter:
     """Return what is likely of the seat from image to image.
 
-    ``each`` is eliminated without any jitter.
+    Parameters
+    ----------
+    each : NormalEquations
+        Without any jitter.
+    seen : (N,) array of bool
+        Images that show anything.
+    change : (p,) array
+        Of the unknowns, that solves these equations.
+    covariance : (p, p) array
+        Of the unknowns.
     """
-    seen = used.any(axis=(1, 2))
+    step, shifts = unknowns.step(change)
     rows = each.cone_rows[seen]
     own = rows[..., :N_CONE]
     right = each.cone_right - each.cone_rows @ step

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.linearised import N_CONE, BundleState, Eliminated
+from lightpen.estimation.linearised import N_CONE, BundleState, NormalEquations
 from lightpen.estimation.priors import Priors
 from lightpen.estimation.variance_components import (
     FITTED,
@@ -126,14 +126,14 @@ def lean_forms(rotations: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The unknowns of a fit as combinations of the columns of `Eliminated`.
+    """The unknowns of a fit as combinations of the columns of `NormalEquations`.
 
     Attributes
     ----------
     columns : Columns
         Where each kind stands.
     mixing : (K, p0) array
-        Columns of `Eliminated` by the unknowns common to all images.
+        Columns of `NormalEquations` by the unknowns common to all images.
     forms : (N, m) array
         Weights by which each image shifts its cone: the lean, then the drift, then
         whether it is at the second cone.
@@ -206,7 +206,7 @@ class Unknowns:
         """How many there are, rotations apart."""
         return int(self.columns.between.stop)
 
-    def system(self, each: Eliminated) -> tuple[FloatArray, FloatArray]:
+    def system(self, each: NormalEquations) -> tuple[FloatArray, FloatArray]:
         """Return information (p, p) and gradient (p,) of the unknowns."""
         mixing, forms = self.mixing, self.forms
         p0, p = mixing.shape[1], self.number

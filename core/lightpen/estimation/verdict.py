@@ -10,7 +10,7 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.led_quality import DISPLACED
 from lightpen.estimation.rig_report import late_cameras
 from lightpen.estimation.single_images import USUAL_SIGMA
-from lightpen.estimation.uncertainty import Halves, ShareName
+from lightpen.estimation.uncertainty import IMAGES_SHRINK, Halves, ShareName
 from lightpen.messages import (
     Code,
     camera_moved,
@@ -41,13 +41,6 @@ CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance a
 AXES = "xyz"
 TINY = 1e-12  # mm
 
-IMAGES_SHRINK = (
-    ShareName.NOISE,
-    ShareName.CENTERS,
-    ShareName.SEAT,
-    ShareName.DRIFT,
-    ShareName.HELD_BACK,
-)
 _ADVICE = {
     ShareName.LEDS: sentence(
         "share.leds", "the LED file. Measure the LEDs better, and state how well"

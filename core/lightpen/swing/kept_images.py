@@ -11,6 +11,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
 from lightpen.estimation.reach import NOT_REACHED, Reach, Reached, reach_of
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
@@ -44,10 +45,12 @@ class KeptImages:
         Tip and cone by the best fit there is.
     joint : JointFit or None
         The joint fit, as soon as the postures allow one.
+    assumed : Assumptions
+        What stands in for what the files do not state.
     reach : Reach or None
         What the images say beside the files, with the joint fit.
     reached : Reached
-        How certain the tip is, what the files leave open included.
+        How certain the tip is, by all shares that the verdict counts.
     """
 
     numbers: IntArray
@@ -57,6 +60,7 @@ class KeptImages:
     translations: FloatArray
     cofactors: FloatArray
     sigmas: FloatArray
+    assumed: Assumptions = USUAL
     seat: Seat | None = None
     joint: JointFit | None = None
     reach: Reach | None = None
@@ -93,7 +97,7 @@ class KeptImages:
         return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
 
 
-def none_kept(n_leds: int) -> KeptImages:
+def none_kept(n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
     """Return no images of a pen with this number of LEDs."""
     return KeptImages(
         numbers=np.zeros(0, dtype=np.int64),
@@ -103,6 +107,7 @@ def none_kept(n_leds: int) -> KeptImages:
         translations=np.zeros((0, 3)),
         cofactors=np.zeros((0, 6, 6)),
         sigmas=np.zeros(0),
+        assumed=assumed,
     )
 
 
@@ -113,6 +118,7 @@ def kept_before(
     pixels: FloatArray,
     rotations: FloatArray,
     translations: FloatArray,
+    assumed: Assumptions = USUAL,
 ) -> KeptImages:
     """Return images that were kept before an interruption, with their fit.
 
@@ -126,7 +132,7 @@ def kept_before(
         cam_from_pen, mm.
     """
     if not len(numbers):
-        return none_kept(pen.n_leds)
+        return none_kept(pen.n_leds, assumed)
     poses = fit_poses(camera, pen, pixels, rotations, translations)
     kept = KeptImages(
         numbers=numbers,
@@ -136,6 +142,7 @@ def kept_before(
         translations=poses.translations,
         cofactors=poses.covariances / poses.sigma**2,
         sigmas=np.full(len(numbers), poses.sigma),
+        assumed=assumed,
     )
     return _refit(camera, pen, kept, poses.rotations)
 
@@ -157,6 +164,7 @@ def keep(
         translations=np.concatenate([kept.translations, sighting.translation[None]]),
         cofactors=np.concatenate([kept.cofactors, sighting.cofactors[None]]),
         sigmas=np.append(kept.sigmas, sighting.sigma),
+        assumed=kept.assumed,
     )
     if kept.joint is None:
         return _refit(camera, pen, longer, longer.rotations)
@@ -214,7 +222,7 @@ def _refit(
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
-    reached = reach.reached(camera, pen, max(joint.sigma, NO_NOISE))
+    reached = reach.reached(joint, max(joint.sigma, NO_NOISE), kept.assumed)
     return replace(kept, seat=fitted, joint=joint, reach=reach, reached=reached)
 
 
