@@ -216,7 +216,7 @@ def fit_bundle(
                 if components.jitter.covariance is None
                 else eliminate(views, used, weight_sigma)
             )
-            seen = used.any(axis=(1, 2))
+            seen = np.asarray(used.any(axis=(1, 2)))
             jitter = jitter_of(unknowns, alone, seen, values - taken_up, covariance)
             components = components._replace(jitter=jitter)
         if n_pass in (1, FINDING_PASSES):

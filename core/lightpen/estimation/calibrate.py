@@ -107,6 +107,8 @@ class Calibration:
         The bundle adjustment: everything that the files may have wrong.
     priors : Priors
         What it took from the files, as stated or assumed.
+    assumptions : Assumptions
+        What stood in for what the files do not state.
     growth : float
         By which the pen is larger than its file has it, as it is warmer; relative.
     contradictions : tuple of Contradiction
@@ -129,6 +131,7 @@ class Calibration:
     joint: JointFit
     bundle: Bundle
     priors: Priors
+    assumptions: Assumptions
     growth: float
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit
@@ -329,6 +332,7 @@ def calibrate_rig(
         joint=joint,
         bundle=bundle,
         priors=adjusted.priors,
+        assumptions=assumptions,
         growth=growth,
         contradictions=adjusted.contradictions,
         two_stage=two_stage,

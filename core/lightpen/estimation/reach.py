@@ -8,6 +8,7 @@ an image more adds no more than its own. That successive images may hang togethe
 left to the verdict.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 
@@ -28,7 +29,9 @@ from lightpen.estimation.priors import Priors, priors_of
 from lightpen.estimation.uncertainty import (
     COVERAGE_FACTOR,
     IMAGES_SHRINK,
+    POSTURES,
     Share,
+    ShareName,
     shares_of,
 )
 from lightpen.estimation.unknowns import (
@@ -45,7 +48,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
 
 GROWTH = 1.25  # of the number of images, after which all are counted anew
-ENDLESS = 1e6  # times the images, for what no image can lower
+ENDLESS = 100.0  # times the images, more than anyone takes
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ class Reached:
     uncertainty : float
         U (k = 2) along the weakest direction, mm; infinite until it is known.
     floor : float
-        What more images of this kind cannot bring it below, mm: what the LED file
-        leaves open, as the images themselves tell of the camera.
+        What more images of this kind cannot bring it below, mm: what files, ball and
+        cone leave open, and what does not average out.
     """
 
     uncertainty: float = float("inf")
@@ -109,7 +112,13 @@ class Reach:
         endless = _with_endless_images(bundle)
         nothing = np.zeros((6, 6))
         at_last = shares_of(endless, priors, n_images, nothing, nothing[0])
-        stays = tuple(each for each in at_last if each.name not in IMAGES_SHRINK)
+        stays = [each for each in at_last if each.name not in IMAGES_SHRINK]
+        share = min(n_images / POSTURES, 1.0)  # of what no longer averages out then
+        stays += [
+            replace(each, covariance=share * each.covariance)
+            for each in now
+            if each.name is ShareName.CENTERS
+        ]
         return Reached(_weakest(now), _weakest(stays))
 
 
@@ -192,7 +201,7 @@ def _linear_bundle(
     unknowns: Unknowns, equations: NormalEquations, joint: JointFit, sigma: float
 ) -> Bundle:
     """Return the bundle adjustment after a single step."""
-    seen = joint.used.any(axis=1)
+    seen = np.asarray(joint.used.any(axis=1))
     information, right = unknowns.system(equations)
     components = unknowns.found(information, right, NO_COMPONENTS)
     prior = unknowns.prior_information(components)
@@ -282,7 +291,7 @@ def _with_endless_images(bundle: Bundle) -> Bundle:
     )
 
 
-def _weakest(shares: tuple[Share, ...]) -> float:
+def _weakest(shares: Sequence[Share]) -> float:
     """Return U (k = 2) of the tip along its weakest direction, mm."""
     covariance = sum((share.covariance[:3, :3] for share in shares), np.zeros((3, 3)))
     return COVERAGE_FACTOR * sqrt(float(np.linalg.eigvalsh(covariance)[-1]))

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -122,6 +122,7 @@ def calibration_record(
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "adjusted": _adjusted(calibration),
+        "assumptions": asdict(calibration.assumptions),
         "fixed_lamps": lamps_record(calibration),
         "second_cone": _second_cone(calibration.second),
         "instrument": instrument_record(calibration.instrument),

@@ -167,6 +167,11 @@ def _pen_lines(calibration: Calibration) -> list[str]:
             f"Discs        {reading.value:.2f} mm wide by their areas, U = "
             f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
         )
+    else:
+        lines.append(
+            f"Discs        {calibration.bundle.state.pen.diameter:.2f} mm wide by the "
+            "LED file; LED centres alone do not tell"
+        )
     second = calibration.second
     if second is not None:
         lines += [

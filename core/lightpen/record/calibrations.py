@@ -4,7 +4,7 @@ Both hold the same record of the calibration, and tell when they were changed si
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,6 +25,7 @@ from lightpen.formats.own_json import (
     in_shape,
     parse_json,
 )
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.record.results import Row, has_head, parse_result
 from lightpen.sentences import sentence
 
@@ -83,6 +84,7 @@ class _Record(Struct):
     leds: list[_Led]
     frames: list[_Frame]
     nominal_tip_mm: Vector | None = None
+    assumptions: dict[str, float | None] = {}
     instrument: _Instrument | None = None
     rig: Any = None
 
@@ -129,6 +131,8 @@ class CalibrationFile:
         Noise of one image coordinate, px.
     nominal_tip : (3,) array or None
         mm.
+    assumptions : Assumptions
+        What stood in for what the files do not state.
     camera_sha256, pen_sha256 : str
         Of the files that it was made with.
     pen_file : str
@@ -165,6 +169,7 @@ class CalibrationFile:
     uncertainty: FloatArray
     sigma: float
     nominal_tip: FloatArray | None
+    assumptions: Assumptions
     camera_sha256: str
     pen_sha256: str
     pen_file: str
@@ -224,6 +229,7 @@ def _calibration(
         record = in_shape(tree, _Record)
         instrument = _instrument(record)
         seen, lamps = _seen(record), _lamps(record)
+        assumed = _assumed(record)
     except DamagedError as error:
         raise _other(path) from error
     return CalibrationFile(
@@ -240,6 +246,7 @@ def _calibration(
         nominal_tip=(
             None if record.nominal_tip_mm is None else np.array(record.nominal_tip_mm)
         ),
+        assumptions=assumed,
         camera_sha256=record.inputs.camera.sha256,
         pen_sha256=record.inputs.pen.sha256,
         pen_file=record.inputs.pen.file,
@@ -288,6 +295,14 @@ def _seen(record: _Record) -> FloatArray:
             area = math.nan if led.area_px2 is None else led.area_px2
             seen[i, led.led - 1] = led.x_px, led.y_px, area
     return seen
+
+
+def _assumed(record: _Record) -> Assumptions:
+    """Return what was assumed; a version that does not say had what is usual."""
+    try:
+        return Assumptions(**{**asdict(USUAL), **record.assumptions})
+    except (TypeError, ValueError) as error:
+        raise DamagedError("The assumptions make no sense.") from error
 
 
 def _lamps(record: _Record) -> FloatArray:

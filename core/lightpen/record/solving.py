@@ -159,7 +159,9 @@ def _solved(
         for index, number in enumerate(numbers.tolist())
         if number in taken_out
     }
-    calibration = calibrate(source.camera, source.pen, leave_out(observations, reasons))
+    calibration = calibrate(
+        source.camera, source.pen, leave_out(observations, reasons), source.assumptions
+    )
     return Solution(
         source=source,
         numbers=numbers,

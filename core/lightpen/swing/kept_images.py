@@ -170,7 +170,7 @@ def keep(
         return _refit(camera, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
     longer = replace(longer, seat=kept.seat, reach=kept.reach)
-    return _refit(camera, pen, longer, starts)
+    return _refit(camera, pen, longer, starts, is_near=True)
 
 
 def first_images(
@@ -202,7 +202,12 @@ def _leave_out(
 
 
 def _refit(
-    camera: Camera, pen: Pen, kept: KeptImages, starts: FloatArray
+    camera: Camera,
+    pen: Pen,
+    kept: KeptImages,
+    starts: FloatArray,
+    *,
+    is_near: bool = False,
 ) -> KeptImages:
     """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
     kept = replace(kept, joint=None, reached=NOT_REACHED)
@@ -214,7 +219,10 @@ def _refit(
     if not fixed:
         return replace(kept, seat=seat)
     try:
-        joint = fit_joint(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam)
+        joint = fit_joint(
+            *(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam),
+            is_near=is_near,
+        )
     except CalibrationError:  # an image too bad to settle; the next ones may help
         return replace(kept, seat=seat)
     used = joint.used.any(axis=1)

@@ -102,7 +102,7 @@ def calibrate_again(
         edge_widths=calibration.edge_widths,
         lamps=calibration.lamps,
     )
-    return calibrate(camera, pen, measured)
+    return calibrate(camera, pen, measured, calibration.assumptions)
 
 
 def improve_pen(
