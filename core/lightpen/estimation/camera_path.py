@@ -31,7 +31,7 @@ from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 
 MIN_IMAGES = 10
-LEAST = 1e-6  # px, of the noise; keeps exact lamps from none
+LEAST = 1e-6  # px, of noise and ways; keeps exact lamps from dividing by zero
 RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
 HALF = 0.5  # of the way of the lamps, which the pen goes at least if the camera does
 FAR = 3.0  # times the usual distance; what lies farther has slipped
@@ -189,4 +189,5 @@ def _share_of_pen(camera: Camera, path: CameraPath, posed: PosedImages) -> float
     by_lamps, by_pen = (
         each[near] - each[near].mean(axis=0) for each in (by_lamps, by_pen)
     )
-    return float(np.sum(by_lamps * by_pen) / np.sum(by_lamps**2))
+    together = np.sum(by_lamps * by_pen)
+    return float(together / max(np.sum(by_lamps**2), LEAST**2))
