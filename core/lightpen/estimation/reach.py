@@ -201,7 +201,8 @@ def _linear_bundle(
     unknowns: Unknowns, equations: NormalEquations, joint: JointFit, sigma: float
 ) -> Bundle:
     """Return the bundle adjustment after a single step."""
-    seen = np.asarray(joint.used.any(axis=1))
+    # LEDs that count by now may not have done so when they were counted.
+    seen = np.trace(equations.cone_rows[..., :N_CONE], axis1=1, axis2=2) > 0
     information, right = unknowns.system(equations)
     components = unknowns.found(information, right, NO_COMPONENTS)
     prior = unknowns.prior_information(components)

@@ -312,7 +312,9 @@ class Unknowns:
         """Return the components, each found beside the others."""
         now = before
         for _ in range(ROUNDS):
-            now = self._found_once(information, right, now)
+            known, now = now, self._found_once(information, right, now)
+            if self._sigmas(now) == self._sigmas(known):  # as they would be once more
+                break
         return now
 
     def _found_once(
