@@ -235,7 +235,8 @@ def _fit_times() -> _FitTimes:
         calibration=median_ms(lambda: calibrate(CAMERA, PEN, seen), REPEATS),
         extend=median_ms(
             lambda: fit_joint(
-                CAMERA, PEN, pixels, found, but_one.tip_pen, but_one.cone_cam
+                *(CAMERA, PEN, pixels, found, but_one.tip_pen, but_one.cone_cam),
+                is_near=True,
             ),
             REPEATS,
         ),

@@ -43,6 +43,7 @@ class Code(StrEnum):
     FILE_ASSUMED = "verdict.file-assumed"
     FILE_CONTRADICTED = "verdict.file-contradicted"
     NOT_SIMULTANEOUS = "verdict.not-simultaneous"
+    CAMERA_MOVED = "verdict.camera-moved"
     OUT_OF_REACH = "swing.out-of-reach"
     TIP_CHANGED = "verdict.tip-changed"
     LAST_UNKNOWN = "verdict.last-unknown"
@@ -247,6 +248,17 @@ def not_simultaneous(camera: str, lag: float) -> Sentence:
         "it. Trigger all cameras by one signal, or hold the pen still for each image.",
         camera=camera,
         lag=abs(lag),
+    )
+
+
+def camera_moved(distance: float) -> Sentence:
+    """Tell how far cone and camera moved against each other during the swing, mm."""
+    return sentence(
+        Code.CAMERA_MOVED,
+        "Cone and camera moved by {distance:.3f} mm against each other during the "
+        "swing. It is taken out as far as the images tell, but touches would not be "
+        "right either. Clamp both, and let the camera warm up.",
+        distance=distance,
     )
 
 

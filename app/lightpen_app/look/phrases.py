@@ -78,6 +78,7 @@ _SHORTS: dict[Code, str] = {
     Code.FILE_UNCERTAIN: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_ASSUMED: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.FILE_CONTRADICTED: QT_TRANSLATE_NOOP("phrases", "File does not fit"),
+    Code.CAMERA_MOVED: QT_TRANSLATE_NOOP("phrases", "Camera or cone moved"),
     Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
     Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),

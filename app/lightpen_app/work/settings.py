@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QWidget
 from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
+from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
 from lightpen.sentences import Sentence
 from lightpen_app.look.languages import Language
@@ -70,6 +71,11 @@ class Station:
         File of a GenTL producer, where one was chosen.
     max_uncertainty : float
         U (k = 2) of the tip that ends a swing, mm.
+    focal_length, scale, form_error, center_bias, temperature, warmth, expansion : float
+        What is assumed where files say nothing; see
+        `lightpen.model.assumptions.Assumptions`.
+    temperature_c : float
+        Of the pen, degrees C; not a number when it was not measured.
     """
 
     operator: str = ""
@@ -88,6 +94,14 @@ class Station:
     max_uncertainty: float = SwingLimits.max_uncertainty
     min_images: int = SwingLimits.min_images
     max_images: int = SwingLimits.max_images
+    focal_length: float = USUAL.focal_length
+    scale: float = USUAL.scale
+    form_error: float = USUAL.form_error
+    center_bias: float = USUAL.center_bias
+    temperature_c: float = math.nan
+    temperature: float = USUAL.temperature
+    warmth: float = USUAL.warmth
+    expansion: float = USUAL.expansion
 
 
 @dataclass(frozen=True)

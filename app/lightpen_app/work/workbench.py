@@ -1,5 +1,6 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,6 +21,7 @@ from lightpen.live.sources import (
     files_of_before,
     sample_files,
 )
+from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
@@ -42,6 +44,11 @@ from lightpen_app.work.swing_run import SwingRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 COUNTING_MS = 5000  # from one look for other windows to the next
+# Those of a station's assumptions that it keeps by their names.
+ASSUMED = (
+    *("scale", "form_error", "center_bias"),
+    *("temperature", "warmth", "expansion"),
+)
 
 
 @dataclass(frozen=True)
@@ -201,6 +208,7 @@ class Workbench(QObject):
             pen_file=None,
             mask=_parse_circles(station.mask),
             limits=_limits(station),
+            assumptions=_assumptions(station),
         )
         self._open_files(station)
         self._remember_station()
@@ -459,6 +467,7 @@ class Workbench(QObject):
             max_uncertainty=now.limits.max_uncertainty,
             min_images=now.limits.min_images,
             max_images=now.limits.max_images,
+            **_assumed_entries(now.assumptions),
         )
         self._settings.set_station(names.station, station)
 
@@ -492,6 +501,26 @@ def _limits(station: Station) -> SwingLimits:
         )
     except ValueError:
         return SwingLimits()
+
+
+def _assumptions(station: Station) -> Assumptions:
+    """Return what a station assumes, what is usual if that makes no sense."""
+    own = {name: getattr(station, name) for name in ASSUMED}
+    measured = None if math.isnan(station.temperature_c) else station.temperature_c
+    try:
+        others = replace(USUAL, temperature_c=measured, **own)
+        return with_focal_length(others, station.focal_length)
+    except ValueError:
+        return USUAL
+
+
+def _assumed_entries(assumptions: Assumptions) -> dict[str, float]:
+    measured = assumptions.temperature_c
+    entries = {name: getattr(assumptions, name) for name in ASSUMED}
+    return entries | {
+        "focal_length": assumptions.focal_length,
+        "temperature_c": math.nan if measured is None else measured,
+    }
 
 
 def _source(station: Station) -> SourceChoice:

@@ -8,11 +8,16 @@ from lightpen.commands.arguments import above_zero, add_pen_options, finite, num
 from lightpen.errors import UsageError
 from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import METHODS
-from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
+from lightpen.model.assumptions import (
+    COLDEST,
+    USUAL,
+    WARMEST,
+    Assumptions,
+    with_focal_length,
+)
 from lightpen.sentences import sentence
 
 LARGEST_SHARE = 0.1
-TEMPERATURES = (-50.0, 100.0)  # degrees C, of a pen
 
 
 def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +62,7 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--temperature",
-        type=number_from(*TEMPERATURES, "temperature", "degrees Celsius"),
+        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
         help="of the pen during the swing, which makes it larger than its file says",
     )

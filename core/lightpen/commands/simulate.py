@@ -12,6 +12,7 @@ LED_DIAMETERS = (2.0, 12.0)  # mm, of simulated LEDs
 MAX_RIG = 4  # simulated cameras
 BASELINES = (50.0, 1500.0)  # mm, between simulated cameras
 BLURS = (0.3, 8.0)  # px, of simulated optics
+LARGEST_SHIFT = 10.0  # px, of simulated images
 MAX_RENDERED = 30_000  # images
 
 
@@ -66,6 +67,18 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
         help="from the first of several cameras to the last",
     )
     parser.add_argument(
+        "--lamp",
+        action="store_true",
+        help="a fixed lamp in view, which tells whether the camera stands still",
+    )
+    parser.add_argument(
+        "--camera-turn",
+        type=number_from(0.0, LARGEST_SHIFT, "shift", "px"),
+        default=0.0,
+        metavar="PX",
+        help="how far the image shifts during the swing, as the camera turns",
+    )
+    parser.add_argument(
         "--pen",
         choices=("paper", "six", "eight", "near-symmetric", "fanned"),
         default="paper",
@@ -101,6 +114,8 @@ def _simulate(options: argparse.Namespace) -> None:
         sensor=Sensor(bits=options.bits),
         faces=looks.faces,
         optics=replace(looks.optics, psf_sigma=options.blur),
+        has_lamp=options.lamp,
+        camera_turn=options.camera_turn,
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
     )
     with progress("Rendering") as report:

@@ -110,6 +110,7 @@ def _rearranged(seen: Observations, images: IntArray) -> Observations:
         rotations=moved(seen.rotations),
         translations=moved(seen.translations),
         edge_widths=moved(seen.edge_widths),
+        lamps=moved(seen.lamps),
         reasons=tuple(Reason.ABSENT if i == NONE else seen.reasons[i] for i in images),
         details=tuple(None if i == NONE else seen.details[i] for i in images),
     )

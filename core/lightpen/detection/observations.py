@@ -11,6 +11,7 @@ from typing import Self
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
+from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
 from lightpen.detection.labelling.diagnosis import diagnose, diagnose_mirror
 from lightpen.detection.labelling.labels import label_images
 from lightpen.detection.pose import MIN_POSE_LEDS, start_poses
@@ -58,6 +59,8 @@ class Observations:
     edge_widths : (N,) array
         Mean width of the rims of the labelled LEDs from dark to bright, px; NaN where
         none is labelled, or only centres are given.
+    lamps : (N, K, 2) array
+        Centres of K fixed lamps in view, px; NaN where an image does not show one.
     reasons : tuple of Reason
         Why an image cannot be used; `Reason.NONE` where it can.
     details : tuple of Sentence or None
@@ -73,6 +76,7 @@ class Observations:
     rotations: FloatArray
     translations: FloatArray
     edge_widths: FloatArray
+    lamps: FloatArray
     reasons: tuple[Reason, ...]
     details: tuple[Sentence | None, ...]
     advice: Sentence | None = None
@@ -80,9 +84,10 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class _Searched:
-    """The spots of one image, or why there are none."""
+    """The spots of one image, or why there are none; what a mask leaves out, (M, 2)."""
 
     spots: Spots = field(default_factory=Spots.none)
+    masked: FloatArray | None = None
     reason: Reason = Reason.NONE
     detail: Sentence | None = None
 
@@ -135,7 +140,9 @@ def observe_images(
     images = [image for image, _ in labelled]
     sightings = [sighting for _, sighting in labelled]
     _require_size(images, camera)
-    seen = _observations(source.names, sightings)
+    nothing = np.full((0 if mask is None else len(mask), 2), np.nan)
+    masked = np.stack([nothing if i.masked is None else i.masked for i in images])
+    seen = _observations(source.names, sightings, fixed_lamps(masked, sightings))
     spots = [sighting.spots for sighting in sightings if sighting.spots is not None]
     mostly_labelled = 2 * seen.reasons.count(Reason.NONE) > n_images
     if mostly_labelled and not np.isfinite(seen.seen_pixels[..., 0]).any(axis=0).all():
@@ -163,7 +170,8 @@ def observe_centers(centers: Centers, camera: Camera, pen: Pen) -> Observations:
     rotations[enough], translations[enough] = start_poses(camera, pen, pixels[enough])
     names = tuple(f"frame {frame}" for frame in centers.frames)
     images = zip(pixels, rotations, translations, strict=True)
-    return _observations(names, [sighting_of_centers(*image) for image in images])
+    sightings = [sighting_of_centers(*image) for image in images]
+    return _observations(names, sightings, np.zeros((len(names), 0, 2)))
 
 
 def leave_out(
@@ -215,7 +223,7 @@ def _search(
         )
         return _Searched(reason=Reason.WRONG_SIZE, detail=size)
     try:
-        return _Searched(detect_spots(image, mask))
+        return _Searched(detect_spots(image, mask), masked_lights(image, mask))
     except MISHAPS as error:
         return _Searched.failed(error)
 
@@ -240,7 +248,9 @@ def _labelled(
     ]
 
 
-def _observations(names: tuple[str, ...], sightings: list[Sighting]) -> Observations:
+def _observations(
+    names: tuple[str, ...], sightings: list[Sighting], lamps: FloatArray
+) -> Observations:
     return Observations(
         names=names,
         pixels=np.array([sighting.pixels for sighting in sightings]),
@@ -249,6 +259,7 @@ def _observations(names: tuple[str, ...], sightings: list[Sighting]) -> Observat
         rotations=np.array([sighting.rotation for sighting in sightings]),
         translations=np.array([sighting.translation for sighting in sightings]),
         edge_widths=np.array([sighting.edge_width for sighting in sightings]),
+        lamps=lamps,
         reasons=tuple(sighting.reason for sighting in sightings),
         details=(None,) * len(sightings),
     )

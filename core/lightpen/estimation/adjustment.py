@@ -22,7 +22,7 @@ from lightpen.estimation.contradictions import (
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import inverse, lean_forms
+from lightpen.estimation.unknowns import Forms, drift_forms, inverse, lean_forms
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
@@ -64,6 +64,7 @@ def adjust(
     pixels: FloatArray,
     priors: Priors,
     places: FloatArray | None = None,
+    shifts: FloatArray | None = None,
 ) -> Adjustment:
     """Adjust all that the files may have wrong; let go what the images contradict.
 
@@ -76,6 +77,8 @@ def adjust(
     places : (6 (C - 1),) array, optional
         By which the cameras stood off the file of the rig where the state was found,
         in the order of `Rig.covariance`.
+    shifts : (N, k) array, optional
+        Ways that fixed lamps in view go, px, along which the cone may drift.
 
     Raises
     ------
@@ -83,8 +86,8 @@ def adjust(
         The iteration does not settle.
     """
     rig = state.rig
-    lean = lean_forms(state.rotations)
-    fit = partial(fit_bundle, pixels, state, lean=lean, places=places)
+    forms = Forms(lean_forms(state.rotations), drift_forms(len(pixels), shifts))
+    fit = partial(fit_bundle, pixels, state, forms=forms, places=places)
 
     def all_allowed(
         factor: float,
@@ -109,14 +112,14 @@ def adjust(
         # Noise that lasts contradicts a file by chance more often.
         factor = correlation.factor
         allowed, contradictions, freed, correlation = all_allowed(factor)
-    held = _held_to_files(allowed, freed)
+    held = held_to_files(allowed, freed)
     bundle = allowed
     if held is not freed:
         bundle = fit(held, inflation=factor)
     return Adjustment(bundle, allowed, freed, contradictions, correlation)
 
 
-def _held_to_files(bundle: Bundle, priors: Priors) -> Priors:
+def held_to_files(bundle: Bundle, priors: Priors) -> Priors:
     """Return priors that allow an assumed camera no more than its images show."""
     cameras = list(priors.cameras)
     for c, place in enumerate(bundle.columns.cameras):

@@ -32,6 +32,7 @@ from lightpen.estimation.linearised import (
     BundleState,
     CameraView,
     Eliminated,
+    NormalEquations,
     eliminate,
     views_at,
 )
@@ -40,6 +41,7 @@ from lightpen.estimation.unknowns import (
     NO_COMPONENTS,
     Columns,
     Components,
+    Forms,
     Unknowns,
     inverse,
 )
@@ -110,6 +112,17 @@ class Bundle:
         moves = self.unknowns.basis @ self.values[self.columns.leds]
         return np.asarray(moves.reshape(-1, 3))
 
+    @property
+    def drift(self) -> float:
+        """How far apart the farthest two places of the cone are by its drift, mm."""
+        at, unknowns = self.columns, self.unknowns
+        first = (at.drift.start - at.seat[0].start) // N_CONE
+        n_forms = (at.drift.stop - at.drift.start) // N_CONE
+        by_form = self.values[at.drift].reshape(-1, N_CONE)
+        places = unknowns.forms[:, first : first + n_forms] @ by_form
+        apart = np.linalg.norm(places[:, None] - places, axis=2)
+        return float(apart.max())
+
     def part(self, *kinds: slice) -> FloatArray:
         """Return what stands in tip and cone for some unknowns, (6, 6).
 
@@ -140,7 +153,7 @@ def fit_bundle(
     pixels: FloatArray,
     start: BundleState,
     priors: Priors,
-    lean: FloatArray,
+    forms: Forms,
     inflation: float = 1.0,
     places: FloatArray | None = None,
 ) -> Bundle:
@@ -152,8 +165,8 @@ def fit_bundle(
         Ellipse centres of the LEDs, px; NaN where an LED was not seen.
     start : BundleState
         With cameras and pen as their files have them.
-    lean : (N, F) array
-        Forms in which the seat may follow the pen's lean, each of mean square 1.
+    forms : Forms
+        In which the seat may follow the pen's lean, and the cone drift.
     inflation : float
         How many times the variance of the noise counts beside the priors, as it does
         not average out.
@@ -165,7 +178,7 @@ def fit_bundle(
     CalibrationError
         The iteration does not settle.
     """
-    unknowns = Unknowns.of(start, priors, lean)
+    unknowns = Unknowns.of(start, priors, forms)
     at = unknowns.columns
     state, taken_up = start, np.zeros(unknowns.number)
     if places is not None:
@@ -203,7 +216,8 @@ def fit_bundle(
                 if components.jitter.covariance is None
                 else eliminate(views, used, weight_sigma)
             )
-            jitter = _jitter(unknowns, alone, used, step, shifts, covariance)
+            seen = np.asarray(used.any(axis=(1, 2)))
+            jitter = jitter_of(unknowns, alone, seen, values - taken_up, covariance)
             components = components._replace(jitter=jitter)
         if n_pass in (1, FINDING_PASSES):
             used = gate(_together(residuals)).reshape(used.shape)
@@ -311,19 +325,27 @@ def _n_eliminated(
     return float(N_TURN * n_images + freedom.sum())
 
 
-def _jitter(
+def jitter_of(
     unknowns: Unknowns,
-    each: Eliminated,
-    used: BoolArray,
-    step: FloatArray,
-    shifts: FloatArray,
+    each: NormalEquations,
+    seen: BoolArray,
+    change: FloatArray,
     covariance: FloatArray,
 ) -> Jitter:
     """Return what is likely of the seat from image to image.
 
-    ``each`` is eliminated without any jitter.
+    Parameters
+    ----------
+    each : NormalEquations
+        Without any jitter.
+    seen : (N,) array of bool
+        Images that show anything.
+    change : (p,) array
+        Of the unknowns, that solves these equations.
+    covariance : (p, p) array
+        Of the unknowns.
     """
-    seen = used.any(axis=(1, 2))
+    step, shifts = unknowns.step(change)
     rows = each.cone_rows[seen]
     own = rows[..., :N_CONE]
     right = each.cone_right - each.cone_rows @ step

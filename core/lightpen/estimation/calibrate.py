@@ -14,6 +14,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.adjustment import adjust
 from lightpen.estimation.bundle import Bundle
+from lightpen.estimation.camera_path import CameraPath, SteadyImages, pose_steadily
 from lightpen.estimation.contradictions import Contradiction
 from lightpen.estimation.disc_diameter import read_diameter
 from lightpen.estimation.instrument import Instrument, adjusted_instrument
@@ -32,7 +33,6 @@ from lightpen.estimation.second_cone import (
 )
 from lightpen.estimation.single_images import (
     PosedImages,
-    pose_images,
     require_fit,
     require_images,
 )
@@ -63,6 +63,8 @@ class CameraImages:
     leds_used : (N, L) array of bool
     total_rms : float
         Of all LEDs that are used, px.
+    path : CameraPath or None
+        How the camera moved by its fixed lamps; None without any.
     """
 
     observations: Observations
@@ -70,6 +72,7 @@ class CameraImages:
     rms: FloatArray
     leds_used: BoolArray
     total_rms: float
+    path: CameraPath | None
 
     @property
     def used(self) -> BoolArray:
@@ -104,6 +107,8 @@ class Calibration:
         The bundle adjustment: everything that the files may have wrong.
     priors : Priors
         What it took from the files, as stated or assumed.
+    assumptions : Assumptions
+        What stood in for what the files do not state.
     growth : float
         By which the pen is larger than its file has it, as it is warmer; relative.
     contradictions : tuple of Contradiction
@@ -126,6 +131,7 @@ class Calibration:
     joint: JointFit
     bundle: Bundle
     priors: Priors
+    assumptions: Assumptions
     growth: float
     contradictions: tuple[Contradiction, ...]
     two_stage: TwoStageFit
@@ -147,6 +153,22 @@ class Calibration:
     def leds_used(self) -> BoolArray:
         """Which LEDs of its images take part, (N, L)."""
         return self.cameras[0].leds_used
+
+    @property
+    def moved(self) -> float:
+        """How far cone and camera moved against each other for certain, mm.
+
+        As fixed lamps tell, or the pen.
+        """
+        by_lamps = [
+            images.path.moved * float(self.joint.cone_cam[2]) / camera.fx
+            for images, camera in zip(
+                self.cameras, self.bundle.state.rig.cameras, strict=True
+            )
+            if images.path is not None and images.path.is_followed
+        ]
+        is_certain = self.bundle.components.drift.is_significant
+        return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
     @property
     def led_sigma(self) -> float:
@@ -207,12 +229,13 @@ def calibrate_rig(
     """
     growth = thermal_growth(pen, assumptions)
     pen = grown(pen, growth)
-    parts = [
-        _of_camera(rig, c, partial(pose_images, camera, pen, seen))
+    steady = [
+        _of_camera(rig, c, partial(pose_steadily, camera, pen, seen))
         for c, (camera, seen) in enumerate(zip(rig.cameras, observations, strict=True))
     ]
+    parts = [each.posed for each in steady]
     reasons = _with_slips(parts)
-    seen_by_all = np.stack([seen.pixels for seen in observations], axis=1)
+    seen_by_all = np.stack([each.observations.pixels for each in steady], axis=1)
     there, places = rig, None
     lags: tuple[Lag | None, ...] = ()
     if rig.n_cameras > 1:
@@ -251,12 +274,13 @@ def calibrate_rig(
         edge_widths[chosen],
     )
     priors = replace(priors_of(rig, pen, assumptions), reading=reading)
-    seen = pixels
+    seen, shifts = pixels, _shifts_of(steady, chosen)
     if second is not None:
         others = second_images(rig.cameras[0], pen, second.observations)
         state, seen = others.joined(state, pixels)
         priors = replace(priors, separation=second.separation)
-    adjusted = adjust(state, seen, priors, places)
+        shifts = None
+    adjusted = adjust(state, seen, priors, places, shifts)
     bundle, fitted = adjusted.bundle, adjusted.bundle.state
     joint = joint_at(
         ContactModel(fitted.rig, fitted.pen, pixels),
@@ -293,6 +317,7 @@ def calibrate_rig(
             refined[c],
             joint.of_camera(c, pen.n_leds),
             chosen,
+            steady[c].path,
         )
         for c, part in enumerate(parts)
     )
@@ -307,6 +332,7 @@ def calibrate_rig(
         joint=joint,
         bundle=bundle,
         priors=adjusted.priors,
+        assumptions=assumptions,
         growth=growth,
         contradictions=adjusted.contradictions,
         two_stage=two_stage,
@@ -323,6 +349,15 @@ def calibrate_rig(
     )
 
 
+def _shifts_of(steady: Sequence[SteadyImages], chosen: IntArray) -> FloatArray | None:
+    """Return the ways along which a single camera may have moved, (M, 2), px.
+
+    What lamps show is all that the pen does only where they stand as far away as it.
+    """
+    path = steady[0].path
+    return None if len(steady) > 1 or path is None else path.shifts[chosen]
+
+
 def _images_of_camera(
     observations: Observations,
     reasons: npt.NDArray[np.object_],
@@ -330,6 +365,7 @@ def _images_of_camera(
     refined: Poses,
     own: JointFit,
     chosen: IntArray,
+    path: CameraPath | None,
 ) -> CameraImages:
     """Return what became of a camera's images.
 
@@ -349,6 +385,7 @@ def _images_of_camera(
         rms=rms,
         leds_used=leds_used,
         total_rms=own.rms if own.used.any() else float("nan"),
+        path=path,
     )
 
 
@@ -365,7 +402,7 @@ def _telling(parts: Sequence[PosedImages], kept: BoolArray) -> list[IntArray]:
     ]
 
 
-def _of_camera(rig: Rig, c: int, work: Callable[[], PosedImages]) -> PosedImages:
+def _of_camera(rig: Rig, c: int, work: Callable[[], SteadyImages]) -> SteadyImages:
     """Return what the work on one camera's images gives; an error names the camera."""
     try:
         return work()

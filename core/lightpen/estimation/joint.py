@@ -119,6 +119,8 @@ def fit_joint(
     rotations: FloatArray,
     tip_pen: FloatArray,
     cone_cam: FloatArray,
+    *,
+    is_near: bool = False,
 ) -> JointFit:
     """Fit tip and cone to the LED centres of all images.
 
@@ -130,6 +132,9 @@ def fit_joint(
         Start, of cam_from_pen.
     tip_pen, cone_cam : (3,) array
         Start, mm.
+    is_near : bool
+        Whether it starts from a fit to most of these images, so that LEDs that are far
+        off are known at once.
 
     Raises
     ------
@@ -137,7 +142,7 @@ def fit_joint(
         The iteration does not settle.
     """
     model = ContactModel.of(camera, pen, pixels)
-    return fit_contact(model, rotations, tip_pen, cone_cam)
+    return fit_contact(model, rotations, tip_pen, cone_cam, is_near=is_near)
 
 
 def fit_contact(
@@ -145,10 +150,13 @@ def fit_contact(
     rotations: FloatArray,
     tip_pen: FloatArray,
     cone_rig: FloatArray,
+    *,
+    is_near: bool = False,
 ) -> JointFit:
     """Fit tip and cone to what the cameras of a rig see; see `fit_joint`."""
     state = model.at(rotations, tip_pen, cone_rig)
-    state = _descend(model, state, None, SETTLED)
+    if not is_near:
+        state = _descend(model, state, None, SETTLED)
     for _ in range(MAX_GATINGS):
         used = gate(state.residuals)
         state = _descend(model, state, used, CONVERGED)

@@ -131,8 +131,8 @@ def _view(state: BundleState, c: int, pixels: FloatArray) -> CameraView:
 
 
 @dataclass(frozen=True, eq=False)
-class Eliminated:
-    """Normal equations with the rotations eliminated, in units of the noise.
+class NormalEquations:
+    """Normal equations of the images of a swing, in units of the noise.
 
     Columns: cone (3), each camera's own, diameter, LEDs (3 L).
 
@@ -144,6 +144,20 @@ class Eliminated:
         What each image adds to the three rows of the cone.
     cone_right : (N, 3) array
         What it adds to their right side.
+    """
+
+    N: FloatArray
+    b: FloatArray
+    cone_rows: FloatArray
+    cone_right: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated(NormalEquations):
+    """The same, the rotations eliminated.
+
+    Attributes
+    ----------
     turn : (N, q) array
         Step of the eliminated unknowns of each image where the others stand: its
         rotation, and with jitter its seat.
@@ -152,10 +166,6 @@ class Eliminated:
         Inverse of the normal matrix of the eliminated unknowns.
     """
 
-    N: FloatArray
-    b: FloatArray
-    cone_rows: FloatArray
-    cone_right: FloatArray
     turn: FloatArray
     turn_by_step: FloatArray
     left: FloatArray

@@ -27,7 +27,7 @@ from lightpen.estimation.priors import Priors
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.unknowns import led_basis
 from lightpen.estimation.workers import Map
-from lightpen.model.assumptions import USUAL, Assumptions
+from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.sentences import sentence
@@ -112,9 +112,7 @@ class MonteCarlo:
         return (self.linear - self.deviation) / self.precision
 
 
-def trials_of(
-    calibration: Calibration, assumptions: Assumptions = USUAL, seed: int = 0
-) -> Trials:
+def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
     """Return what the trials of a calibration draw from."""
     instrument, joint = calibration.instrument, calibration.joint
     return Trials(
@@ -127,7 +125,7 @@ def trials_of(
         sigma=joint.sigma * float(np.sqrt(calibration.budget.correlation_factor)),
         led_sigma=max(calibration.led_sigma, instrument.pen.led_sigma or 0.0),
         priors=calibration.priors,
-        assumptions=assumptions,
+        assumptions=calibration.assumptions,
         seed=seed,
     )
 
@@ -137,7 +135,6 @@ def run_monte_carlo(
     n_trials: int,
     in_workers: Map,
     report: Callable[[float], None] = lambda fraction: None,
-    assumptions: Assumptions = USUAL,
 ) -> MonteCarlo:
     """Run trials of a calibration in worker processes.
 
@@ -155,7 +152,7 @@ def run_monte_carlo(
     """
     if n_trials < MIN_TRIALS:
         raise ValueError(f"`n_trials` must be {MIN_TRIALS} or more, got {n_trials}.")
-    trials = trials_of(calibration, assumptions)
+    trials = trials_of(calibration)
     outcomes = in_workers(partial(run_trial, trials), range(n_trials), report)
     errors = [error for error in outcomes if error is not None]
     if 2 * len(errors) < n_trials:
@@ -210,6 +207,7 @@ def _observed(trials: Trials, pixels: FloatArray) -> Observations:
         translations=trials.cone_cam - shifts,
         areas=np.full(pixels.shape[:2], np.nan),
         edge_widths=np.full(n_images, np.nan),
+        lamps=np.zeros((n_images, 0, 2)),
         reasons=(Reason.NONE,) * n_images,
         details=(None,) * n_images,
     )

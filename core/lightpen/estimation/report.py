@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -12,6 +12,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.instrument import instrument_record
+from lightpen.estimation.lamp_report import lamp_warnings, lamps_record
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.rig_report import (
     count_dropped,
@@ -121,6 +122,8 @@ def calibration_record(
         "warnings": warnings_of(calibration),
         "uncertainty": _uncertainty(calibration),
         "adjusted": _adjusted(calibration),
+        "assumptions": asdict(calibration.assumptions),
+        "fixed_lamps": lamps_record(calibration),
         "second_cone": _second_cone(calibration.second),
         "instrument": instrument_record(calibration.instrument),
         "weakest_direction": {
@@ -216,6 +219,7 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
     warnings = [
         *rig_warnings(calibration),
         *(each.sentence for each in calibration.contradictions),
+        *lamp_warnings(calibration),
         *_seat_warnings(calibration),
     ]
     warnings += [
@@ -277,14 +281,13 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
             )
         )
     if found.drift.is_significant:
-        moved = float(np.linalg.norm(bundle.values[bundle.columns.drift]))
         warnings.append(
             sentence(
                 "warning.drift",
                 "The cone moved by {distance:.4f} mm against the camera during the "
                 "swing. Clamp both, let the camera warm up, and repeat. It is in the "
                 "uncertainty.",
-                distance=moved,
+                distance=bundle.drift,
             )
         )
     stated = calibration.priors.led_sigma
@@ -497,6 +500,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                 "rms_px": rms[i],
                 "tip_cam_mm": tips[i],
                 "edge_width_px": observations.edge_widths[i],
+                "lamps_px": observations.lamps[i],
                 "leds": [
                     {
                         "led": j + 1,

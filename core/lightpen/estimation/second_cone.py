@@ -12,10 +12,11 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations
 from lightpen.estimation.adjustment import Adjustment
+from lightpen.estimation.camera_path import pose_steadily
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.priors import Separation
-from lightpen.estimation.single_images import pose_images, require_fit
+from lightpen.estimation.single_images import require_fit
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, Budget
 from lightpen.estimation.unknowns import inverse
 from lightpen.model.camera import Camera
@@ -67,8 +68,9 @@ def second_images(camera: Camera, pen: Pen, observations: Observations) -> Secon
     CalibrationError
         They do not; the text says what is missing.
     """
-    part = pose_images(camera, pen, observations)
-    pixels = observations.pixels[part.chosen]
+    steady = pose_steadily(camera, pen, observations)
+    part = steady.posed
+    pixels = steady.observations.pixels[part.chosen]
     joint = fit_contact(
         ContactModel.of(camera, pen, pixels),
         part.poses.of(part.kept).rotations,

@@ -37,6 +37,8 @@ class PosedImages:
         Images that have a pose.
     poses : Poses
         Of these.
+    fitted : (F,) array of int
+        Images whose pose most LEDs agree with; ``pivot`` is of these.
     kept : (K,) array of int
         Those among the M whose tip is where most have it.
     pivot : PivotFit
@@ -46,6 +48,7 @@ class PosedImages:
     reasons: npt.NDArray[np.object_]
     posed: IntArray
     poses: Poses
+    fitted: IntArray
     kept: IntArray
     pivot: PivotFit
 
@@ -91,6 +94,7 @@ def pose_images(camera: Camera, pen: Pen, observations: Observations) -> PosedIm
         reasons=reasons,
         posed=posed,
         poses=poses,
+        fitted=posed[fitting],
         kept=np.flatnonzero(fitting)[pivot.used],
         pivot=pivot,
     )

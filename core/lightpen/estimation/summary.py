@@ -4,6 +4,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.calibrate import Calibration
+from lightpen.estimation.lamp_report import lamp_lines
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.report import (
     METHODS,
@@ -52,6 +53,7 @@ def calibration_text(
         "",
         *_origin_lines(origin),
         *_image_lines(calibration),
+        *lamp_lines(calibration),
         "",
         *_quality_lines(calibration, chosen),
     ]
@@ -164,6 +166,11 @@ def _pen_lines(calibration: Calibration) -> list[str]:
         lines.append(
             f"Discs        {reading.value:.2f} mm wide by their areas, U = "
             f"{COVERAGE_FACTOR * reading.sigma:.2f} mm"
+        )
+    else:
+        lines.append(
+            f"Discs        {calibration.bundle.state.pen.diameter:.2f} mm wide by the "
+            "LED file; LED centres alone do not tell"
         )
     second = calibration.second
     if second is not None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.estimation.linearised import N_CONE, BundleState, Eliminated
+from lightpen.estimation.linearised import N_CONE, BundleState, NormalEquations
 from lightpen.estimation.priors import Priors
 from lightpen.estimation.variance_components import (
     FITTED,
@@ -56,7 +56,7 @@ class Components(NamedTuple):
     seat : tuple of Component
         Of the seat by each kind of form in which it may follow the lean, mm.
     drift : Component
-        Of the cone from the first to the last image, mm.
+        Of the cone over the whole of each of its ways, mm.
     jitter : Jitter
         Of the seat from image to image.
     """
@@ -68,6 +68,38 @@ class Components(NamedTuple):
 
 
 NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, Jitter(None, 0.0))
+
+
+class Forms(NamedTuple):
+    """Weights by which images may shift their cone.
+
+    Attributes
+    ----------
+    lean : (N, 7) array
+        As the pen leans, see `lean_forms`.
+    drift : (N, D) array
+        In the course of the swing, see `drift_forms`.
+    """
+
+    lean: FloatArray
+    drift: FloatArray
+
+
+def drift_forms(n_images: int, shifts: FloatArray | None = None) -> FloatArray:
+    """Return the forms in which a cone may drift, (N, D), each over a range of 1.
+
+    Evenly in time, and along the ways that lamps in view go.
+
+    Parameters
+    ----------
+    shifts : (N, k) array, optional
+        These ways, px.
+    """
+    time = np.linspace(-0.5, 0.5, n_images)[:, None]
+    if shifts is None or n_images == 0:
+        return time
+    ranges = np.ptp(shifts, axis=0)
+    return np.column_stack([time, shifts[:, ranges > 0] / ranges[ranges > 0]])
 
 
 def lean_forms(rotations: FloatArray) -> FloatArray:
@@ -94,17 +126,17 @@ def lean_forms(rotations: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The unknowns of a fit as combinations of the columns of `Eliminated`.
+    """The unknowns of a fit as combinations of the columns of `NormalEquations`.
 
     Attributes
     ----------
     columns : Columns
         Where each kind stands.
     mixing : (K, p0) array
-        Columns of `Eliminated` by the unknowns common to all images.
+        Columns of `NormalEquations` by the unknowns common to all images.
     forms : (N, m) array
-        Weights by which each image shifts its cone: the lean, then time, then whether
-        it is at the second cone.
+        Weights by which each image shifts its cone: the lean, then the drift, then
+        whether it is at the second cone.
     basis : (3 L, 3 L - 6) array
         Moves of LEDs but those of the pen as a whole.
     scaling : (3 L,) array
@@ -120,7 +152,7 @@ class Unknowns:
     priors: Priors
 
     @classmethod
-    def of(cls, start: BundleState, priors: Priors, lean: FloatArray) -> "Unknowns":
+    def of(cls, start: BundleState, priors: Priors, given: Forms) -> "Unknowns":
         """Return the unknowns of a fit that starts there."""
         rig, pen = start.rig, start.pen
         n_leds = pen.n_leds
@@ -129,7 +161,8 @@ class Unknowns:
         basis = led_basis(pen.leds)
         counts = [3, 3, *sizes, n_extrinsics, 1, 1, basis.shape[1]]
         counts += [3 * n_forms for n_forms in FORMS]
-        counts += [3, 0 if start.at_second is None else 3]
+        n_drifts = given.drift.shape[1]
+        counts += [3 * n_drifts, 0 if start.at_second is None else 3]
         ends = np.cumsum(counts).tolist()
         slices = [slice(end - n, end) for n, end in zip(counts, ends, strict=True)]
         tip, cone, *others = slices
@@ -164,9 +197,8 @@ class Unknowns:
         mixing[row, columns.diameter] = 1.0
         mixing[at_leds, columns.scale.start] = scaling
         mixing[at_leds, columns.leds] = basis
-        time = np.linspace(-0.5, 0.5, len(lean))
         second = () if start.at_second is None else (start.at_second.astype(float),)
-        forms = np.column_stack([lean, time, *second])
+        forms = np.column_stack([given.lean, given.drift, *second])
         return cls(columns, start, mixing, forms, basis, scaling, priors)
 
     @property
@@ -174,7 +206,7 @@ class Unknowns:
         """How many there are, rotations apart."""
         return int(self.columns.between.stop)
 
-    def system(self, each: Eliminated) -> tuple[FloatArray, FloatArray]:
+    def system(self, each: NormalEquations) -> tuple[FloatArray, FloatArray]:
         """Return information (p, p) and gradient (p,) of the unknowns."""
         mixing, forms = self.mixing, self.forms
         p0, p = mixing.shape[1], self.number
@@ -280,7 +312,9 @@ class Unknowns:
         """Return the components, each found beside the others."""
         now = before
         for _ in range(ROUNDS):
-            now = self._found_once(information, right, now)
+            known, now = now, self._found_once(information, right, now)
+            if self._sigmas(now) == self._sigmas(known):  # as they would be once more
+                break
         return now
 
     def _found_once(

@@ -23,10 +23,11 @@ from lightpen.arrays import FloatArray
 SIGNIFICANT = 10.83  # chi-square, 1 degree of freedom, at 0.001
 COUNTED = 2.71  # the same at 0.1: enough to be counted in the uncertainty
 FITTED = 6.63  # the same at 0.01: enough to be fitted
-NONE_SHARE = 0.5  # of swings in which errors of a kind are as good as none
+NONE_SHARE = 0.7  # of swings in which errors of a kind are as good as none
 SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
 SEEN = 1e-9  # of the largest eigenvalue; what is less is not seen at all
 MAX_PASSES = 60
+COARSE = 4  # one in so many scales, where all images are asked for each
 SETTLED = 1e-2  # relative, of a standard deviation
 MATRIX_SIGNIFICANT = 22.46  # chi-square, 6 degrees of freedom, at 0.001
 
@@ -84,7 +85,7 @@ def find_component(S: FloatArray, right: FloatArray, stated: float = 0.0) -> Com
 def _expected(sigmas: FloatArray, costs: FloatArray) -> float:
     """Return the root mean square of standard deviations, the first being none, mm."""
     weights = np.exp(-0.5 * (costs - costs.min()))
-    weights[1:] *= (1 - NONE_SHARE) / (NONE_SHARE * len(SCALES))
+    weights[1:] *= (1 - NONE_SHARE) / (NONE_SHARE * (len(sigmas) - 1))
     return float(np.sqrt(weights @ sigmas**2 / weights.sum()))
 
 
@@ -128,7 +129,7 @@ def find_jitter(
 
     values, vectors = np.linalg.eigh(noise)
     projected = np.einsum("nji,njk,nki->ni", vectors, excess, vectors)
-    sigmas = np.array([0.0, *SCALES])
+    sigmas = np.array([0.0, *SCALES[::COARSE]])
     totals = values + sigmas[:, None, None] ** 2
     costs = np.sum(np.log(totals) + projected / totals, axis=(1, 2))
     expected = _expected(sigmas, costs)

@@ -10,9 +10,10 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.led_quality import DISPLACED
 from lightpen.estimation.rig_report import late_cameras
 from lightpen.estimation.single_images import USUAL_SIGMA
-from lightpen.estimation.uncertainty import Halves, ShareName
+from lightpen.estimation.uncertainty import IMAGES_SHRINK, Halves, ShareName
 from lightpen.messages import (
     Code,
+    camera_moved,
     file_contradicted,
     file_uncertain,
     halves_differ,
@@ -32,6 +33,7 @@ from lightpen.model.limits import SwingLimits
 from lightpen.sentences import Sentence, sentence
 
 FAR_OFF = 3.0  # times the limit of U: no result to work with
+FAR_MOVED = 3.0  # times the limit of U: cone against camera, though it is taken out
 MANY_DROPPED = 0.2  # of the images
 HALVES_GATE = 1.5  # times U (k = 2) of their difference: 3 standard deviations
 FAR_FROM_NOMINAL = 3.0  # mm; pens of one design differ by some 2
@@ -39,13 +41,6 @@ CHANGE_GATE = 1.2  # times U (k = 2) of a change: 95 % of three axes by chance a
 AXES = "xyz"
 TINY = 1e-12  # mm
 
-IMAGES_SHRINK = (
-    ShareName.NOISE,
-    ShareName.CENTERS,
-    ShareName.SEAT,
-    ShareName.DRIFT,
-    ShareName.HELD_BACK,
-)
 _ADVICE = {
     ShareName.LEDS: sentence(
         "share.leds", "the LED file. Measure the LEDs better, and state how well"
@@ -98,6 +93,7 @@ class NextStep(StrEnum):
     REPEAT = "repeat"
     CHECK_FILES = "check files"
     CHECK_TIP = "check tip"
+    CLAMP = "clamp"
 
     @property
     def sentence(self) -> Sentence:
@@ -121,6 +117,9 @@ _TOLD = {
     NextStep.CHECK_TIP: sentence(
         "next-step.check-tip",
         "Next: see that it is the tip that is named, clean and tight, then repeat.",
+    ),
+    NextStep.CLAMP: sentence(
+        "next-step.clamp", "Next: clamp cone and camera, then repeat the swing."
     ),
 }
 
@@ -157,6 +156,7 @@ _NEXT_STEPS = {
     Code.FILE_ASSUMED: NextStep.CHECK_FILES,
     Code.FILE_CONTRADICTED: NextStep.CHECK_FILES,
     Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
+    Code.CAMERA_MOVED: NextStep.CLAMP,
     Code.TIP_CHANGED: NextStep.CHECK_TIP,
     Code.LAST_UNKNOWN: NextStep.CHECK_TIP,
 }
@@ -279,6 +279,8 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     if calibration.contradictions:
         worst_one = max(calibration.contradictions, key=lambda each: each.deviations)
         return Verdict(Grade.CHECK, file_contradicted(worst_one.sentence))
+    if calibration.moved > FAR_MOVED * limit:
+        return Verdict(Grade.CHECK, camera_moved(calibration.moved))
     if calibration.joint.sigma > USUAL_SIGMA:
         misfit = leds_misfit(calibration.joint.sigma, USUAL_SIGMA)
         return Verdict(Grade.CHECK, misfit)

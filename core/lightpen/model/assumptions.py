@@ -3,6 +3,8 @@
 from dataclasses import dataclass, fields, replace
 from math import isfinite
 
+COLDEST, WARMEST = -50.0, 100.0  # degrees C, of a pen
+
 
 @dataclass(frozen=True)
 class Assumptions:
@@ -69,8 +71,9 @@ class Assumptions:
         for item in fields(self):
             value = getattr(self, item.name)
             if item.name == "temperature_c":
-                continue
-            if not (isfinite(value) and value >= 0):
+                if value is not None and not COLDEST <= value <= WARMEST:
+                    raise ValueError(f"{value} degrees C is no temperature of a pen.")
+            elif not (isfinite(value) and value >= 0):
                 raise ValueError(f"`{item.name}` must be 0 or more, got {value}.")
 
 

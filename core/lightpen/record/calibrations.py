@@ -4,7 +4,7 @@ Both hold the same record of the calibration, and tell when they were changed si
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,6 +25,7 @@ from lightpen.formats.own_json import (
     in_shape,
     parse_json,
 )
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.record.results import Row, has_head, parse_result
 from lightpen.sentences import sentence
 
@@ -68,6 +69,7 @@ class _Frame(Struct):
     used: bool
     leds: list[_SeenLed]
     edge_width_px: Length | None = None
+    lamps_px: list[tuple[Length | None, Length | None]] = []
 
 
 class _Record(Struct):
@@ -82,6 +84,7 @@ class _Record(Struct):
     leds: list[_Led]
     frames: list[_Frame]
     nominal_tip_mm: Vector | None = None
+    assumptions: dict[str, float | None] = {}
     instrument: _Instrument | None = None
     rig: Any = None
 
@@ -128,6 +131,8 @@ class CalibrationFile:
         Noise of one image coordinate, px.
     nominal_tip : (3,) array or None
         mm.
+    assumptions : Assumptions
+        What stood in for what the files do not state.
     camera_sha256, pen_sha256 : str
         Of the files that it was made with.
     pen_file : str
@@ -145,6 +150,8 @@ class CalibrationFile:
         Of the LEDs in the images, px^2; NaN where not known.
     edge_widths : (N,) array
         Of the rims of the LEDs in each image, px; NaN where not known.
+    lamps : (N, K, 2) array
+        Fixed lamps in each image, px; NaN where not seen.
     is_of_rig : bool
         Whether several cameras looked; the frames are then of all of them.
     has_checksum : bool
@@ -162,6 +169,7 @@ class CalibrationFile:
     uncertainty: FloatArray
     sigma: float
     nominal_tip: FloatArray | None
+    assumptions: Assumptions
     camera_sha256: str
     pen_sha256: str
     pen_file: str
@@ -172,6 +180,7 @@ class CalibrationFile:
     pixels: FloatArray
     areas: FloatArray
     edge_widths: FloatArray
+    lamps: FloatArray
     is_of_rig: bool
     has_checksum: bool
 
@@ -219,7 +228,8 @@ def _calibration(
     try:
         record = in_shape(tree, _Record)
         instrument = _instrument(record)
-        seen = _seen(record)
+        seen, lamps = _seen(record), _lamps(record)
+        assumed = _assumed(record)
     except DamagedError as error:
         raise _other(path) from error
     return CalibrationFile(
@@ -236,6 +246,7 @@ def _calibration(
         nominal_tip=(
             None if record.nominal_tip_mm is None else np.array(record.nominal_tip_mm)
         ),
+        assumptions=assumed,
         camera_sha256=record.inputs.camera.sha256,
         pen_sha256=record.inputs.pen.sha256,
         pen_file=record.inputs.pen.file,
@@ -250,6 +261,7 @@ def _calibration(
         edge_widths=np.array(
             [f.edge_width_px for f in record.frames], dtype=np.float64
         ),
+        lamps=lamps,
         is_of_rig=record.rig is not None,
         has_checksum=is_checked,
     )
@@ -283,6 +295,24 @@ def _seen(record: _Record) -> FloatArray:
             area = math.nan if led.area_px2 is None else led.area_px2
             seen[i, led.led - 1] = led.x_px, led.y_px, area
     return seen
+
+
+def _assumed(record: _Record) -> Assumptions:
+    """Return what was assumed; a version that does not say had what is usual."""
+    try:
+        return Assumptions(**{**asdict(USUAL), **record.assumptions})
+    except (TypeError, ValueError) as error:
+        raise DamagedError("The assumptions make no sense.") from error
+
+
+def _lamps(record: _Record) -> FloatArray:
+    """Return where images show fixed lamps, (N, K, 2), px."""
+    if record.rig is not None:  # each camera has its own, and none is solved again
+        return np.zeros((len(record.frames), 0, 2))
+    if len({len(frame.lamps_px) for frame in record.frames}) > 1:
+        raise DamagedError("Images show different numbers of fixed lamps.")
+    lamps = np.array([frame.lamps_px for frame in record.frames], dtype=np.float64)
+    return lamps.reshape(len(record.frames), -1, 2)
 
 
 def _other(path: Path) -> UsageError:

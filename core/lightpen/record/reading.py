@@ -27,7 +27,7 @@ from datetime import datetime
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Self, TypeAlias
+from typing import Annotated, Self
 
 import numpy as np
 from msgspec import Meta, Struct
@@ -52,10 +52,12 @@ from lightpen.formats.own_json import (
     require_usual,
 )
 from lightpen.formats.pen_files import PEN_FILE, read_pen
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
+from lightpen.record.assumed import Plain, recorded_assumptions
 from lightpen.record.journal import (
     JOURNAL,
     BackLine,
@@ -79,7 +81,6 @@ FORMAT = 2
 FIRST_WITH_CHECKSUMS = 2
 HEADER_LIMIT = MEGABYTE
 DISCARDED = "discarded"
-Plain: TypeAlias = str | int | float | bool | None
 
 
 @dataclass(frozen=True)
@@ -167,6 +168,7 @@ class HeaderEntries(Struct):
     def __post_init__(self) -> None:
         require_usual(self.created)
         _limits(self.settings)
+        recorded_assumptions(self.settings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,6 +265,8 @@ class RecordSource:
         loaded.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
+    assumptions : Assumptions
+        What stands in for what the files do not state.
     origin : Origin or None
         What the images are of; None where the record does not say.
     """
@@ -274,6 +278,7 @@ class RecordSource:
     mask: FloatArray
     camera_file: Path
     pen_file: Path
+    assumptions: Assumptions = USUAL
     origin: Origin | None = None
 
 
@@ -401,6 +406,7 @@ def source(record: Record) -> RecordSource:
         mask=header.mask,
         camera_file=camera_file,
         pen_file=pen_file,
+        assumptions=recorded_assumptions(header.settings),
         origin=recorded_origin(record),
     )
 

@@ -21,6 +21,7 @@ from lightpen.detection.observations import (
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.camera_path import steadied
 from lightpen.estimation.joint import ContactModel, reduce
 from lightpen.formats.hashes import Inputs, all_hashed, hashed
 from lightpen.model.rigid import rotation_from_vector
@@ -158,7 +159,9 @@ def _solved(
         for index, number in enumerate(numbers.tolist())
         if number in taken_out
     }
-    calibration = calibrate(source.camera, source.pen, leave_out(observations, reasons))
+    calibration = calibrate(
+        source.camera, source.pen, leave_out(observations, reasons), source.assumptions
+    )
     return Solution(
         source=source,
         numbers=numbers,
@@ -174,15 +177,14 @@ def _all_residuals(
 ) -> FloatArray:
     """Return the residuals of all images, (N, L, 2), as `Solution` has them."""
     joint = calibration.joint
-    residuals = np.full_like(observations.pixels, np.nan)
+    pixels = steadied(source.camera, observations, calibration.cameras[0].path).pixels
+    residuals = np.full_like(pixels, np.nan)
     residuals[calibration.used] = joint.residuals[joint.used.any(axis=1)]
     shows_pen = np.isfinite(observations.translations[:, 0])
     others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):
         fitted = calibration.bundle.state
-        model = ContactModel.of(
-            fitted.rig.cameras[0], fitted.pen, observations.pixels[others]
-        )
+        model = ContactModel.of(fitted.rig.cameras[0], fitted.pen, pixels[others])
         residuals[others] = _turned_to_fit(
             model, observations.rotations[others], joint.tip_pen, joint.cone_cam
         )

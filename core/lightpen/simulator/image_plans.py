@@ -13,7 +13,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.ellipse import Ellipses, disc_images
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
-from lightpen.model.rigid import vector_from_rotation
+from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen.simulator.clutter import random_finger, random_glares, random_lamps
 from lightpen.simulator.faces import Dome, Face, HotSpot, Ring
 from lightpen.simulator.postures import operator_postures
@@ -30,7 +30,7 @@ from lightpen.simulator.swings import (
     swing_from_postures,
     swing_poses,
 )
-from lightpen.simulator.view import Optics, View, moving_poses
+from lightpen.simulator.view import Lamp, Optics, View, moving_poses
 
 LED_DECIMALS = 5  # of a measuring machine's millimetres
 MIN_GAIN = 0.93  # of the dimmest LED against the brightest
@@ -41,6 +41,10 @@ DOME_HEIGHT, DOME_DARKENING = 0.35, 0.75
 RING_INNER, RING_SOFTNESS, RING_MIDDLE = 0.55, 0.12, 0.15
 MAX_MISSING = 4
 MOTION = (2.0, 12.0)  # px moved during the exposure
+LAMP_PLACE = (0.1, 0.12)  # of width and height of the image
+LAMP_RADIUS = 0.004  # of its width
+LAMP_LEVEL = 0.6
+TURN = (0.8, 0.6)  # of the image's shift, to the right and down
 DEFOCUS = (2.0, 5.0)  # px, radius of the blur disc
 SATURATED_EXPOSURE = (1.6, 3.0)
 DIM_EXPOSURE = (0.1, 0.25)
@@ -162,6 +166,7 @@ def plan_rig(scene: Scene, rig: Rig) -> tuple[ScenePlan, ...]:
     for c, (camera, R, t) in enumerate(stands):
         there = seen_from(swing, R, t)
         seen = replace(scene, camera=camera, cone_cam=there.cone_cam, viewpoint=c)
+        there = _turned(there, seen)
         image_plans = tuple(
             _plan_image(seen, there, gains, index, flags[index])
             for index in range(scene.n_images)
@@ -223,6 +228,35 @@ def _random_hot_spot(rng: np.random.Generator) -> HotSpot:
     distance, direction = rng.uniform(*HOT_DISTANCE), rng.uniform(0, 2 * np.pi)
     place = distance * np.cos(direction), distance * np.sin(direction)
     return HotSpot(place, rng.uniform(*HOT_WIDTH), rng.uniform(*HOT_SHARE))
+
+
+def _turned(swing: Swing, scene: Scene) -> Swing:
+    """Return a swing as a camera sees it that turns from image to image."""
+    turns = np.array([_turn(scene, index) for index in range(len(swing))])
+    return replace(
+        swing,
+        rotations=turns @ swing.rotations,
+        translations=np.einsum("nij,nj->ni", turns, swing.translations),
+        tips_cam=np.einsum("nij,nj->ni", turns, swing.tips_cam),
+    )
+
+
+def _turn(scene: Scene, index: int) -> FloatArray:
+    """Return by how much the camera has turned in an image, (3, 3)."""
+    share = index / max(scene.n_images - 1, 1) - 0.5
+    right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
+    return rotation_from_vector(np.array([-down, right, 0.0]))
+
+
+def _lamps(scene: Scene, index: int) -> tuple[Lamp, ...]:
+    """Return the lamps beside the cone."""
+    if not scene.has_lamp:
+        return ()
+    camera = scene.camera
+    place = np.array(LAMP_PLACE) * camera.image_size
+    ray = np.append(camera.unproject(place), 1.0)
+    place = camera.project((_turn(scene, index) @ ray)[None])[0]
+    return (Lamp(place, (LAMP_RADIUS * camera.width,) * 2, level=LAMP_LEVEL),)
 
 
 def _stream(scene: Scene, *path: int) -> np.random.Generator:
@@ -316,7 +350,7 @@ def _disturbed_view(
     if "clutter" in flags:
         lamps = random_lamps(camera, discs, rng)
         glares = random_glares(camera, discs, rng)
-        view = replace(view, lamps=lamps, glares=glares)
+        view = replace(view, lamps=view.lamps + lamps, glares=glares)
     if "fingers" in flags:
         view = replace(view, fingers=(random_finger(discs, rng),))
     return view
@@ -374,5 +408,11 @@ def _plan_in_motion(
     rotations, translations = moving_poses(
         rotation, translation, scene.tip_pen, turn, n_times
     )
-    view = View(rotations, translations, led_gains(scene), faces=led_faces(scene))
+    view = View(
+        rotations,
+        translations,
+        led_gains(scene),
+        lamps=_lamps(scene, index),
+        faces=led_faces(scene),
+    )
     return ImagePlan(index, view, scene.optics, rotation, translation)

@@ -111,6 +111,11 @@ class Scene:
         The truth.
     tip_pen, cone_cam : (3,) array
         The truth, mm.
+    has_lamp : bool
+        Whether a lamp beside the cone is in view.
+    camera_turn : float
+        By which the image shifts from the first to the last one, as the camera turns,
+        px.
     viewpoint : int
         Which camera of several it is, from 0; it chooses the noise.
     """
@@ -127,4 +132,6 @@ class Scene:
     camera: Camera = field(default_factory=paper_camera)
     tip_pen: FloatArray = field(default_factory=PAPER_TIP.copy)
     cone_cam: FloatArray = field(default_factory=PAPER_CONE.copy)
+    has_lamp: bool = False
+    camera_turn: float = 0.0
     viewpoint: int = 0

@@ -11,6 +11,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
 from lightpen.estimation.reach import NOT_REACHED, Reach, Reached, reach_of
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
@@ -44,10 +45,12 @@ class KeptImages:
         Tip and cone by the best fit there is.
     joint : JointFit or None
         The joint fit, as soon as the postures allow one.
+    assumed : Assumptions
+        What stands in for what the files do not state.
     reach : Reach or None
         What the images say beside the files, with the joint fit.
     reached : Reached
-        How certain the tip is, what the files leave open included.
+        How certain the tip is, by all shares that the verdict counts.
     """
 
     numbers: IntArray
@@ -57,6 +60,7 @@ class KeptImages:
     translations: FloatArray
     cofactors: FloatArray
     sigmas: FloatArray
+    assumed: Assumptions = USUAL
     seat: Seat | None = None
     joint: JointFit | None = None
     reach: Reach | None = None
@@ -93,7 +97,7 @@ class KeptImages:
         return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
 
 
-def none_kept(n_leds: int) -> KeptImages:
+def none_kept(n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
     """Return no images of a pen with this number of LEDs."""
     return KeptImages(
         numbers=np.zeros(0, dtype=np.int64),
@@ -103,6 +107,7 @@ def none_kept(n_leds: int) -> KeptImages:
         translations=np.zeros((0, 3)),
         cofactors=np.zeros((0, 6, 6)),
         sigmas=np.zeros(0),
+        assumed=assumed,
     )
 
 
@@ -113,6 +118,7 @@ def kept_before(
     pixels: FloatArray,
     rotations: FloatArray,
     translations: FloatArray,
+    assumed: Assumptions = USUAL,
 ) -> KeptImages:
     """Return images that were kept before an interruption, with their fit.
 
@@ -126,7 +132,7 @@ def kept_before(
         cam_from_pen, mm.
     """
     if not len(numbers):
-        return none_kept(pen.n_leds)
+        return none_kept(pen.n_leds, assumed)
     poses = fit_poses(camera, pen, pixels, rotations, translations)
     kept = KeptImages(
         numbers=numbers,
@@ -136,6 +142,7 @@ def kept_before(
         translations=poses.translations,
         cofactors=poses.covariances / poses.sigma**2,
         sigmas=np.full(len(numbers), poses.sigma),
+        assumed=assumed,
     )
     return _refit(camera, pen, kept, poses.rotations)
 
@@ -157,12 +164,13 @@ def keep(
         translations=np.concatenate([kept.translations, sighting.translation[None]]),
         cofactors=np.concatenate([kept.cofactors, sighting.cofactors[None]]),
         sigmas=np.append(kept.sigmas, sighting.sigma),
+        assumed=kept.assumed,
     )
     if kept.joint is None:
         return _refit(camera, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
     longer = replace(longer, seat=kept.seat, reach=kept.reach)
-    return _refit(camera, pen, longer, starts)
+    return _refit(camera, pen, longer, starts, is_near=True)
 
 
 def first_images(
@@ -194,7 +202,12 @@ def _leave_out(
 
 
 def _refit(
-    camera: Camera, pen: Pen, kept: KeptImages, starts: FloatArray
+    camera: Camera,
+    pen: Pen,
+    kept: KeptImages,
+    starts: FloatArray,
+    *,
+    is_near: bool = False,
 ) -> KeptImages:
     """Return the images with a new fit, whose rotations (N, 3, 3) start there."""
     kept = replace(kept, joint=None, reached=NOT_REACHED)
@@ -206,7 +219,10 @@ def _refit(
     if not fixed:
         return replace(kept, seat=seat)
     try:
-        joint = fit_joint(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam)
+        joint = fit_joint(
+            *(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam),
+            is_near=is_near,
+        )
     except CalibrationError:  # an image too bad to settle; the next ones may help
         return replace(kept, seat=seat)
     used = joint.used.any(axis=1)
@@ -214,7 +230,7 @@ def _refit(
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
     reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
-    reached = reach.reached(camera, pen, max(joint.sigma, NO_NOISE))
+    reached = reach.reached(joint, max(joint.sigma, NO_NOISE), kept.assumed)
     return replace(kept, seat=fitted, joint=joint, reach=reach, reached=reached)
 
 

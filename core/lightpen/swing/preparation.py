@@ -17,12 +17,14 @@ from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import PEN_FILE
 from lightpen.local_time import local_now
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
+from lightpen.record.assumed import Plain, assumption_entries
 from lightpen.record.names import Names
-from lightpen.record.reading import FileCopy, Header, Plain
+from lightpen.record.reading import FileCopy, Header
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.record.results import Result
 from lightpen.swing.state import SwingSetup
@@ -109,6 +111,8 @@ class Preparation:
         None until one is open.
     mask : (M, 3) array
         Circles of stray light: centre x, y and radius, px.
+    assumptions : Assumptions
+        What stands in for what the files do not state.
     has_unsaved_leds : bool
         Whether LEDs were edited or opened that are not those of the file in use.
     """
@@ -122,6 +126,7 @@ class Preparation:
     pen_file: PenFile | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     limits: SwingLimits = field(default_factory=SwingLimits)
+    assumptions: Assumptions = USUAL
     has_unsaved_leds: bool = False
 
     @property
@@ -240,7 +245,11 @@ class Preparation:
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
         is_recording = self.source.kind == SourceKind.RECORDED
-        return SwingSetup(camera, pen, self.limits, self.mask, is_recording)
+        return SwingSetup(
+            *(camera, pen, self.limits, self.mask),
+            assumptions=self.assumptions,
+            is_recording=is_recording,
+        )
 
     def swings_like(self, other: "Preparation") -> bool:
         """Return whether a swing begun with the other would be the same."""
@@ -249,6 +258,7 @@ class Preparation:
             and self.pen_file is other.pen_file
             and self.names == other.names
             and self.limits == other.limits
+            and self.assumptions == other.assumptions
             and _same(self.nominal_tip, other.nominal_tip)
             and np.array_equal(self.mask, other.mask)
         )
@@ -284,6 +294,7 @@ class Preparation:
                 "max_images": limits.max_images,
                 "min_per_field": limits.min_per_field,
                 "spacing_rad": limits.spacing,
+                **assumption_entries(self.assumptions),
                 **(settings or {}),
             },
         )

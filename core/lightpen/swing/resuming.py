@@ -127,6 +127,7 @@ def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingS
         np.array([image.pixels for image in images]),
         np.array([image.rotation for image in images]),
         np.array([image.translation for image in images]),
+        setup.assumptions,
     )
     return start_again(setup, kept, record.next_number, time)
 
@@ -142,5 +143,6 @@ def recorded_setup(record: Record) -> SwingSetup:
     found = source(record)
     return SwingSetup(
         *(found.camera, found.pen, recorded_limits(record), found.mask),
+        assumptions=found.assumptions,
         is_recording=is_of_recording(record),
     )

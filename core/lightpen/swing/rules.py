@@ -481,7 +481,9 @@ def _dropped(state: SwingState, numbers: set[int]) -> Transition:
 def _dropped_all(setup: SwingSetup, state: SwingState) -> Transition:
     """Drop all images: they were taken while the tip was in a wrong place."""
     numbers = set(map(int, state.kept.numbers))
-    return _dropped(replace(state, kept=none_kept(setup.pen.n_leds)), numbers)
+    return _dropped(
+        replace(state, kept=none_kept(setup.pen.n_leds, setup.assumptions)), numbers
+    )
 
 
 def _more(

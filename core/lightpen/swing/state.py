@@ -19,6 +19,7 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.messages import SHOW_PEN, images_read
+from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
@@ -96,6 +97,8 @@ class SwingSetup:
     ----------
     mask : (M, 3) array or None
         Circles of stray light: centre x, y and radius, px.
+    assumptions : Assumptions
+        What stands in for what the files do not state.
     is_recording : bool
         Whether its images were recorded before: all are read, once and in their order,
         and nobody is asked to lean the pen.
@@ -105,6 +108,7 @@ class SwingSetup:
     pen: Pen
     limits: SwingLimits = field(default_factory=SwingLimits)
     mask: FloatArray | None = None
+    assumptions: Assumptions = USUAL
     is_recording: bool = False
 
 
@@ -258,7 +262,7 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         since=time,
         time=time,
         message=images_read(0, 0) if is_recording else SHOW_PEN,
-        kept=none_kept(setup.pen.n_leds),
+        kept=none_kept(setup.pen.n_leds, setup.assumptions),
         next_number=1,
         n_dropped=Counter(),
         seat=None,

@@ -22,6 +22,7 @@ from lightpen.detection.observations import observe_centers
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.camera_path import steadied
 from lightpen.estimation.joint import JointFit, fit_joint
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.estimation.unknowns import inverse
@@ -96,9 +97,12 @@ def calibrate_again(
         pen,
     )
     measured = replace(
-        seen, areas=calibration.areas, edge_widths=calibration.edge_widths
+        seen,
+        areas=calibration.areas,
+        edge_widths=calibration.edge_widths,
+        lamps=calibration.lamps,
     )
-    return calibrate(camera, pen, measured)
+    return calibrate(camera, pen, measured, calibration.assumptions)
 
 
 def improve_pen(
@@ -211,11 +215,13 @@ def _of_images(bundle: Bundle, common: IntArray) -> tuple[FloatArray, FloatArray
 
 def _fit_held(calibration: Calibration, pen: Pen) -> JointFit:
     """Fit tip and cone of a swing with LEDs held as they are."""
-    joint = calibration.joint
+    joint, camera = calibration.joint, calibration.instrument.camera
+    path = calibration.cameras[0].path
+    seen = steadied(camera, calibration.observations, path)
     return fit_joint(
-        calibration.instrument.camera,
+        camera,
         pen,
-        calibration.observations.pixels[calibration.used],
+        seen.pixels[calibration.used],
         joint.rotations[joint.used.any(axis=1)],
         joint.tip_pen,
         joint.cone_cam,

@@ -24,6 +24,84 @@
     </message>
 </context>
 <context>
+    <name>AssumptionsDialog</name>
+    <message>
+        <source>Assumptions of the station</source>
+        <translation>工位的假定值</translation>
+    </message>
+    <message>
+        <source>Standard uncertainties (k = 1) where the files of camera and LEDs state none. The next swing uses them, and its result marks what rests on them.</source>
+        <translation>相机文件和 LED 文件未给出不确定度时所采用的标准不确定度（k = 1）。下一次摆动将采用这些值，结果中会标明依据假定的部分。</translation>
+    </message>
+    <message>
+        <source>not measured</source>
+        <translation>未测量</translation>
+    </message>
+    <message>
+        <source>Focal length; the rest of the camera goes with it</source>
+        <translation>焦距；相机的其余参数随之变化</translation>
+    </message>
+    <message>
+        <source>Scale of the LEDs</source>
+        <translation>LED 的比例</translation>
+    </message>
+    <message>
+        <source>Ball and cone, as they are not quite round</source>
+        <translation>测球和锥座的圆度误差</translation>
+    </message>
+    <message>
+        <source>LED centres, by what does not average out</source>
+        <translation>LED 中心的不可平均误差</translation>
+    </message>
+    <message>
+        <source>Temperature of the pen during the swing</source>
+        <translation>摆动时光笔的温度</translation>
+    </message>
+    <message>
+        <source>Uncertainty of this temperature</source>
+        <translation>该温度的不确定度</translation>
+    </message>
+    <message>
+        <source>How much warmer than at its measurement, not measured</source>
+        <translation>相对标定时的温差（未测量时）</translation>
+    </message>
+    <message>
+        <source>Thermal expansion of the pen</source>
+        <translation>光笔的热膨胀系数</translation>
+    </message>
+    <message>
+        <source>Usual: {0}.</source>
+        <translation>通常：{0}。</translation>
+    </message>
+</context>
+<context>
+    <name>AssumptionsPanel</name>
+    <message>
+        <source>Where files say nothing</source>
+        <translation>文件未说明的内容</translation>
+    </message>
+    <message>
+        <source>The usual uncertainties are assumed.</source>
+        <translation>采用通常的不确定度。</translation>
+    </message>
+    <message>
+        <source>Uncertainties of this station are assumed.</source>
+        <translation>采用本工位设定的不确定度。</translation>
+    </message>
+    <message>
+        <source>Change</source>
+        <translation>更改</translation>
+    </message>
+    <message>
+        <source>Change what is assumed</source>
+        <translation>更改假定值</translation>
+    </message>
+    <message>
+        <source>Focal length, scale, warmth, ball and cone: how uncertain each is where no file says it.</source>
+        <translation>焦距、比例、温度、测球和锥座：文件未说明时各自的不确定度。</translation>
+    </message>
+</context>
+<context>
     <name>CameraPage</name>
     <message>
         <source>Camera</source>
@@ -2770,6 +2848,10 @@
         <translation>请补全该行；如果是最后一行，则文件不完整。</translation>
     </message>
     <message>
+        <source>Cone and camera moved by {distance:.3f} mm against each other during the swing. It is taken out as far as the images tell, but touches would not be right either. Clamp both, and let the camera warm up.</source>
+        <translation>摆动过程中，锥座与相机之间相对移动了 {distance:.3f} mm。图像能够判明的部分已被扣除，但此时接触测量同样不准确。请固定锥座和相机，并让相机充分预热。</translation>
+    </message>
+    <message>
         <source>Dask is not installed here, which a cluster needs. Install the extra named cluster, or compute on this machine.</source>
         <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
     </message>
@@ -3038,6 +3120,10 @@
         <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
     </message>
     <message>
+        <source>Next: clamp cone and camera, then repeat the swing.</source>
+        <translation>下一步：固定锥座和相机，然后重新摆动。</translation>
+    </message>
+    <message>
         <source>Next: clean tip and artefact, clamp artefact and camera, and verify again.</source>
         <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
     </message>
@@ -3202,6 +3288,10 @@
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
     </message>
     <message>
+        <source>The camera moved during the swing: fixed lamps in view shift by {shift:.2f} px, and the pen with them. It is taken out. Clamp the camera, and let it warm up.</source>
+        <translation>相机在摆动过程中移动了：视野中的固定灯移动了 {shift:.2f} px，光笔也随之移动。此移动已被扣除。请固定相机，并让其充分预热。</translation>
+    </message>
+    <message>
         <source>The camera sends no images in the pixel format {wanted} that can be used; it offers {offered}. Choose Mono8, or another of Mono8 to Mono16.</source>
         <translation>相机不能以像素格式 {wanted} 送来可用的图像；它提供 {offered}。请选择 Mono8，或 Mono8 到 Mono16 中的另一种。</translation>
     </message>
@@ -3320,6 +3410,10 @@
     <message>
         <source>The joint fit did not settle in {n_steps} steps. The images may not be of this pen and camera: check both files.</source>
         <translation>联合拟合在 {n_steps} 步内未收敛。图像可能不属于这支光笔和这台相机：请检查两个文件。</translation>
+    </message>
+    <message>
+        <source>The lamp at {x:.0f}, {y:.0f} px moved by {shift:.2f} px during the swing, and the pen did not move with it. Nothing is taken out. Fix the lamp, or cover it.</source>
+        <translation>位于 {x:.0f}, {y:.0f} px 的灯在摆动过程中移动了 {shift:.2f} px，而光笔没有随之移动。未作任何扣除。请固定该灯，或将其遮住。</translation>
     </message>
     <message>
         <source>The led_covariance of {name} is none: it must be symmetric, and no variance below 0. Leave it away, or give it as it was written.</source>
@@ -4819,6 +4913,10 @@
     <message>
         <source>File does not fit</source>
         <translation>文件不符</translation>
+    </message>
+    <message>
+        <source>Camera or cone moved</source>
+        <translation>相机或锥座移动</translation>
     </message>
     <message>
         <source>Not at the same time</source>

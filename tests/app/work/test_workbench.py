@@ -16,6 +16,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import read_pen
+from lightpen.model.assumptions import USUAL, with_focal_length
 from lightpen.model.limits import SwingLimits
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.names import Names
@@ -93,10 +94,12 @@ def recording(tmp_path: Path) -> Path:
 
 def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) -> None:
     before = stage.workbench.preparation
+    assumed = replace(with_focal_length(USUAL, 0.001), temperature_c=23.5, warmth=4.0)
     stage.choose(
         nominal_tip=np.array([0.1, -90.0, 1 / 3]),
         mask=MASK,
         limits=SwingLimits(max_uncertainty=0.007, min_images=11, max_images=99),
+        assumptions=assumed,
     )
     now = stage.start_again()
 
@@ -106,6 +109,7 @@ def test_everything_that_was_chosen_is_chosen_at_the_next_start(stage: Stage) ->
     assert now.nominal_tip.tolist() == [0.1, -90.0, 1 / 3]
     np.testing.assert_array_equal(now.mask, MASK)
     assert now.limits == SwingLimits(0.007, 11, 99)
+    assert now.assumptions == assumed
     assert now.camera_file is not None
     assert before.camera_file is not None
     assert now.camera_file.path == before.camera_file.path
@@ -278,6 +282,7 @@ def test_choices_that_cannot_be_saved_are_told_and_in_force_all_the_same(
         Station(camera_file="", pen_file=""),
         Station(min_images=-5, max_images=0),
         Station(max_uncertainty=-1.0),
+        Station(warmth=-1.0),
     ],
 )
 def test_settings_that_make_no_sense_are_passed_over(
@@ -289,6 +294,7 @@ def test_settings_that_make_no_sense_are_passed_over(
 
     assert now.source == SourceChoice()
     assert now.limits == SwingLimits()
+    assert now.assumptions == USUAL
     assert now.mask.shape == (0, 3)
     assert now.nominal_tip is None
     assert (now.camera_file, now.pen_file) == (None, None)

@@ -283,6 +283,7 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         (Code.FILE_UNCERTAIN, NextStep.CHECK_FILES),
         (Code.FILE_CONTRADICTED, NextStep.CHECK_FILES),
         (Code.NOT_SIMULTANEOUS, NextStep.REPEAT),
+        (Code.CAMERA_MOVED, NextStep.CLAMP),
     ],
 )
 def test_every_reason_has_one_next_step(code: Code, step: NextStep) -> None:

@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,12 @@ import pytest
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError, Cancelled, FileError
 from lightpen.estimation.report import calibration_record
+from lightpen.formats.own_json import with_checksum
+from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
+from lightpen.record.assumed import assumption_entries
 from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import image_name, open_record, record_files
+from lightpen.record.reading import HEADER, image_name, open_record, record_files
 from lightpen.record.solving import (
     Solution,
     record_inputs,
@@ -181,3 +185,16 @@ def test_the_files_of_a_record_are_all_that_its_folder_holds(folder: Path) -> No
 
     assert set(record_files(open_record(folder))) == found
     assert json.loads((folder / "header.json").read_text(encoding="utf-8"))
+
+
+def test_a_record_is_solved_by_what_its_station_assumed(folder: Path) -> None:
+    usual = solve_record(open_record(folder)).calibration
+    header = folder / HEADER
+    entries = json.loads(header.read_bytes())
+    del entries["checksum"]
+    entries["settings"] |= assumption_entries(replace(USUAL, form_error=0.01))
+    header.write_bytes(with_checksum(json.dumps(entries).encode()))
+    other = solve_record(open_record(folder)).calibration
+
+    assert other.assumptions.form_error == 0.01
+    assert other.budget.weakest_uncertainty > 2 * usual.budget.weakest_uncertainty

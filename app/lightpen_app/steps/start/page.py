@@ -29,6 +29,7 @@ from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
 from lightpen_app.steps.page import MainAction, Page
+from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
@@ -68,6 +69,7 @@ class StartPage(Rearranged, Page):
         # Widgets: the order of making them is the order of the Tab key
         self._names = NamesForm()
         self._limits = LimitsForm()
+        self._assumed = AssumptionsPanel()
         self._interrupted = InterruptedPanel()
         self._last = LastResultPanel(workbench.around.now)
         self._sound_test = SoundTest(sounds)
@@ -83,6 +85,7 @@ class StartPage(Rearranged, Page):
         left.setSpacing(2 * GRID)
         left.addWidget(self._names)
         left.addWidget(self._limits)
+        left.addWidget(self._assumed)
         left.addStretch(1)
         self._right = right = QVBoxLayout()
         right.setSpacing(2 * GRID)
@@ -109,6 +112,7 @@ class StartPage(Rearranged, Page):
         self._names.station_changed.connect(self._on_station_changed)
         self._names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
         self._limits.value_changed.connect(self._on_limits_changed)
+        self._assumed.value_changed.connect(self._on_assumed_changed)
         self._typing.timeout.connect(self._take_names)
         self._searching.timeout.connect(self._search_interrupted)
         self._interrupted.resume_requested.connect(self._on_resume_requested)
@@ -224,6 +228,10 @@ class StartPage(Rearranged, Page):
     def _on_limits_changed(self) -> None:
         self._choose(replace(self._workbench.preparation, limits=self._limits.value()))
 
+    def _on_assumed_changed(self) -> None:
+        assumed = self._assumed.value()
+        self._choose(replace(self._workbench.preparation, assumptions=assumed))
+
     def _choose_tip(self, preparation: Preparation) -> None:
         """Choose names with what belongs to their tip; they may be being typed in."""
         self._names.set_ball(preparation.names.ball_diameter)
@@ -260,6 +268,8 @@ class StartPage(Rearranged, Page):
             self._names.set_value(now.names)
         if before is None or now.limits != before.limits:
             self._limits.set_value(now.limits)
+        if before is None or now.assumptions != before.assumptions:
+            self._assumed.set_value(now.assumptions)
         if before is None or now.nominal_tip is not before.nominal_tip:
             self._names.set_nominal_tip(now.nominal_tip)
         if before is None or now.pen_file is not before.pen_file:

@@ -1,0 +1,122 @@
+"""Fixed lamps in view, beside the pen: they tell whether the camera stands still.
+
+A lamp is the light in a circle that was masked as stray, or a spot that nearly every
+image shows in the same place and that is no LED of the pen.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, Image
+from lightpen.detection.sighting import Sighting
+from lightpen.detection.spots import Flaw, Spots, detect_spots
+
+NEARLY_ALL = 0.8  # of the images show a lamp
+STAYS = 5.0  # px about its usual place; a camera that moved by more is another matter
+N_LOOKED_AT = 5  # images in which lamps are looked for first
+MARGIN = 8  # px about a masked circle
+
+
+def masked_lights(
+    image: Image, mask: FloatArray | None, full_scale: int | None = None
+) -> FloatArray:
+    """Return where the light is that a mask leaves out, (M, 2), px.
+
+    Parameters
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    mask : (M, 3) array or None
+        Circles of stray light: centre x, y and radius, px.
+    full_scale : int, optional
+        As of `lightpen.detection.spots.detect_spots`.
+
+    Returns
+    -------
+    (M, 2) array
+        Centre of the brightest clean spot in each circle; NaN without one.
+    """
+    circles = np.zeros((0, 3)) if mask is None else np.asarray(mask)
+    found = np.full((len(circles), 2), np.nan)
+    height, width = image.shape
+    for k, (x, y, radius) in enumerate(circles):
+        left, top = (max(int(v - radius) - MARGIN, 0) for v in (x, y))
+        right = min(int(x + radius) + MARGIN, width)
+        bottom = min(int(y + radius) + MARGIN, height)
+        if left >= right or top >= bottom:
+            continue
+        window: Image = image[top:bottom, left:right].copy()
+        spots = detect_spots(window, full_scale=full_scale)
+        centers = spots.centers[_are_clean(spots)] + (left, top)
+        inside = np.hypot(*(centers - (x, y)).T) < radius
+        if inside.any():
+            found[k] = centers[np.argmax(inside)]  # brightest first
+    return found
+
+
+def fixed_lamps(masked: FloatArray, sightings: Sequence[Sighting]) -> FloatArray:
+    """Return where images show lamps that stay, (N, K, 2), px.
+
+    Parameters
+    ----------
+    masked : (N, M, 2) array
+        Lights in masked circles, px; NaN where an image shows none.
+    sightings : sequence of Sighting
+        Of the N images, whose spots that are no LEDs may be lamps, too.
+
+    Returns
+    -------
+    (N, K, 2) array
+        Of lamps that nearly all images show; NaN where one does not.
+    """
+    paths = [
+        _path(path[:, None], np.nanmedian(path, axis=0))
+        for path in np.swapaxes(masked, 0, 1)
+        if np.isfinite(path[:, 0]).any()
+    ]
+    lights = [_foreign(sighting) for sighting in sightings]
+    padded = np.full((len(lights), max(map(len, lights), default=0), 2), np.nan)
+    for row, each in zip(padded, lights, strict=True):
+        row[: len(each)] = each
+    shown = [each for each in lights if len(each)]
+    if len(shown) >= NEARLY_ALL * len(lights):
+        looked_at = np.linspace(0, len(shown) - 1, N_LOOKED_AT).astype(int)
+        places = np.concatenate([shown[index] for index in looked_at])
+        paths += [_path(padded, place) for place in places]
+    found: list[FloatArray] = []
+    for path in paths:
+        is_fixed = np.isfinite(path[:, 0]).sum() >= NEARLY_ALL * len(path)
+        if is_fixed and not any(_are_same(path, other) for other in found):
+            found.append(path)
+    return np.stack(found, axis=1) if found else np.zeros((len(lights), 0, 2))
+
+
+def _are_same(path: FloatArray, other: FloatArray) -> bool:
+    """Return whether two lamps, each in nearly all images, are one."""
+    apart = np.linalg.norm(path - other, axis=1)
+    return bool(np.nanmedian(apart) <= STAYS)
+
+
+def _foreign(sighting: Sighting) -> FloatArray:
+    """Return the centres of clean spots that are no LEDs, (S, 2), px."""
+    spots, labels = sighting.spots, sighting.labels
+    if spots is None or labels is None:
+        return np.zeros((0, 2))
+    clean = _are_clean(spots)
+    clean[labels.spot[labels.spot >= 0]] = False
+    return np.asarray(spots.centers[clean])
+
+
+def _are_clean(spots: Spots) -> BoolArray:
+    return np.asarray((spots.flaws & ~Flaw.SATURATED) == 0)
+
+
+def _path(padded: FloatArray, place: FloatArray) -> FloatArray:
+    """Return the spot of each image that is nearest to a place, if it is near."""
+    distances = np.linalg.norm(padded - place, axis=2)
+    distances = np.where(np.isfinite(distances), distances, np.inf)
+    nearest = distances.argmin(axis=1)
+    path: FloatArray = padded[np.arange(len(padded)), nearest]
+    path[distances.min(axis=1) > STAYS] = np.nan
+    return path

@@ -1,0 +1,31 @@
+"""What is assumed of a station, among the settings of a record."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TypeAlias
+
+from lightpen.model.assumptions import USUAL, Assumptions
+
+Plain: TypeAlias = str | int | float | bool | None
+PREFIX = "assumed_"
+
+
+def assumption_entries(assumptions: Assumptions) -> dict[str, Plain]:
+    """Return assumptions as settings of a record."""
+    return {PREFIX + name: value for name, value in asdict(assumptions).items()}
+
+
+def recorded_assumptions(settings: Mapping[str, Plain]) -> Assumptions:
+    """Return the assumptions among settings; the usual one for each that is missing.
+
+    Raises
+    ------
+    ValueError
+        One makes no sense.
+    """
+    values = asdict(USUAL)
+    for name in values:
+        value = settings.get(PREFIX + name)
+        if isinstance(value, int | float):
+            values[name] = float(value)
+    return Assumptions(**values)

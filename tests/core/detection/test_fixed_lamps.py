@@ -1,0 +1,76 @@
+"""Lamps that stay where they are, beside a pen that moves."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
+from lightpen.detection.labelling.labels import Labels, label_images
+from lightpen.detection.sighting import Sighting, sightings_of
+from lightpen.detection.spots import detect_spots
+from lightpen.model.camera import Camera
+from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import paper_pen
+
+SMALL = Camera(320, 240, 600.0, 600.0, 160.0, 120.0)
+PEN = paper_pen()
+MASK = np.array([[80.0, 60.0, 20.0]])
+
+
+def disc_at(*places: tuple[float, float]) -> Image:
+    y, x = np.mgrid[:240, :320]
+    image = np.zeros((240, 320))
+    for u, v in places:
+        image += 180 * np.clip(8.5 - np.hypot(x - u, y - v), 0, 1)
+    return image.astype(np.uint8)
+
+
+def seen(image: Image) -> Sighting:
+    spots = detect_spots(image)
+    return sightings_of([spots], label_images([spots], SMALL, PEN), SMALL)[0]
+
+
+def nothing_masked(n_images: int) -> FloatArray:
+    return np.zeros((n_images, 0, 2))
+
+
+def test_the_light_in_a_masked_circle_is_measured() -> None:
+    found = masked_lights(disc_at((82.3, 58.6), (200.0, 100.0)), MASK)
+    np.testing.assert_allclose(found, [[82.3, 58.6]], atol=0.02)
+
+
+def test_a_masked_circle_without_light_shows_none() -> None:
+    assert np.isnan(masked_lights(disc_at((200.0, 100.0)), MASK)).all()
+    outside = np.array([[900.0, 900.0, 10.0]])
+    assert np.isnan(masked_lights(disc_at((200.0, 100.0)), outside)).all()
+
+
+def test_a_spot_that_stays_is_a_lamp_and_one_that_moves_is_none() -> None:
+    sightings = [seen(disc_at((80.0, 60.0), (100.0 + 15 * i, 180.0))) for i in range(8)]
+    lamps = fixed_lamps(nothing_masked(8), sightings)
+    assert lamps.shape == (8, 1, 2)
+    np.testing.assert_allclose(lamps[:, 0], [[80.0, 60.0]] * 8, atol=0.02)
+
+
+def test_a_lamp_that_few_images_show_is_none() -> None:
+    sightings = [seen(disc_at(*[(80.0, 60.0)] * (i < 4))) for i in range(8)]
+    assert fixed_lamps(nothing_masked(8), sightings).shape == (8, 0, 2)
+
+
+def test_an_led_that_passes_through_a_masked_circle_is_passed_over() -> None:
+    masked = np.full((8, 1, 2), [82.0, 58.0])
+    masked[3] = 95.0, 70.0
+    lamps = fixed_lamps(masked, [seen(disc_at())] * 8)
+    assert np.isnan(lamps[3]).all()
+    assert np.isfinite(np.delete(lamps, 3, axis=0)).all()
+
+
+def test_the_leds_of_the_pen_are_no_lamps() -> None:
+    scene = Scene(n_images=1, seed=4, has_lamp=True)
+    image = render_plan(scene, plan_scene(scene).image_plans[0])
+    spots = detect_spots(image)
+    labels: list[Labels] = label_images([spots], scene.camera, scene.pen)
+    sighting = sightings_of([spots], labels, scene.camera)[0]
+    lamps = fixed_lamps(nothing_masked(1), [sighting])
+    assert len(spots) == scene.pen.n_leds + 1
+    assert lamps.shape == (1, 1, 2)

@@ -1,0 +1,134 @@
+"""A camera that moves during the swing, and the lamps that witness it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import Observations, observe_centers
+from lightpen.errors import CalibrationError
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.camera_path import follow_lamps
+from lightpen.estimation.report import warnings_of
+from lightpen.estimation.verdict import Grade, NextStep, judge
+from lightpen.formats.observation_files import Centers
+from lightpen.messages import Code
+from lightpen.model.limits import SwingLimits
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+CAMERA, PEN = paper_camera(), paper_pen()
+N_IMAGES = 80
+TIME = np.linspace(0, 1, N_IMAGES)
+LAMPS = np.array([[1100.0, 900.0], [1300.0, 1100.0]])
+SIGMA = 0.03  # px
+SWING = swing_poses(N_IMAGES, np.random.default_rng(5))
+
+
+def lamps_along(way: FloatArray, noise: float = 0.02) -> FloatArray:
+    rng = np.random.default_rng(6)
+    return LAMPS + way[:, None] + noise * rng.standard_normal((len(way), 2, 2))
+
+
+def seen_along(pen_way: FloatArray) -> Observations:
+    rng = np.random.default_rng(7)
+    poses = SWING.rotations, SWING.translations
+    pixels = simulate_centers(CAMERA, PEN, *poses, SIGMA, rng) + pen_way[:, None]
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    return observe_centers(centers, CAMERA, PEN)
+
+
+def solved(pen_way: FloatArray, lamp_way: FloatArray) -> Calibration:
+    seen = replace(seen_along(pen_way), lamps=lamps_along(lamp_way))
+    return calibrate(CAMERA, PEN, seen)
+
+
+def errors_in_u(calibration: Calibration) -> FloatArray:
+    off = calibration.joint.tip_pen - SWING.tip_pen
+    return np.abs(off) / calibration.budget.expanded_uncertainty[:3]
+
+
+STILL = np.zeros((N_IMAGES, 2))
+EVEN = np.outer(TIME, [1.0, -0.6])
+CURVE = np.outer(np.sin(7 * TIME), [1.5, 0.8])
+BUMP = np.outer(TIME > 0.4, [0.8, 0.3])
+
+
+def test_noise_is_no_way() -> None:
+    path = follow_lamps(lamps_along(STILL))
+    assert path is not None
+    assert path.moved == 0
+    # Two lamps, each with noise of 0.02 px.
+    np.testing.assert_allclose(path.noise, 0.02 / np.sqrt(2), rtol=0.2)
+    np.testing.assert_allclose(path.lamps, LAMPS, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("way", "left"),
+    [(EVEN, 0.6), (CURVE, 0.8), (BUMP, 1.1)],
+    ids=["even", "curve", "bump"],
+)
+def test_the_way_of_the_lamps_is_freed_of_noise(way: FloatArray, left: float) -> None:
+    path = follow_lamps(lamps_along(way))
+    assert path is not None
+    off = path.shifts - (way - way.mean(axis=0))
+    assert np.sqrt(np.mean(off**2)) < left * 0.02 / np.sqrt(2)
+    farthest = np.linalg.norm(way[:, None] - way, axis=2).max()
+    assert path.moved == pytest.approx(farthest, rel=0.1)
+
+
+def test_images_that_do_not_show_a_lamp_are_bridged() -> None:
+    lamps = lamps_along(EVEN)
+    lamps[::7] = np.nan
+    path = follow_lamps(lamps)
+    assert path is not None
+    np.testing.assert_allclose(path.shifts, EVEN - EVEN.mean(axis=0), atol=0.05)
+
+
+def test_without_lamps_there_is_no_way() -> None:
+    assert follow_lamps(np.zeros((N_IMAGES, 0, 2))) is None
+
+
+@pytest.mark.parametrize("way", [EVEN, BUMP], ids=["even", "bump"])
+def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
+    calibration = solved(way, way)
+    path = calibration.cameras[0].path
+    assert path is not None
+    assert path.is_followed
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
+    assert calibration.budget.weakest_uncertainty < 0.01
+    codes = {str(each.code) for each in warnings_of(calibration)}
+    assert "warning.camera-moved" in codes
+    verdict = judge(calibration, SwingLimits())
+    assert verdict.grade is Grade.CHECK
+    assert verdict.reason.code == Code.CAMERA_MOVED
+    assert verdict.next_step is NextStep.CLAMP
+
+
+def test_a_way_without_a_lamp_is_refused_and_with_one_it_is_not() -> None:
+    with pytest.raises(CalibrationError, match="did not stay in one place"):
+        calibrate(CAMERA, PEN, seen_along(CURVE))
+    calibration = solved(CURVE, CURVE)
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
+
+
+def test_a_lamp_that_moves_by_itself_changes_nothing() -> None:
+    calibration = solved(STILL, EVEN)
+    alone = calibrate(CAMERA, PEN, seen_along(STILL))
+    path = calibration.cameras[0].path
+    assert path is not None
+    assert path.moved > 1
+    assert not path.is_followed
+    np.testing.assert_allclose(
+        calibration.joint.tip_pen, alone.joint.tip_pen, atol=1e-3
+    )
+    codes = [str(each.code) for each in warnings_of(calibration)]
+    assert codes == ["warning.lamp-moved"]
