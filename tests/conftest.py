@@ -17,6 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import pytest
 from filelock import FileLock
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from tests.gige_simulator import GigeSimulator
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
 
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# How long an example takes depends on what else the machine does.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")
 
 HOLDER = """
 import sys, time

@@ -607,7 +607,7 @@ def test_the_operator_view_leads_the_swing_by_its_keys(capturing: "Walker") -> N
 def test_pressing_enter_again_and_again_accepts_once(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    short = replace(LONG, max_uncertainty=0.01, min_images=20, max_images=150)
+    short = replace(LONG, max_uncertainty=0.02, min_images=20, max_images=150)
     settings.set_station(STATION, short)
     settings.set_last_station(STATION)
     walker = open_wizard()

@@ -335,7 +335,7 @@ class Unknowns:
         def likely(place: slice, stated: float = 0.0) -> Component:
             component = find(place, stated)
             is_more = component.sigma > stated and component.gain > FITTED
-            return component if is_more else component._replace(sigma=0.0)
+            return component if is_more else NONE._replace(expected=component.expected)
 
         return before._replace(
             leds=self._found_leds(find),

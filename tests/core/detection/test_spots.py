@@ -513,7 +513,7 @@ def test_the_number_of_spots_is_limited() -> None:
     assert len(detect_spots(image)) == MAX_SPOTS
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     arrays(
         st.sampled_from([np.uint8, np.uint16]),

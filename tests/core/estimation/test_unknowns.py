@@ -267,6 +267,14 @@ def test_a_still_seat_and_cone_have_no_share_of_note() -> None:
     assert sum(jitter is not None for jitter in jitters) <= 1
 
 
+def test_a_seat_that_is_truer_than_is_assumed_is_no_finding() -> None:
+    result = calibrated(replace(PEN, led_sigma=0.002), 1e-3, 5)
+
+    seat = result.bundle.components.seat
+    assert not any(form.is_significant for form in seat)
+    assert {form.sigma for form in seat} == {0.0}
+
+
 def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
     forms = lean_forms(SWING.rotations)
 
