@@ -646,6 +646,9 @@ class ReviewPage(Rearranged, Page):
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
+        images = self._images.content_so_far()
+        if images is not None:
+            images.forget_refused()
 
 
 def _step_of_file(reason: Sentence) -> str:
