@@ -222,7 +222,7 @@ def drag(canvas: QWidget, start: QPoint, end: QPoint) -> None:
     """Draw the mouse over a plot with its button held down."""
     QTest.mousePress(canvas, LEFT, pos=start)
     for share in (0.25, 0.5, 0.75, 1.0):
-        place = QPointF(start + share * (end - start))
+        place = QPointF(start) + QPointF(end - start) * share
         none = Qt.KeyboardModifier.NoModifier
         seen_at = QPointF(canvas.mapToGlobal(place))
         # That of QTest says of no button that it is held.
