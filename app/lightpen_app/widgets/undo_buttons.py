@@ -11,7 +11,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 
-class Step(QUndoCommand):
+class UndoableStep(QUndoCommand):
     """Something that was done, and how it is undone."""
 
     def __init__(self, do: Callable[[], object], undo: Callable[[], object]) -> None:

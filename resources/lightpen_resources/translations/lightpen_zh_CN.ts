@@ -2841,7 +2841,7 @@
     </message>
     <message>
         <source>Nothing to redo.</source>
-        <translation>没有可重做的操作。</translation>
+        <translation>没有可取消的撤销。</translation>
     </message>
     <message>
         <source>Undo</source>
@@ -2849,7 +2849,7 @@
     </message>
     <message>
         <source>Redo</source>
-        <translation>重做</translation>
+        <translation>取消撤销</translation>
     </message>
 </context>
 <context>

@@ -25,7 +25,7 @@ from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
-from lightpen_app.widgets.undo_buttons import Step, UndoButtons
+from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
 from lightpen_app.work.job import Job, Report
 
 TABLE_WIDTH = 40 * GRID
@@ -347,7 +347,7 @@ class ImagesPanel(Translated, QWidget):
     ) -> None:
         self._is_awaited = True
         self._steps.push(
-            Step(lambda: wish.emit(numbers), lambda: opposite.emit(numbers))
+            UndoableStep(lambda: wish.emit(numbers), lambda: opposite.emit(numbers))
         )
 
 
