@@ -219,7 +219,11 @@ class Workbench(QObject):
     def try_out(self) -> None:
         """Choose a simulated pen with its files, and names for it."""
         now = replace(
-            self._preparation, names=TRIAL, nominal_tip=None, limits=SwingLimits()
+            self._preparation,
+            names=TRIAL,
+            nominal_tip=None,
+            limits=SwingLimits(),
+            assumptions=USUAL,
         )
         self.set_preparation(now.with_source(SourceChoice()))
         self.use_sample_files()
