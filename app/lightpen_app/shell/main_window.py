@@ -252,6 +252,8 @@ class MainWindow(Rearranged, QMainWindow):
                 and focused.isEnabled()
             ):
                 focused.click()
+            elif self.page().main_action().why_not:
+                self.page().show_lack()
             else:
                 self._action_bar.press_main()
         elif key == Qt.Key.Key_PageDown:

@@ -99,6 +99,9 @@ class Page(Translated, QWidget):
         """Do it; a page that has more to do than to go on overrides this."""
         self.advance_requested.emit()
 
+    def show_lack(self) -> None:
+        """Put the focus where that can be given for want of which it cannot go on."""
+
     def is_hands_free(self) -> bool:
         """Return whether the operator is at the cone, away from the keys.
 

@@ -62,14 +62,18 @@ class ImageView(Translated, QWidget):
     """Shows the newest image whole, or enlarged about a place.
 
     The wheel, or + and -, enlarge; the mouse, or the arrow keys, move; 0 shows all.
+    Instead of moving the image, the mouse may draw circles on it.
 
     Signals
     -------
     pixel_clicked(float, float)
         Where on the image, px.
+    circle_drawn(float, float, float)
+        Its centre x, y and its radius, image px.
     """
 
     pixel_clicked = Signal(float, float)
+    circle_drawn = Signal(float, float, float)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -82,6 +86,7 @@ class ImageView(Translated, QWidget):
         self._center = QPointF(0.5, 0.5)  # of the image, as fractions
         self._pressed: QPointF | None = None
         self._dragged = QPointF()
+        self._draws_circles = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         policy = QSizePolicy.Policy.Expanding
@@ -146,6 +151,16 @@ class ImageView(Translated, QWidget):
         self._zoom = min(max(zoom, 1.0), MAX_ZOOM)
         self._move(place - self.place_of(pixel.x(), pixel.y()))
 
+    def set_draws_circles(self, draws_circles: bool) -> None:
+        """Let the mouse draw circles, or move the image."""
+        self._draws_circles = draws_circles
+        self._pressed = None
+        if draws_circles:
+            self.setCursor(Qt.CursorShape.CrossCursor)
+        else:
+            self.unsetCursor()
+        self.update()
+
     @override
     def sizeHint(self) -> QSize:
         return QSize(612, 512)
@@ -182,6 +197,11 @@ class ImageView(Translated, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         for marker in self._markers:
             self._draw_marker(painter, marker, scale)
+        if self._draws_circles and self._pressed is not None:
+            painter.setPen(QPen(QColor(DARK.accent), 2))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            radius = math.dist(self._pressed.toTuple(), self._dragged.toTuple())
+            painter.drawEllipse(self._pressed, radius, radius)
 
     def _draw_marker(self, painter: QPainter, marker: Marker, scale: float) -> None:
         place = self.place_of(marker.x, marker.y)
@@ -250,18 +270,27 @@ class ImageView(Translated, QWidget):
 
     @override
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        if self._pressed is not None:
-            self._move(event.position() - self._dragged)
-            self._dragged = event.position()
+        if self._pressed is None:
+            return
+        before, self._dragged = self._dragged, event.position()
+        if self._draws_circles:
+            self.update()
+        else:
+            self._move(self._dragged - before)
 
     @override
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         pressed, self._pressed = self._pressed, None
         if pressed is None or self._size.isEmpty():
             return
-        if (event.position() - pressed).manhattanLength() > CLICK_SLACK:
-            return
         pixel = self.pixel_at(pressed)
+        if (event.position() - pressed).manhattanLength() > CLICK_SLACK:
+            if self._draws_circles:
+                rim = self.pixel_at(event.position())
+                radius = math.dist(pixel.toTuple(), rim.toTuple())
+                self.circle_drawn.emit(pixel.x(), pixel.y(), radius)
+                self.update()
+            return
         if QRectF(-0.5, -0.5, self._size.width(), self._size.height()).contains(pixel):
             self.pixel_clicked.emit(pixel.x(), pixel.y())
 

@@ -112,9 +112,10 @@ class Plot(QWidget):
 
         # Widgets
         left = _ReadableAxis("left")
-        self._graphics = pg.PlotWidget(parent=self, axisItems={"left": left})
+        self._graphics = pg.PlotWidget(
+            parent=self, axisItems={"left": left}, enableMenu=False
+        )
         self._item = self._graphics.getPlotItem()
-        self._item.setMenuEnabled(False)
         self._item.hideButtons()
         self._item.setMouseEnabled(x=False, y=False)
         self._graphics.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -49,6 +49,8 @@ ASSUMED = (
     *("scale", "form_error", "center_bias"),
     *("temperature", "warmth", "expansion"),
 )
+# What is tried out goes by these, and nothing of it is remembered.
+TRIAL = Names("Trial", "Trial", "SIM-1", "T-1", "C-1", 10.0)
 
 
 @dataclass(frozen=True)
@@ -213,6 +215,20 @@ class Workbench(QObject):
         self._open_files(station)
         self._remember_station()
         self._follow(before)
+
+    def try_out(self) -> None:
+        """Choose a simulated pen with its files, and names for it."""
+        now = replace(
+            self._preparation,
+            names=TRIAL,
+            nominal_tip=None,
+            limits=SwingLimits(),
+            assumptions=USUAL,
+        )
+        self.set_preparation(now.with_source(SourceChoice()))
+        self.use_sample_files()
+        if not self.live.is_open:
+            self.open_camera()
 
     def set_preparation(self, preparation: Preparation) -> None:
         """Take over other choices, and remember them for the station."""
@@ -438,13 +454,13 @@ class Workbench(QObject):
 
     def _remember_station(self) -> None:
         station = self._preparation.names.station
-        if station:
+        if station not in ("", TRIAL.station):
             self._settings.set_last_station(station)
 
     def _remember(self) -> None:
         now = self._preparation
         names = now.names
-        if not names.station:
+        if names.station in ("", TRIAL.station):
             return
         camera_file, pen_file = now.camera_file, now.pen_file
         unread = self._unread  # files that are being read stay remembered

@@ -85,6 +85,12 @@ class Finding:
     axes: str = ""
     advice: Sentence | None = None
 
+    @property
+    def can_be_mended(self) -> bool:
+        """Whether it tells what to write into the table of the LEDs instead."""
+        is_measured = self.what is What.SHIFTED and self.is_sure
+        return self.what is What.EXCHANGED or is_measured
+
 
 @dataclass(frozen=True, eq=False)
 class PenMatch:

@@ -583,6 +583,14 @@
         <translation>图像</translation>
     </message>
     <message>
+        <source>drag down to take out</source>
+        <translation>向下拖动以剔除</translation>
+    </message>
+    <message>
+        <source>take out {0} above {1} px</source>
+        <translation>剔除高于 {1} px 的 {0} 幅</translation>
+    </message>
+    <message>
         <source>{0} of {1} used</source>
         <translation>使用 {0} / {1} 幅</translation>
     </message>
@@ -765,6 +773,73 @@
     </message>
 </context>
 <context>
+    <name>Introduction</name>
+    <message>
+        <source>What is this?</source>
+        <translation>这是什么？</translation>
+    </message>
+    <message>
+        <source>Where is the tip of the pen?</source>
+        <translation>光笔的测头在哪里？</translation>
+    </message>
+    <message>
+        <source>The pen carries LEDs that a camera sees. What it touches with its tip can be measured, once it is known where the tip is from the LEDs. That is what is calibrated.</source>
+        <translation>光笔上装有相机可见的 LED。只有知道测头相对于 LED 的位置，才能测量测头所接触的点。标定的就是这个位置。</translation>
+    </message>
+    <message>
+        <source>The tip rests in a cone and stays there while the pen is leaned to all sides. The only point of the pen that does not move is the centre of its tip.</source>
+        <translation>测头放在锥孔中保持不动，光笔向各个方向倾斜。光笔上唯一不动的点就是测头的中心。</translation>
+    </message>
+    <message>
+        <source>Start</source>
+        <translation>开始</translation>
+    </message>
+    <message>
+        <source>say which pen and which tip.</source>
+        <translation>填写光笔和测头。</translation>
+    </message>
+    <message>
+        <source>Camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>see that the images are bright and sharp.</source>
+        <translation>确认图像明亮、清晰。</translation>
+    </message>
+    <message>
+        <source>LEDs</source>
+        <translation>LED</translation>
+    </message>
+    <message>
+        <source>see that the file of the LEDs is that of this pen.</source>
+        <translation>确认 LED 文件属于这支光笔。</translation>
+    </message>
+    <message>
+        <source>Swing</source>
+        <translation>摆动</translation>
+    </message>
+    <message>
+        <source>lean the pen as the arrow shows; no key is needed.</source>
+        <translation>按箭头倾斜光笔，无需按键。</translation>
+    </message>
+    <message>
+        <source>Review</source>
+        <translation>复核</translation>
+    </message>
+    <message>
+        <source>see how certain the tip is, and accept it.</source>
+        <translation>查看测头的不确定度，然后接受。</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>关闭</translation>
+    </message>
+    <message>
+        <source>Try it with a simulated pen</source>
+        <translation>用模拟光笔试一试</translation>
+    </message>
+</context>
+<context>
     <name>LastResultPanel</name>
     <message>
         <source>Last practice with this pen and tip</source>
@@ -868,6 +943,10 @@
 </context>
 <context>
     <name>LedFilePanel</name>
+    <message>
+        <source>Exchange {0} and {1}</source>
+        <translation>交换 {0} 和 {1}</translation>
+    </message>
     <message>
         <source>Cancel</source>
         <translation>取消</translation>
@@ -1287,6 +1366,17 @@
     </message>
 </context>
 <context>
+    <name>MendableRemark</name>
+    <message>
+        <source>Exchange {0} and {1}</source>
+        <translation>交换 {0} 和 {1}</translation>
+    </message>
+    <message>
+        <source>Use the measured place</source>
+        <translation>采用测得的位置</translation>
+    </message>
+</context>
+<context>
     <name>MethodsPanel</name>
     <message>
         <source>Objective / mm²</source>
@@ -1374,6 +1464,33 @@
     <message>
         <source>not known</source>
         <translation>未知</translation>
+    </message>
+</context>
+<context>
+    <name>NewcomerPanel</name>
+    <message>
+        <source>New here?</source>
+        <translation>第一次使用？</translation>
+    </message>
+    <message>
+        <source>No pen and no camera are needed to see how it goes. What is simulated is kept apart from real tips.</source>
+        <translation>无需光笔和相机即可了解流程。模拟结果与真实测头分开保存。</translation>
+    </message>
+    <message>
+        <source>Try it with a simulated pen</source>
+        <translation>用模拟光笔试一试</translation>
+    </message>
+    <message>
+        <source>What is this?</source>
+        <translation>这是什么？</translation>
+    </message>
+    <message>
+        <source>Play the demo</source>
+        <translation>播放演示</translation>
+    </message>
+    <message>
+        <source>In another window, which goes through all steps by itself.</source>
+        <translation>在另一个窗口中自动走完所有步骤。</translation>
     </message>
 </context>
 <context>
@@ -2229,6 +2346,10 @@
         <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
     </message>
     <message>
+        <source>A swing is under way.</source>
+        <translation>正在摆动。</translation>
+    </message>
+    <message>
         <source>The swing is being discarded.</source>
         <translation>正在放弃摆动。</translation>
     </message>
@@ -2284,6 +2405,14 @@
     <message>
         <source>Clear the mask</source>
         <translation>清除屏蔽</translation>
+    </message>
+    <message>
+        <source>Draw the mask on the image</source>
+        <translation>在图像上绘制屏蔽区</translation>
+    </message>
+    <message>
+        <source>Click a spot to mask it, draw a circle with the button held down, or click into a circle to take it away.</source>
+        <translation>点击光斑将其屏蔽，按住鼠标键画圆，或点击圆内将其删除。</translation>
     </message>
     <message>
         <source>Uncover the LEDs</source>
@@ -2702,6 +2831,25 @@
     <message>
         <source>Images hang together: their noise counts {0} times (variance).</source>
         <translation>各图像相关：噪声方差按 {0} 倍计。</translation>
+    </message>
+</context>
+<context>
+    <name>UndoButtons</name>
+    <message>
+        <source>Nothing to undo.</source>
+        <translation>没有可撤销的操作。</translation>
+    </message>
+    <message>
+        <source>Nothing to redo.</source>
+        <translation>没有可取消的撤销。</translation>
+    </message>
+    <message>
+        <source>Undo</source>
+        <translation>撤销</translation>
+    </message>
+    <message>
+        <source>Redo</source>
+        <translation>取消撤销</translation>
     </message>
 </context>
 <context>

@@ -52,6 +52,11 @@ class Seen:
                 return each
         raise AssertionError(f"No {name} on the page, but:\n{self.words}")
 
+    def shows(self, name: str) -> bool:
+        """Whether there is a button on which this is written, to be seen."""
+        buttons = self.page.findChildren(QPushButton)
+        return any(each.isVisible() and each.text() == name for each in buttons)
+
     def click(self, name: str) -> None:
         QTest.mouseClick(self.named(name), Qt.MouseButton.LeftButton)
 

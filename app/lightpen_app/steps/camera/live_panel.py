@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 from lightpen.cameras.protocol import Stats
 from lightpen.cameras.worker import Connection
 from lightpen.detection.reasons import Reason
+from lightpen.detection.spots import Spots
 from lightpen.live.looking import LiveImage
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
@@ -73,6 +74,10 @@ class LivePanel(Translated, QWidget):
     def view(self) -> ImageView:
         """Return the image."""
         return self._view
+
+    def spots(self) -> Spots | None:
+        """Return what is bright in the image and not masked; None without one."""
+        return None if self._seen is None else self._seen.spots
 
     def set_image(self, shown: Shown, stats: Stats) -> None:
         """Show another image, and what became of those before."""

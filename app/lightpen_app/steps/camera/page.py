@@ -20,6 +20,7 @@ from lightpen.cameras.sources import absent_sources
 from lightpen.cameras.worker import Connection
 from lightpen.detection.auto_exposure import AutoExposure
 from lightpen.detection.inspection import Exposure, Inspection, inspect
+from lightpen.detection.mask import clicked, with_circle
 from lightpen.formats.opened_files import CameraFile
 from lightpen.live.looking import LiveImage
 from lightpen.record.recordings import FilesBeside, files_beside
@@ -94,6 +95,9 @@ class CameraPage(Rearranged, Page):
         self._stray.mask_requested.connect(self._on_mask_requested)
         self._stray.clear_requested.connect(self._on_clear_requested)
         self._stray.cover_requested.connect(self._on_cover_requested)
+        self._stray.drawing_toggled.connect(self._images.view().set_draws_circles)
+        self._images.view().pixel_clicked.connect(self._on_image_clicked)
+        self._images.view().circle_drawn.connect(self._on_circle_drawn)
         self._exposure.exposure_changed.connect(self._on_exposure_asked)
         self._exposure.gain_changed.connect(self._on_gain_asked)
         self._exposure.adjustment_requested.connect(self._on_adjustment_requested)
@@ -150,6 +154,7 @@ class CameraPage(Rearranged, Page):
         self._is_shown = False
         self._end_adjustment()
         self._stray.give_up()
+        self._stray.end_drawing()
         self._stray.uncover()
 
     @override
@@ -326,13 +331,25 @@ class CameraPage(Rearranged, Page):
         self._workbench.use_sample_files()
 
     def _on_mask_requested(self, circles: FloatArray) -> None:
-        now = self._workbench.preparation
-        mask = np.concatenate([now.mask, circles])
-        self._workbench.set_preparation(replace(now, mask=mask))
+        mask = np.concatenate([self._workbench.preparation.mask, circles])
+        self._set_mask(mask)
 
     def _on_clear_requested(self) -> None:
+        self._set_mask(np.zeros((0, 3)))
+
+    def _on_image_clicked(self, x: float, y: float) -> None:
+        spots = self._images.spots()
+        if self._stray.is_drawing and spots is not None:
+            mask = self._workbench.preparation.mask
+            self._set_mask(clicked(mask, spots, np.array([x, y])))
+
+    def _on_circle_drawn(self, x: float, y: float, radius: float) -> None:
+        circle = np.array([x, y, radius])
+        self._set_mask(with_circle(self._workbench.preparation.mask, circle))
+
+    def _set_mask(self, mask: FloatArray) -> None:
         now = self._workbench.preparation
-        self._workbench.set_preparation(replace(now, mask=np.zeros((0, 3))))
+        self._workbench.set_preparation(replace(now, mask=mask))
 
     # What the camera does
 

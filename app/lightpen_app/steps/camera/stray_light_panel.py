@@ -27,12 +27,15 @@ class StrayLightPanel(Translated, QGroupBox):
         Leave nothing out any more.
     cover_requested(bool)
         The simulated operator is to cover the LEDs, or to uncover them.
+    drawing_toggled(bool)
+        The mask is to be drawn on the image, or no longer.
     """
 
     found_changed = Signal()
     mask_requested = Signal(object)
     clear_requested = Signal()
     cover_requested = Signal(bool)
+    drawing_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -49,6 +52,8 @@ class StrayLightPanel(Translated, QGroupBox):
         self._start = PushButton()
         self._mask = PushButton()
         self._clear = PushButton()
+        self._draw = PushButton()
+        self._draw.setCheckable(True)
         self._outcome = SignLabel()
 
         # Layout
@@ -58,6 +63,7 @@ class StrayLightPanel(Translated, QGroupBox):
         buttons.addWidget(self._cover, 0, 1)
         buttons.addWidget(self._mask, 1, 0)
         buttons.addWidget(self._clear, 1, 1)
+        buttons.addWidget(self._draw, 2, 0, 1, 2)
         buttons.setColumnStretch(0, 1)
         buttons.setColumnStretch(1, 1)
         layout = QVBoxLayout(self)
@@ -72,6 +78,7 @@ class StrayLightPanel(Translated, QGroupBox):
         self._start.clicked.connect(self._on_start_clicked)
         self._mask.clicked.connect(self._on_mask_clicked)
         self._clear.clicked.connect(self.clear_requested)
+        self._draw.toggled.connect(self.drawing_toggled)
 
         self._retranslate()
 
@@ -101,6 +108,15 @@ class StrayLightPanel(Translated, QGroupBox):
     def set_has_operator(self, has_operator: bool) -> None:
         """Offer that the simulated operator covers the LEDs, or not."""
         self._cover.setVisible(has_operator)
+
+    @property
+    def is_drawing(self) -> bool:
+        """Whether the mask is drawn on the image now."""
+        return self._draw.isChecked()
+
+    def end_drawing(self) -> None:
+        """Let the mask be drawn no longer."""
+        self._draw.setChecked(False)
 
     def uncover(self) -> None:
         """Let the simulated operator uncover the LEDs, if he covers them."""
@@ -149,6 +165,13 @@ class StrayLightPanel(Translated, QGroupBox):
         self._task.setText(self.tr("Cover the pen, then search for what still shines."))
         self._start.setText(self.tr("Search"))
         self._clear.setText(self.tr("Clear the mask"))
+        self._draw.setText(self.tr("Draw the mask on the image"))
+        self._draw.setToolTip(
+            self.tr(
+                "Click a spot to mask it, draw a circle with the button held down, or "
+                "click into a circle to take it away."
+            )
+        )
         self._refresh()
 
     def _refresh(self) -> None:

@@ -37,12 +37,15 @@ class LedFilePanel(Translated, QWidget):
         The LEDs are to be saved there; a file that exists may be replaced.
     samples_requested()
         The file of the simulated pen is to be used.
+    exchange_requested(pair of int)
+        Two LEDs, by number, are to be exchanged.
     """
 
     path_chosen = Signal(str)
     units_chosen = Signal(str, str)
     save_chosen = Signal(object)
     samples_requested = Signal()
+    exchange_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -50,6 +53,7 @@ class LedFilePanel(Translated, QWidget):
         self._suffix = "csv"
         self._why_no_save = ""
         self._agreed: Callable[[], None] | None = None
+        self._pair: tuple[int, int] | None = None
 
         # Widgets
         self._label = QLabel()
@@ -61,6 +65,8 @@ class LedFilePanel(Translated, QWidget):
         self._label.setBuddy(self._path.edit())
         self._units = _UnitsRow()
         self._problem = SignLabel()
+        self._exchange = PushButton()
+        self._exchange.hide()
         self._question = QuestionBar()
 
         # Layout
@@ -75,7 +81,11 @@ class LedFilePanel(Translated, QWidget):
         layout.setSpacing(GRID)
         layout.addLayout(row)
         layout.addWidget(self._units)
-        layout.addWidget(self._problem)
+        told = QHBoxLayout()
+        told.setSpacing(2 * GRID)
+        told.addWidget(self._problem, 1)
+        told.addWidget(self._exchange, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addLayout(told)
         layout.addWidget(self._question)
 
         # Connections
@@ -84,6 +94,7 @@ class LedFilePanel(Translated, QWidget):
         self._open.clicked.connect(self._on_open_clicked)
         self._save.clicked.connect(self._on_save_clicked)
         self._samples.clicked.connect(self.samples_requested)
+        self._exchange.clicked.connect(self._on_exchange_clicked)
         self._units.value_changed.connect(self._on_units_chosen)
         self._question.agreed.connect(self._on_agreed)
         self._question.declined.connect(self._on_declined)
@@ -107,6 +118,13 @@ class LedFilePanel(Translated, QWidget):
         """Say what is wrong, or nothing."""
         self._path.set_faulty(bool(sentence))
         self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
+
+    def set_exchange(self, pair: tuple[int, int] | None) -> None:
+        """Offer to exchange two LEDs, by number, or nothing."""
+        self._pair = pair
+        self._exchange.setVisible(pair is not None)
+        if pair is not None:
+            self._exchange.setText(self.tr("Exchange {0} and {1}").format(*pair))
 
     def ask_units(self, name: str) -> None:
         """Ask for the units of a file that does not say them; empty asks no more."""
@@ -142,6 +160,9 @@ class LedFilePanel(Translated, QWidget):
             self.tr("LEDs of the pen"),
             self.tr("LEDs of a pen ({0})").format("*.csv *.txt *.json"),
         )
+
+    def _on_exchange_clicked(self) -> None:
+        self.exchange_requested.emit(self._pair)
 
     def _on_units_chosen(self, units: str) -> None:
         self.units_chosen.emit(self._path.value(), units)
@@ -192,6 +213,7 @@ class LedFilePanel(Translated, QWidget):
         self._open.setText(self.tr("Open..."))
         self._save.setText(self.tr("Save as..."))
         self._samples.setText(self.tr("Use the simulated pen's file"))
+        self.set_exchange(self._pair)
         self._refresh_save_words()
 
     def _refresh_save_words(self) -> None:

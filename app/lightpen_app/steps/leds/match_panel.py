@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Iterable
 
 import numpy as np
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -19,9 +20,10 @@ from lightpen_app.look.quantities import number_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
+from lightpen_app.steps.leds.mendable_remark import MendableRemark
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import live_markers
-from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import Shown
@@ -32,7 +34,15 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 
 
 class MatchPanel(Translated, QGroupBox):
-    """Shows images with numbered LEDs, how many fit, and which do not."""
+    """Shows images with numbered LEDs, how many fit, and which do not.
+
+    Signals
+    -------
+    mend_requested(Finding)
+        The table is to be mended as this finding says.
+    """
+
+    mend_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -42,11 +52,12 @@ class MatchPanel(Translated, QGroupBox):
         self._counts: deque[int] = deque(maxlen=N_SMOOTHED)
         self._why_none = ""
         self._has_frame = True
+        self._can_mend = True
 
         # Widgets
         self._view = ImageView()
         self._banner = StateBanner(TextSize.TITLE)
-        self._remarks = tuple(SignLabel() for _ in range(N_FINDINGS))
+        self._remarks = tuple(MendableRemark() for _ in range(N_FINDINGS))
 
         # Layout
         layout = QVBoxLayout(self)
@@ -57,6 +68,10 @@ class MatchPanel(Translated, QGroupBox):
         for remark in self._remarks:
             layout.addWidget(remark)
         layout.addStretch(0)
+
+        # Connections
+        for remark in self._remarks:
+            remark.mend_requested.connect(self.mend_requested)
 
         self._retranslate()
 
@@ -70,7 +85,7 @@ class MatchPanel(Translated, QGroupBox):
 
     def remarks(self) -> tuple[str, ...]:
         """Return what is said about the views so far."""
-        texts = (remark.value().text for remark in self._remarks)
+        texts = (remark.text() for remark in self._remarks)
         return tuple(filter(None, texts))
 
     def set_image(self, shown: Shown) -> None:
@@ -103,6 +118,12 @@ class MatchPanel(Translated, QGroupBox):
         """Say whether the pen stands in its frame; if not, fitting is not enough."""
         if has_frame != self._has_frame:
             self._has_frame = has_frame
+            self._refresh()
+
+    def set_can_mend(self, can_mend: bool) -> None:
+        """Say whether the table is in the frame in which findings are told."""
+        if can_mend != self._can_mend:
+            self._can_mend = can_mend
             self._refresh()
 
     def value(self) -> PenMatch | None:
@@ -139,8 +160,10 @@ class MatchPanel(Translated, QGroupBox):
 
     def _refresh(self) -> None:
         found = self._found()
-        for i, label in enumerate(self._remarks):
-            label.set_value(found[i] if i < len(found) else Remark())
+        mendable = self._mendable()
+        for i, remark in enumerate(self._remarks):
+            remark.set_value(found[i] if i < len(found) else Remark())
+            remark.set_mendable(mendable[i] if i < len(mendable) else None)
         self._refresh_state()
 
     def _refresh_state(self) -> None:
@@ -201,6 +224,15 @@ class MatchPanel(Translated, QGroupBox):
             text = words.format(f"{MIN_SHIFT:g}", match.n_views)
             remarks = [Remark(text, Sign.CHECK, Tone.GOOD)]
         return remarks
+
+    def _mendable(self) -> list[Finding | None]:
+        """Return the findings that a click can mend, in their places."""
+        if self._match is None or self._why_none or not self._can_mend:
+            return []
+        return [
+            each if each.can_be_mended else None
+            for each in self._match.findings[:N_FINDINGS]
+        ]
 
     def _words(self, finding: Finding) -> str:
         place = [

@@ -6,18 +6,21 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
 from lightpen.formats.opened_files import PenFile
 from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
-from lightpen.pen_check.match import PenMatch
+from lightpen.pen_check.match import Finding, PenMatch
+from lightpen.pen_check.mending import exchanged, leds_to_exchange, mended
 from lightpen.pen_check.opening import OpenedPen, open_pen, save_pen
 from lightpen.swing.preparation import SourceKind
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID
+from lightpen_app.steps.leds.draft_edit import DraftEdit
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
 from lightpen_app.steps.leds.match_panel import MatchPanel
@@ -27,6 +30,7 @@ from lightpen_app.steps.leds.table_panel import Changes, LedTablePanel
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.undo_buttons import UndoButtons
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
@@ -55,10 +59,11 @@ class LedsPage(Rearranged, Page):
         self._is_foreign = False  # opened from a file that cannot be used
         self._check = DraftCheck()
         self._job: Job | None = None
+        self._edits = QUndoStack(self)
 
         # Widgets
         self._file = LedFilePanel()
-        self._table = LedTablePanel()
+        self._table = LedTablePanel(UndoButtons(self._edits, self))
         self._space = FramePanel()
         self._match = MatchPanel()
         self._watch = PenWatch(self)
@@ -86,11 +91,13 @@ class LedsPage(Rearranged, Page):
         self._file.units_chosen.connect(self._on_units_chosen)
         self._file.save_chosen.connect(self._on_save_chosen)
         self._file.samples_requested.connect(self._on_samples_requested)
-        self._table.value_changed.connect(self._set_draft)
+        self._file.exchange_requested.connect(self._on_exchange_requested)
+        self._table.value_changed.connect(self._edit)
         self._table.discard_requested.connect(self._on_discard_requested)
         self._table.led_chosen.connect(self._space.view().set_chosen)
         self._space.led_chosen.connect(self._table.set_chosen)
         self._space.move_requested.connect(self._on_move_requested)
+        self._match.mend_requested.connect(self._on_mend_requested)
         self._watch.value_changed.connect(self._on_match_changed)
         self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.live.image_shown.connect(self._on_image_shown)
@@ -194,7 +201,7 @@ class LedsPage(Rearranged, Page):
             changed = self._draft if self._is_edited else None
             self._open_in_use()
             if changed is not None:
-                self._set_draft(changed)
+                self._edit(changed)
         self._file.set_has_samples(preparation.source.kind == SourceKind.SIMULATED)
         self._refresh()
         self._aim()
@@ -209,7 +216,13 @@ class LedsPage(Rearranged, Page):
         """Show a draft as it was opened, with nothing to complain about yet."""
         self._opened, self._is_foreign = draft, foreign
         self._file.ask_units("")
+        if draft != self._draft:  # else it is what was saved now
+            self._edits.clear()
         self._set_draft(draft)
+
+    def _edit(self, draft: PenDraft) -> None:
+        """Show another draft, from which the way back is open."""
+        self._edits.push(DraftEdit(self._set_draft, self._draft, draft))
 
     def _set_draft(self, draft: PenDraft) -> None:
         self._draft = draft
@@ -219,7 +232,10 @@ class LedsPage(Rearranged, Page):
         frame = self._check.frame
         self._table.set_flaw(worded(self._check.flaw))
         self._file.set_problem("" if frame is None else worded(frame.error))
+        self._file.set_exchange(leds_to_exchange(frame))
         self._match.set_has_frame(frame is None or not frame.error)
+        is_as_typed = self._check.sought is self._check.pen
+        self._match.set_can_mend(is_as_typed)
         preparation = self._workbench.preparation
         if preparation.has_unsaved_leds is not self._is_pending:
             self._workbench.set_preparation(
@@ -271,7 +287,7 @@ class LedsPage(Rearranged, Page):
     def _discard(self) -> None:
         """Go back to what was opened; from what cannot be used, to the file in use."""
         if self._is_edited:
-            self._set_draft(self._opened)
+            self._edit(self._opened)
         else:
             self._open_in_use()
 
@@ -349,7 +365,13 @@ class LedsPage(Rearranged, Page):
 
     def _on_move_requested(self) -> None:
         if self._check.sought is not None:
-            self._set_draft(PenDraft.of(self._check.sought))
+            self._edit(PenDraft.of(self._check.sought))
+
+    def _on_exchange_requested(self, pair: tuple[int, int]) -> None:
+        self._edit(exchanged(self._draft, pair))
+
+    def _on_mend_requested(self, finding: Finding) -> None:
+        self._edit(mended(self._draft, finding))
 
     # Live images
 

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QGridLayout,
     QGroupBox,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QVBoxLayout,
@@ -39,6 +38,11 @@ class Changes(Enum):
 class LedTablePanel(Translated, QGroupBox):
     """Shows a draft and lets it be changed.
 
+    Parameters
+    ----------
+    undo : QWidget
+        Put below its buttons.
+
     Signals
     -------
     value_changed(PenDraft)
@@ -53,7 +57,7 @@ class LedTablePanel(Translated, QGroupBox):
     discard_requested = Signal()
     led_chosen = Signal(int)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, undo: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = PenDraft()
         self._changes = Changes.NONE
@@ -74,10 +78,14 @@ class LedTablePanel(Translated, QGroupBox):
         self._override_label = text_label(TextSize.SMALL, Tone.QUIET)
 
         # Layout
-        buttons = QHBoxLayout()
+        buttons = QGridLayout()
         buttons.setSpacing(GRID)
-        for button in (self._add, self._remove, self._discard):
-            buttons.addWidget(button, 1)
+        buttons.addWidget(self._add, 0, 0)
+        buttons.addWidget(self._remove, 0, 1)
+        buttons.addWidget(self._discard, 0, 2)
+        buttons.addWidget(undo, 1, 0, 1, 3)
+        for column in range(3):
+            buttons.setColumnStretch(column, 1)
         fields = QGridLayout()
         fields.setSpacing(GRID)
         fields.addWidget(self._diameter_label, 0, 0)

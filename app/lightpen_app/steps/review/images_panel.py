@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtCore import QSize, Qt, Signal, SignalInstance
+from PySide6.QtGui import QKeySequence, QShortcut, QUndoStack
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from lightpen.arrays import Image
@@ -25,6 +25,7 @@ from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.undo_buttons import UndoableStep, UndoButtons
 from lightpen_app.work.job import Job, Report
 
 TABLE_WIDTH = 40 * GRID
@@ -68,11 +69,14 @@ class ImagesPanel(Translated, QWidget):
         self._job: Job | None = None
         self._loading: tuple[RecordSource, int] | None = None
         self._shown: int | None = None
+        self._steps = QUndoStack(self)
+        self._is_awaited = False  # whether the last step has no solution yet
 
         # Widgets
         self._table = ImageTable()
         self._take_out = PushButton()
         self._put_back = PushButton()
+        self._undo = UndoButtons(self._steps, self)
         self._count = text_label(TextSize.SMALL, Tone.QUIET)
         self._view = ResidualView()
         self._view.setMinimumHeight(LEAST_HEIGHT)
@@ -91,9 +95,10 @@ class ImagesPanel(Translated, QWidget):
         layout.addWidget(self._table, 0, 0, 3, 1)
         layout.addWidget(self._count, 3, 0)
         layout.addLayout(buttons, 4, 0)
+        layout.addWidget(self._undo, 5, 0)
         layout.addWidget(self._view, 0, 1)
         layout.addWidget(self._caption, 1, 1)
-        layout.addWidget(self._card, 2, 1, 3, 1)
+        layout.addWidget(self._card, 2, 1, 4, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
         layout.setRowStretch(0, VIEW_SHARE)
@@ -103,6 +108,7 @@ class ImagesPanel(Translated, QWidget):
         self._table.number_changed.connect(self._on_number_changed)
         self._table.selection_changed.connect(self._refresh_buttons)
         self._misfits.number_chosen.connect(self._table.choose)
+        self._misfits.limit_set.connect(self._leave_out)
         self._take_out.clicked.connect(self._on_take_out_clicked)
         self._put_back.clicked.connect(self._on_put_back_clicked)
         self._card.enlarge_toggled.connect(self._on_enlarge_toggled)
@@ -124,7 +130,9 @@ class ImagesPanel(Translated, QWidget):
     def set_value(self, solution: Solution | None) -> None:
         """Show the images of another solution; the chosen ones stay chosen."""
         before, self._solution = self._solution, solution
+        self._is_awaited = False
         if solution is None or before is None or before.source != solution.source:
+            self._steps.clear()
             self.shut_down()
             self._clear_view()
         rows = () if solution is None else worst_first(solution)
@@ -138,7 +146,16 @@ class ImagesPanel(Translated, QWidget):
     def set_locked(self, why: str) -> None:
         """Keep images from being taken out or put back, for a reason, or let them."""
         self._why_locked = why
+        self._undo.set_locked(why)
+        self._misfits.set_limit_movable(not why)
         self._refresh_buttons()
+
+    def forget_refused(self) -> None:
+        """Let the last step not be undone if it was refused."""
+        if self._is_awaited:
+            self._is_awaited = False
+            self._steps.command(self._steps.index() - 1).setObsolete(True)
+            self._steps.undo()
 
     def number(self) -> int | None:
         """Return the number of the image that is shown."""
@@ -162,6 +179,9 @@ class ImagesPanel(Translated, QWidget):
         self._put_back.setText(self.tr("Put back"))
         self._misfits.set_axes(
             Axes(self.tr("Misfit / px (x: left out)"), self.tr("image"))
+        )
+        self._misfits.set_limit_words(
+            self.tr("drag down to take out"), self.tr("take out {0} above {1} px")
         )
         self._refresh_texts()
         self._refresh_buttons()
@@ -303,7 +323,7 @@ class ImagesPanel(Translated, QWidget):
         """Give the plot the place of all that is about it, or no longer."""
         for widget in (
             *(self._table, self._count, self._take_out, self._put_back),
-            *(self._view, self._caption),
+            *(self._undo, self._view, self._caption),
         ):
             widget.setVisible(not enlarged)
         layout = self.layout()
@@ -312,12 +332,23 @@ class ImagesPanel(Translated, QWidget):
         layout.setRowStretch(0, 0 if enlarged else VIEW_SHARE)
 
     def _on_take_out_clicked(self) -> None:
-        numbers = [row.number for row in self._table.selected() if row.is_used]
-        self.take_out_requested.emit(numbers)
+        self._leave_out([row.number for row in self._table.selected() if row.is_used])
 
     def _on_put_back_clicked(self) -> None:
-        numbers = [row.number for row in self._table.selected() if row.is_taken_out]
-        self.put_back_requested.emit(numbers)
+        rows = self._table.selected()
+        numbers = [row.number for row in rows if row.is_taken_out]
+        self._do(self.put_back_requested, self.take_out_requested, numbers)
+
+    def _leave_out(self, numbers: list[int]) -> None:
+        self._do(self.take_out_requested, self.put_back_requested, numbers)
+
+    def _do(
+        self, wish: SignalInstance, opposite: SignalInstance, numbers: list[int]
+    ) -> None:
+        self._is_awaited = True
+        self._steps.push(
+            UndoableStep(lambda: wish.emit(numbers), lambda: opposite.emit(numbers))
+        )
 
 
 def _decoded(solution: Solution, number: int, report: Report) -> _Decoded:

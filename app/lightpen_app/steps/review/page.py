@@ -1,6 +1,6 @@
 """The step Review: is the tip good, how sure is it, and what next."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +24,6 @@ from lightpen.record.assessment import Assessment
 from lightpen.record.exports import export_json, export_tables, tip_text
 from lightpen.record.next_tips import next_tips
 from lightpen.record.results import Result
-from lightpen.record.solving import Solution
 from lightpen.sentences import Sentence
 from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
@@ -36,7 +35,6 @@ from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.next_tips_row import NextTipsRow
-from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import (
     MethodsPanel,
     PlotsPanel,
@@ -46,6 +44,7 @@ from lightpen_app.steps.review.plots_panel import (
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
 from lightpen_app.steps.review.result_tools import Export, ResultTools
+from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -105,12 +104,12 @@ class ReviewPage(Rearranged, Page):
         self._take_back = PushButton()
         self._tools = ResultTools()
         self._next_tips = NextTipsRow()
-        self._images = ImagesPanel()
-        self._panels: tuple[ImagesPanel | PlotsPanel, ...] = (
+        self._images = Late(ImagesPanel)
+        self._panels: tuple[Late[ImagesPanel] | Late[PlotsPanel], ...] = (
             self._images,
-            ResidualsPanel(),
-            UncertaintyPanel(),
-            MethodsPanel(),
+            Late[PlotsPanel](ResidualsPanel),
+            Late[PlotsPanel](UncertaintyPanel),
+            Late[PlotsPanel](MethodsPanel),
         )
         self._tabs = QTabWidget()
         self._tab_of = {panel: PageScroll() for panel in self._panels}
@@ -137,18 +136,14 @@ class ReviewPage(Rearranged, Page):
         self._reason.declined.connect(self._tabs.setFocus)
         self._question.agreed.connect(self._on_question_agreed)
         self._question.declined.connect(self._tabs.setFocus)
-        self._images.take_out_requested.connect(self._run.runner.take_out)
-        self._images.put_back_requested.connect(self._run.runner.put_back)
+        self._images.made.connect(self._on_images_made)
         self._tabs.currentChanged.connect(self._fill_tab)
         self._tools.folder_requested.connect(self._open_folder)
         self._tools.copy_requested.connect(self._copy_tip)
         self._tools.save_requested.connect(self._ask_folder)
         self._next_tips.chosen.connect(self._on_next_tip_chosen)
-        for card in self._cards():
-            card.set_place(self._place)
         for panel in self._panels:
-            panel.saved.connect(self.status_changed)
-            panel.failed.connect(self.notice_raised)
+            panel.made.connect(self._on_panel_made)
 
         self._retranslate()
 
@@ -249,7 +244,9 @@ class ReviewPage(Rearranged, Page):
         for job in (self._search, self._saving):
             if job is not None:
                 job.cancel()
-        self._images.shut_down()
+        images = self._images.content_so_far()
+        if images is not None:
+            images.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -359,6 +356,18 @@ class ReviewPage(Rearranged, Page):
             return why_not
         return self.tr("Not good enough: capture more images, or repeat the swing.")
 
+    def _why_locked(self) -> str:
+        """Return why the swing cannot be changed."""
+        if self._run.status.result is not None:
+            return self.tr("The tip is accepted; start the next calibration.")
+        if self._run.status.solution is None:
+            return self.tr("Swing the pen first.")
+        return ""
+
+    def _lock(self, images: ImagesPanel) -> None:
+        goes_on = self.tr("The swing goes on.") if self._run.status.is_reading else ""
+        images.set_locked(self._why_locked() or goes_on)
+
     @Slot()
     def _on_run_changed(self) -> None:
         status = self._run.status
@@ -417,22 +426,33 @@ class ReviewPage(Rearranged, Page):
     def _fill_tab(self) -> None:
         """Show the solution in the tab that is seen; the others wait until they are."""
         for panel, tab in self._tab_of.items():
-            is_seen = tab is self._tabs.currentWidget()
-            solution = self._run.status.solution
-            if is_seen and panel.value() is not solution:
-                panel.set_value(solution)
+            if tab is self._tabs.currentWidget():
+                self._show_solution(panel.content())
+
+    def _show_solution(self, panel: ImagesPanel | PlotsPanel) -> None:
+        solution = self._run.status.solution
+        if panel.value() is not solution:
+            panel.set_value(solution)
+
+    def _on_images_made(self, images: ImagesPanel) -> None:
+        self._lock(images)
+        images.take_out_requested.connect(self._run.runner.take_out)
+        images.put_back_requested.connect(self._run.runner.put_back)
+
+    def _on_panel_made(self, panel: ImagesPanel | PlotsPanel) -> None:
+        for card in panel.cards():
+            card.set_place(self._place)
+        panel.saved.connect(self.status_changed)
+        panel.failed.connect(self.notice_raised)
 
     def _refresh_words(self) -> None:
         status = self._run.status
         self._banner.set_value(self._state())
         self._remarks.set_value(self._warnings())
-        why_locked = ""
-        if status.result is not None:
-            why_locked = self.tr("The tip is accepted; start the next calibration.")
-        elif status.solution is None:
-            why_locked = self.tr("Swing the pen first.")
-        goes_on = self.tr("The swing goes on.") if status.is_reading else ""
-        self._images.set_locked(why_locked or goes_on)
+        why_locked = self._why_locked()
+        images = self._images.content_so_far()
+        if images is not None:
+            self._lock(images)
         all_read = ""
         if self._is_recording:
             all_read = self.tr("All recorded images are read.")
@@ -568,10 +588,6 @@ class ReviewPage(Rearranged, Page):
         workbench.set_preparation(replace(chosen, names=names))
         self._to_next_tip = True
 
-    def _cards(self) -> Iterator[PlotCard]:
-        for panel in self._panels:
-            yield from panel.cards()
-
     def _open_folder(self) -> None:
         folder = self._run.status.record_folder
         if folder is not None:
@@ -601,7 +617,7 @@ class ReviewPage(Rearranged, Page):
         self._place.remember(folder)
         if export in (Export.PLOTS, Export.ALL):
             try:
-                self._save_plots(solution, folder, stem)
+                self._save_plots(folder, stem)
             except FileError as error:
                 self.notice_raised.emit(worded(error.sentence))
                 return
@@ -619,11 +635,10 @@ class ReviewPage(Rearranged, Page):
         job.failed.connect(self.notice_raised)
         job.start()
 
-    def _save_plots(self, solution: Solution, folder: Path, stem: str) -> None:
+    def _save_plots(self, folder: Path, stem: str) -> None:
         for panel in self._panels:
-            if panel.value() is not solution:
-                panel.set_value(solution)
-            for card in panel.cards():
+            self._show_solution(panel.content())
+            for card in panel.content().cards():
                 card.save_beside(folder, stem)
 
     def _tell_saved(self, folder: Path) -> None:
@@ -631,6 +646,9 @@ class ReviewPage(Rearranged, Page):
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
+        images = self._images.content_so_far()
+        if images is not None:
+            images.forget_refused()
 
 
 def _step_of_file(reason: Sentence) -> str:

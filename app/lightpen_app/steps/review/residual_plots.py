@@ -8,11 +8,14 @@ from PySide6.QtWidgets import QGraphicsRectItem, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen_app.look.theme import colors_of
+from lightpen_app.look.quantities import number_text
+from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.plots import Axes, Plot
 
 MANY = 400  # arrows; more are told by their means
 N_CELLS = 20  # across, of which each shows the mean of its arrows
+LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
+LIMIT_GRIP = 0.98  # of the width, where it has a grip
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
 
 
@@ -20,30 +23,45 @@ class MisfitPlot(Plot):
     """The misfit of each image over its number; a click chooses an image.
 
     Images that do not take part are crosses. Where they are far off, they are drawn at
-    the upper rim, so that the others can still be told apart.
+    the upper rim, so that the others can still be told apart. A line above those that
+    take part can be drawn down to the worse half of them, to take them out.
 
     Signals
     -------
     number_chosen(int)
         Of the image that was clicked.
+    limit_set(list of int)
+        Numbers of the images above which the line was left.
     """
 
     number_chosen = Signal(int)
+    limit_set = Signal(list)
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         self._used: pg.ScatterPlotItem | None = None
         super().__init__(axes, parent)
         self._places: dict[int, tuple[float, float]] = {}
         self._number: int | None = None
+        self._in_use: dict[int, tuple[float, float]] = {}
+        self._limit_words = ("", "")
 
         # Widgets
         self._used = pg.ScatterPlotItem(pxMode=True, size=5)
         self._out = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
         self._chosen = pg.ScatterPlotItem(pxMode=True, size=15, symbol="o")
-        for item in (self._chosen, self._used, self._out):
+        self._above = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
+        self._limit = pg.InfiniteLine(
+            angle=0, movable=True, label="", labelOpts={"position": 0.5}
+        )
+        self._limit.label.setFont(font(TextSize.SMALL))
+        self._limit.addMarker("<|>", LIMIT_GRIP, 2 * GRID)
+        self._limit.hide()
+        for item in (self._chosen, self._used, self._out, self._above, self._limit):
             self._item.addItem(item)
 
         # Connections
+        self._limit.sigPositionChanged.connect(self._on_limit_moved)
+        self._limit.sigPositionChangeFinished.connect(self._on_limit_left)
         self._used.sigClicked.connect(self._on_clicked)
         self._out.sigClicked.connect(self._on_clicked)
 
@@ -65,8 +83,10 @@ class MisfitPlot(Plot):
             "misfit_px": misfits,
             "used": used.astype(np.float64),
         }
+        self._in_use = {n: self._places[n] for n in numbers[used].tolist()}
         self._fit(x, np.append(heights, 1.1 * heights.max(initial=0.0)), y_zero=True)
         self.set_number(self._number)
+        self._rest_limit(heights[used])
 
     def number(self) -> int | None:
         """Return the number of the image that is marked."""
@@ -79,19 +99,41 @@ class MisfitPlot(Plot):
         points = [] if place is None else [place]
         self._chosen.setData(pos=np.array(points).reshape(-1, 2))
 
+    def set_limit_words(self, at_rest: str, above: str) -> None:
+        """Change what the line says; ``above`` has fields for a count and for px."""
+        self._limit_words = at_rest, above
+        self._on_limit_moved()
+
+    def set_limit_movable(self, movable: bool) -> None:
+        """Let images be taken out by the line, or not."""
+        self._limit.setMovable(movable)
+        self._limit.setVisible(movable and bool(self._in_use))
+
+    def limit_pixel(self) -> QPoint:
+        """Return where the line can be gripped, in px of `canvas`."""
+        left, right = self.ranges()[0]
+        return self._pixel(left + LIMIT_GRIP * (right - left), self._limit.value())
+
     def place_of(self, number: int) -> tuple[float, float]:
         """Return x and y at which an image is drawn."""
         return self._places[number]
 
     def pixel_of(self, number: int) -> QPoint:
         """Return where an image is drawn, in px of `canvas`."""
-        scene = self._item.vb.mapViewToScene(QPointF(*self._places[number]))
-        return QPoint(self._graphics.mapFromScene(scene))
+        return self._pixel(*self._places[number])
 
     def canvas(self) -> QWidget:
         """Return the widget on which dots are clicked."""
         canvas: QWidget = self._graphics.viewport()
         return canvas
+
+    @override
+    def png(self) -> bytes:
+        was_visible = self._limit.isVisible()
+        self._limit.hide()  # it is there to be drawn, not to be looked at
+        picture = super().png()
+        self._limit.setVisible(was_visible)
+        return picture
 
     @override
     def _restyle(self) -> None:
@@ -105,6 +147,40 @@ class MisfitPlot(Plot):
         self._out.setBrush(pg.mkBrush(None))
         self._chosen.setPen(pg.mkPen(colors.text, width=2))
         self._chosen.setBrush(pg.mkBrush(None))
+        self._above.setPen(pg.mkPen(colors.warn, width=2))
+        self._limit.setPen(pg.mkPen(colors.warn, width=2))
+        self._limit.setHoverPen(pg.mkPen(colors.text, width=2))
+        self._limit.label.setColor(colors.warn)
+
+    def _pixel(self, x: float, y: float) -> QPoint:
+        scene = self._item.vb.mapViewToScene(QPointF(x, y))
+        return QPoint(self._graphics.mapFromScene(scene))
+
+    def _rest_limit(self, heights: FloatArray) -> None:
+        """Put the line above misfits (N,), from where it can be drawn to their half."""
+        if len(heights):
+            rest = LIMIT_REST * float(heights.max())
+            self._limit.setBounds((float(np.median(heights)), rest))
+            self._limit.setValue(rest)
+        self.set_limit_movable(self._limit.movable)
+        self._on_limit_moved()
+
+    def _numbers_above(self) -> list[int]:
+        limit = self._limit.value()
+        return [number for number, (_, y) in self._in_use.items() if y > limit]
+
+    def _on_limit_moved(self, _line: object = None) -> None:
+        numbers = self._numbers_above()
+        places = [self._in_use[number] for number in numbers]
+        self._above.setData(pos=np.array(places).reshape(-1, 2))
+        at_rest, above = self._limit_words
+        words = above.format(len(numbers), number_text(self._limit.value(), 3))
+        self._limit.label.setFormat(words if numbers else at_rest)
+
+    def _on_limit_left(self, _line: object = None) -> None:
+        numbers = self._numbers_above()
+        if numbers:
+            self.limit_set.emit(numbers)
 
     def _on_clicked(
         self, _plot: object, points: "list[pg.SpotItem]", _event: object

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QGridLayout,
     QGroupBox,
@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 from lightpen.arrays import FloatArray
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
+from lightpen.swing.preparation import Lack
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.start.point_field import PointField
 from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
@@ -37,6 +38,8 @@ class NamesForm(Translated, QWidget):
         A field other than the station is finished.
     station_changed(str)
         The name of the station is finished, or chosen from the list.
+    station_entered()
+        It was finished by the Enter key.
     nominal_tip_changed()
         The nominal centre of the tip is another one.
     """
@@ -44,6 +47,7 @@ class NamesForm(Translated, QWidget):
     value_edited = Signal()
     value_changed = Signal()
     station_changed = Signal(str)
+    station_entered = Signal()
     nominal_tip_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -85,6 +89,7 @@ class NamesForm(Translated, QWidget):
         # Connections
         self._station.value_edited.connect(self.value_edited)
         self._station.value_changed.connect(self.station_changed)
+        self._station.entered.connect(self.station_entered)
         for edit in self._edits:
             edit.textEdited.connect(self.value_edited)
             edit.editingFinished.connect(self.value_changed)
@@ -136,6 +141,17 @@ class NamesForm(Translated, QWidget):
     def set_tip_of_file(self, point: FloatArray | None) -> None:
         """Show the nominal centre that the LED file has."""
         self._nominal_tip.set_point_of_file(point)
+
+    def focus_lack(self, lack: Lack) -> None:
+        """Put the focus on the field of a name that is missing."""
+        fields: dict[Lack, QWidget] = {
+            Lack.STATION: self._station,
+            Lack.OPERATOR: self._operator,
+            Lack.PEN: self._pen,
+            Lack.TIP: self._tip,
+            Lack.CONE: self._cone,
+        }
+        fields[lack].setFocus(Qt.FocusReason.OtherFocusReason)
 
     def settle(self) -> None:
         """Take over the numbers that are being typed."""

@@ -33,12 +33,13 @@ from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.job import Job, Report
-from lightpen_app.work.workbench import Workbench
+from lightpen_app.work.workbench import TRIAL, Workbench
 
 T = TypeVar("T")
 
@@ -65,6 +66,7 @@ class StartPage(Rearranged, Page):
         self._work: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
+        self._is_trying = False
 
         # Widgets: the order of making them is the order of the Tab key
         self._names = NamesForm()
@@ -74,6 +76,7 @@ class StartPage(Rearranged, Page):
         self._last = LastResultPanel(workbench.around.now)
         self._sound_test = SoundTest(sounds)
         self._folder = DataFolderPanel(workbench.folder)
+        self._newcomer = NewcomerPanel()
         self._typing = QTimer(self)
         self._typing.setSingleShot(True)
         self._typing.setInterval(TYPING_PAUSE_MS)
@@ -92,6 +95,8 @@ class StartPage(Rearranged, Page):
         right.addWidget(self._last)
         right.addWidget(self._sound_test)
         right.addWidget(self._folder)
+        is_known = bool(workbench.stations())
+        right.insertWidget(right.count() if is_known else 0, self._newcomer)
         right.addStretch(1)
         content = QWidget()
         self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
@@ -110,6 +115,7 @@ class StartPage(Rearranged, Page):
         self._names.value_edited.connect(self._on_edited)
         self._names.value_changed.connect(self._take_names)
         self._names.station_changed.connect(self._on_station_changed)
+        self._names.station_entered.connect(self.show_lack)
         self._names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
         self._limits.value_changed.connect(self._on_limits_changed)
         self._assumed.value_changed.connect(self._on_assumed_changed)
@@ -118,6 +124,7 @@ class StartPage(Rearranged, Page):
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
         self._interrupted.search_requested.connect(self._search_interrupted)
+        self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.take_back_requested.connect(self._on_take_back_requested)
         workbench.others_counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
@@ -152,6 +159,12 @@ class StartPage(Rearranged, Page):
     def run_main_action(self) -> None:
         self._settle()
         super().run_main_action()
+
+    @override
+    def show_lack(self) -> None:
+        lacks = self._typed().start_lacks()
+        if lacks:
+            self._names.focus_lack(lacks[0])
 
     @override
     def entered(self) -> None:
@@ -257,6 +270,7 @@ class StartPage(Rearranged, Page):
         before, now = self._shown, self._workbench.preparation
         self._shown = now
         self._show_changes(before, now)
+        self._go_on_trying()
         if _key(now) != self._looked_up:
             self._look_up_last()
         self.changed.emit()
@@ -306,6 +320,21 @@ class StartPage(Rearranged, Page):
 
     def _on_lookup_crashed(self) -> None:
         self._on_lookup_failed(self.tr("The last calibration cannot be shown."))
+
+    # A trial with the simulated pen
+
+    def _on_trial_requested(self) -> None:
+        self._is_trying = True
+        self._workbench.try_out()
+
+    def _go_on_trying(self) -> None:
+        """Show the swing of a trial once simulated images and files are there."""
+        now = self._workbench.preparation
+        if now.names != TRIAL:
+            self._is_trying = False
+        if self._is_trying and not now.lacks():
+            self._is_trying = False
+            self.step_requested.emit("swing")
 
     # Interrupted swings
 
@@ -413,6 +442,9 @@ class StartPage(Rearranged, Page):
 
     def _on_run_changed(self) -> None:
         status = self._workbench.run.status
+        self._newcomer.set_why_not(
+            self.tr("A swing is under way.") if status.state is not None else ""
+        )
         if status.taken_back is not self._taken_back:
             self._taken_back = status.taken_back
             self._look_up_last()

@@ -22,10 +22,13 @@ class StationField(QComboBox):
         The name that is being typed; it may be unfinished.
     value_changed(str)
         The name is finished, or chosen from the list.
+    entered()
+        It was finished by the Enter key.
     """
 
     value_edited = Signal(str)
     value_changed = Signal(str)
+    entered = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -42,6 +45,7 @@ class StationField(QComboBox):
         # Connections
         self._edit.textEdited.connect(self.value_edited)
         self._edit.editingFinished.connect(self._on_finished)
+        self._edit.entered.connect(self.entered)
         self.activated.connect(self._on_finished)
 
     def value(self) -> str:
@@ -87,9 +91,12 @@ class StationField(QComboBox):
 class _NameEdit(QLineEdit):
     """A line whose Enter key takes over what was typed, and else does nothing."""
 
+    entered = Signal()
+
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         is_typed = self.isModified()
         super().keyPressEvent(event)
         if is_typed and event.key() in ENTER_KEYS:
             event.accept()  # the window would press its main button, too soon
+            self.entered.emit()

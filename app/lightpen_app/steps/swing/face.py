@@ -17,12 +17,13 @@ from typing_extensions import override
 from lightpen.arrays import Image
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
-from lightpen_app.steps.swing.pen_in_space import PenInSpace, PenStand
 from lightpen_app.steps.swing.plots_panel import SwingPlots
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView, Marker
+from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
+from lightpen_app.widgets.pen_in_space import PenInSpace, PenStand
 from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
@@ -74,7 +75,7 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._pen = PenInSpace()
         self._image = ImageView()
         self._image.setMinimumWidth(LEAST_IMAGE)
-        self._plots = SwingPlots()
+        self._plots = Late(SwingPlots)
 
         # Layout
         head = QHBoxLayout()
@@ -163,7 +164,7 @@ class SwingFace(Rearranged, Translated, QWidget):
 
     def plots(self) -> SwingPlots:
         """Return the plots."""
-        return self._plots
+        return self._plots.content()
 
     def _retranslate(self) -> None:
         """Set the texts anew."""

@@ -30,8 +30,8 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.swing.pen_in_space import PenStand
 from lightpen_app.widgets.operator_view import OperatorValue
+from lightpen_app.widgets.pen_in_space import PenStand
 from lightpen_app.widgets.posture_dial import DialValue
 from lightpen_app.widgets.sign_label import Remark
 from lightpen_app.widgets.state_banner import State

@@ -57,7 +57,7 @@ from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.widgets.image_view import Marker
+from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
@@ -713,6 +713,29 @@ def test_a_mask_is_cleared(
     seen.until(lambda: len(others(seen)) == 2)
     assert crossed(seen) == []
     assert not seen.named("Clear the mask").isEnabled()
+
+
+def test_a_mask_is_clicked_and_drawn_on_the_image(
+    seen: "Seen", workbench: Workbench, small_scene: Scene
+) -> None:
+    plugged(workbench, small_scene, *LAMPS)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs, other spots: 2")
+    view = seen.child(ImageView)
+    first, second = (view.place_of(*lamp.center).toPoint() for lamp in LAMPS)
+
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=first)
+    assert len(workbench.preparation.mask) == 0  # so far a click means nothing
+    seen.click("Draw the mask on the image")
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=first)
+    seen.until(lambda: len(others(seen)) == 1)
+    QTest.mousePress(view, Qt.MouseButton.LeftButton, pos=second)
+    QTest.mouseRelease(view, Qt.MouseButton.LeftButton, pos=second + QPoint(12, 0))
+    seen.until(lambda: not others(seen) and len(crossed(seen)) == 2)
+
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=second)
+    seen.until(lambda: len(others(seen)) == 1)
+    assert len(workbench.preparation.mask) == 1
 
 
 def test_a_mask_is_of_one_source_only(

@@ -88,6 +88,10 @@ def cell(seen: "Seen", led: int, column: int) -> str:
     return str(led_table(seen).model().index(led - 1, column).data())
 
 
+def cell_of_file(led: int, column: int) -> str:
+    return f"{LEDS[led - 1, column - 1]:g}"
+
+
 def told_of(seen: "Seen", led: int) -> str:
     """Return what the table says of an LED."""
     index = led_table(seen).model().index(led - 1, 0)
@@ -345,11 +349,10 @@ def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
     assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
     assert not seen.named("Save as...").isEnabled()
 
-    for led in (5, 8):
-        for column in (X, Y):
-            type_cell(seen, led, column, f"{LEDS[led - 1, column - 1]:g}")
+    seen.click("Exchange 5 and 8")
 
     assert "exchanged" not in seen.words
+    assert not seen.shows("Exchange 5 and 8")
     assert why_not(seen) == "Save the LED table first: the record needs its file."
     save_as(seen, tmp_path / "mended.csv")
     assert in_use(workbench).path == tmp_path / "mended.csv"
@@ -692,10 +695,73 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     assert live.child(PenView).value().marked == {7}
     assert live.child(StateBanner).value().tone is Tone.WARN
 
-    type_cell(live, 7, Y, "160")
+    live.click("Use the measured place")
 
     live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    assert float(cell(live, 7, Y)) == pytest.approx(160, abs=0.05)
     assert told_of(live, 7) == ""
+    assert not live.shows("Use the measured place")
+
+
+def test_an_exchanged_coordinate_is_put_back_by_a_click(live: "Seen") -> None:
+    live.wait("10 of 10 LEDs")
+    second, fourth = (cell(live, led, Y) for led in (2, 4))
+    sixth = cell(live, 6, Y)
+    type_cell(live, 2, Y, sixth)
+    type_cell(live, 6, Y, second)
+    live.wait("of LEDs 2 and 6 are exchanged in the table.")
+
+    live.click("Exchange 2 and 6")
+
+    live.wait("Every LED is within 0.1 mm of its place in the table, in")
+    assert [cell(live, led, Y) for led in (2, 4, 6)] == [second, fourth, sixth]
+    assert not live.page.unsaved()
+
+
+def test_changes_of_the_table_are_undone_and_redone_by_keys(seen: "Seen") -> None:
+    assert not seen.named("Undo").isEnabled()
+    type_cell(seen, 7, Y, "161")
+    type_cell(seen, 8, Y, "162")
+    control = Qt.KeyboardModifier.ControlModifier
+
+    QTest.keyClick(led_table(seen), Qt.Key.Key_Z, control)
+    assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", cell_of_file(8, Y))
+    seen.click("Undo")
+    assert cell(seen, 7, Y) == cell_of_file(7, Y)
+    assert not seen.named("Undo").isEnabled()
+    assert not seen.page.unsaved()
+
+    shift = Qt.KeyboardModifier.ShiftModifier
+    QTest.keyClick(led_table(seen), Qt.Key.Key_Z, control | shift)
+    seen.click("Redo")
+    assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", "162")
+
+
+def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None:
+    tip = seen.named("Nominal centre of the tip, x, mm")
+    QTest.keyClicks(tip, "12.5")
+    seen.click("Undo")
+    assert not seen.page.unsaved()
+
+
+def test_discarded_changes_come_back(seen: "Seen") -> None:
+    type_cell(seen, 7, Y, "161")
+    seen.click("Discard")
+    seen.click("Discard them")
+
+    seen.click("Undo")
+
+    assert cell(seen, 7, Y) == "161"
+
+
+def test_another_file_has_nothing_to_undo(seen: "Seen", tmp_path: Path) -> None:
+    seen.click("Add")
+    seen.click("Undo")
+    other = LEDS + np.array([0.0, 0.5, 0.0])
+    open_file(seen, write_table(tmp_path / "other.csv", other))
+
+    assert not seen.named("Undo").isEnabled()
+    assert not seen.named("Redo").isEnabled()
 
 
 def test_the_match_follows_the_table_before_it_is_saved(

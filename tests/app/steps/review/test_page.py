@@ -12,7 +12,8 @@ from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, Qt, QThreadPool
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool
+from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -69,6 +70,7 @@ from lightpen_app.work.workbench import Workbench
 
 W = TypeVar("W", bound=QWidget)
 
+LEFT = Qt.MouseButton.LeftButton
 N_IMAGES = 20
 N_PLOTS = 9
 DAMAGED = 7
@@ -214,6 +216,20 @@ def give_reason(page: ReviewPage, reason: str) -> None:
 
 def click(page: ReviewPage, text: str) -> None:
     QTest.mouseClick(button(page, text), Qt.MouseButton.LeftButton)
+
+
+def drag(canvas: QWidget, start: QPoint, end: QPoint) -> None:
+    """Draw the mouse over a plot with its button held down."""
+    QTest.mousePress(canvas, LEFT, pos=start)
+    for share in (0.25, 0.5, 0.75, 1.0):
+        place = QPointF(start) + QPointF(end - start) * share
+        none = Qt.KeyboardModifier.NoModifier
+        seen_at = QPointF(canvas.mapToGlobal(place))
+        # That of QTest says of no button that it is held.
+        kind = QEvent.Type.MouseMove
+        move = QMouseEvent(kind, place, seen_at, Qt.MouseButton.NoButton, LEFT, none)
+        QApplication.sendEvent(canvas, move)
+    QTest.mouseRelease(canvas, LEFT, pos=end)
 
 
 def look_at_all_tabs(page: ReviewPage) -> None:
@@ -806,6 +822,60 @@ def test_keys_take_several_images_out_and_put_them_back(
     await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
 
 
+def test_what_was_taken_out_or_put_back_is_undone_and_redone(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    control, shift = (
+        Qt.KeyboardModifier.ControlModifier,
+        Qt.KeyboardModifier.ShiftModifier,
+    )
+    assert not button(page, "Undo").isEnabled()
+    click(page, "Take out")
+    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
+
+    QTest.keyClick(table(page), Qt.Key.Key_Z, control)
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+    assert not button(page, "Undo").isEnabled()
+
+    QTest.keyClick(table(page), Qt.Key.Key_Z, control | shift)
+    await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
+
+
+def test_the_line_over_the_misfits_takes_out_what_it_is_drawn_below(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    plot = the(page, MisfitPlot)
+    heights = sorted(plot.pixel_of(n).y() for n in range(1, N_IMAGES + 1))
+    wanted = (heights[2] + heights[3]) // 2
+    grip = plot.limit_pixel()
+
+    drag(plot.canvas(), grip, QPoint(grip.x(), wanted))
+
+    await_count(qtbot, page, f"{N_IMAGES - 3} of {N_IMAGES} used; 3 taken out")
+    click(page, "Undo")
+    await_count(qtbot, page, f"{N_IMAGES} of {N_IMAGES} used")
+
+
+def test_no_line_is_saved_with_the_misfits(page: ReviewPage) -> None:
+    plot = the(page, MisfitPlot)
+    with_line = plot.png()
+
+    plot.set_limit_movable(False)
+
+    assert plot.png() == with_line
+
+
+def test_the_line_leaves_the_better_half_of_the_images(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    plot = the(page, MisfitPlot)
+
+    drag(plot.canvas(), plot.limit_pixel(), plot.limit_pixel() + QPoint(0, 500))
+
+    half = N_IMAGES // 2
+    await_count(qtbot, page, f"{half} of {N_IMAGES} used; {half} taken out")
+
+
 def test_a_slipped_image_of_the_swing_may_be_put_back(bed: Bed) -> None:
     slip(bed.swing)
     bed.solve()
@@ -843,6 +913,7 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
     assert count(page) == f"{N_IMAGES} of {N_IMAGES} used"
     np.testing.assert_array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {}
+    assert not button(page, "Undo").isEnabled()
 
 
 def test_a_computation_shows_its_progress_and_can_be_cancelled(

@@ -8,7 +8,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.model.posture import Posture
 from lightpen.simulator.swings import paper_pen
-from lightpen_app.steps.swing.pen_in_space import (
+from lightpen_app.widgets.pen_in_space import (
     PenInSpace,
     PenStand,
     seen_from_behind,

@@ -1,0 +1,100 @@
+"""Undo and redo: two buttons, and the keys that the desktop has for them."""
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QKeySequence, QShortcut, QUndoCommand, QUndoStack
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+
+class UndoableStep(QUndoCommand):
+    """Something that was done, and how it is undone."""
+
+    def __init__(self, do: Callable[[], object], undo: Callable[[], object]) -> None:
+        super().__init__()
+        self._do, self._undo = do, undo
+
+    @override
+    def redo(self) -> None:
+        self._do()
+
+    @override
+    def undo(self) -> None:
+        self._undo()
+
+
+class UndoButtons(Translated, QWidget):
+    """Takes back the last step of a stack, and does it again.
+
+    Parameters
+    ----------
+    scope : QWidget
+        While it is seen the keys do the same, wherever the focus is.
+    """
+
+    def __init__(self, stack: QUndoStack, scope: QWidget) -> None:
+        super().__init__()
+        self._can_undo, self._can_redo = stack.canUndo(), stack.canRedo()
+        self._why_locked = ""
+
+        # Widgets
+        self._undo = PushButton(0)
+        self._redo = PushButton(0)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._undo, 1)
+        layout.addWidget(self._redo, 1)
+
+        # Connections
+        for button, standard, act in (
+            (self._undo, QKeySequence.StandardKey.Undo, stack.undo),
+            (self._redo, QKeySequence.StandardKey.Redo, stack.redo),
+        ):
+            button.clicked.connect(act)
+            keys = QShortcut(scope)
+            keys.setKeys(standard)
+            keys.activated.connect(button.click)
+        stack.canUndoChanged.connect(self._on_can_undo_changed)
+        stack.canRedoChanged.connect(self._on_can_redo_changed)
+
+        self._retranslate()
+
+    def set_locked(self, why: str) -> None:
+        """Let nothing be undone or redone, for a reason, or let it."""
+        self._why_locked = why
+        self._refresh()
+
+    # A stack that is being deleted still tells these: it is not to be asked then.
+
+    def _on_can_undo_changed(self, can_undo: bool) -> None:
+        self._can_undo = can_undo
+        self._refresh()
+
+    def _on_can_redo_changed(self, can_redo: bool) -> None:
+        self._can_redo = can_redo
+        self._refresh()
+
+    def _refresh(self) -> None:
+        nothing = "" if self._can_undo else self.tr("Nothing to undo.")
+        told = _written(QKeySequence.StandardKey.Undo)
+        self._undo.set_why_not(self._why_locked or nothing, told)
+        nothing = "" if self._can_redo else self.tr("Nothing to redo.")
+        told = _written(QKeySequence.StandardKey.Redo)
+        self._redo.set_why_not(self._why_locked or nothing, told)
+
+    @override
+    def _retranslate(self) -> None:
+        self._undo.setText(self.tr("Undo"))
+        self._redo.setText(self.tr("Redo"))
+        self._refresh()
+
+
+def _written(keys: QKeySequence.StandardKey) -> str:
+    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)
