@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from lightpen.commands.arguments import above_zero, add_json, finite
 from lightpen.commands.console import (
     are_same,
@@ -168,7 +170,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
         observed = observe_board(source, board, _part(report, 0.0, 0.7))
         views = observed.views
         _require_known(options.leave_out, source.names)
-        kept = [name not in options.leave_out for name in views.names]
+        kept = ~np.isin(views.names, options.leave_out)
         calibration = calibrate_camera(
             views.chosen(kept),
             tolerances,

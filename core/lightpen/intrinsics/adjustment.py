@@ -108,7 +108,7 @@ class Adjustment:
         squares = np.square(self.residuals).sum(axis=-1)
         counts = np.isfinite(squares).sum(axis=-1)
         sums = np.nansum(squares, axis=-1)
-        return np.sqrt(np.where(counts > 0, sums, np.nan) / np.maximum(counts, 1))
+        return np.asarray(np.sqrt(sums / np.where(counts > 0, counts, np.nan)))
 
     def of_intrinsics(self, camera: int) -> slice:
         """Return where the intrinsics of a camera stand among the unknowns."""
@@ -326,7 +326,7 @@ def _eliminated(system: _System) -> tuple[FloatArray, FloatArray]:
 
 
 def _diagonals(matrices: FloatArray) -> FloatArray:
-    return np.einsum("vij,ij->vij", matrices, np.eye(matrices.shape[-1]))
+    return np.asarray(matrices * np.eye(matrices.shape[-1]))
 
 
 def _cost(
@@ -402,7 +402,8 @@ def _modelled(
 
 def _normals(state: State) -> FloatArray:
     """Return the normals of the board, (V, C, 3), in the cameras."""
-    return np.einsum("cij,vj->vci", state.rotations, state.poses.rotations[..., 2])
+    normals = state.poses.rotations[..., 2]
+    return np.asarray(np.einsum("cij,vj->vci", state.rotations, normals))
 
 
 def _residuals(views: Views, state: State) -> FloatArray:

@@ -38,7 +38,6 @@ FORMS = (
     "charuco-legacy:12x9:20:15:DICT_5X5_100, markers:5x7:30:6:DICT_6X6_250, "
     "circles:9x7:20:10 or asymmetric-circles:4x11:20:10"
 )
-# Beside columns and rows: lengths, and whether a dictionary follows.
 
 
 class BoardKind(StrEnum):
@@ -131,7 +130,7 @@ class Board:
 
     @property
     def _middle(self) -> FloatArray:
-        return 0.5 * (self._grid.min(axis=0) + self._grid.max(axis=0))
+        return np.asarray(0.5 * (self._grid.min(axis=0) + self._grid.max(axis=0)))
 
     @property
     def _grid(self) -> FloatArray:
@@ -176,10 +175,11 @@ def parse_board(text: str) -> Board:
     if len(lengths) != n_lengths or len(words) != (1 if kind.has_markers else 0):
         raise _no_board(text)
     board = Board(
-        kind,
-        int(counts[1]),
-        int(counts[2]),
-        *lengths,
+        kind=kind,
+        columns=int(counts[1]),
+        rows=int(counts[2]),
+        pitch=lengths[0],
+        detail=lengths[1] if n_lengths > 1 else 0.0,
         dictionary=words[0].upper() if words else "",
     )
     _check(board, text)

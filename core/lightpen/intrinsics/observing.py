@@ -84,7 +84,7 @@ def observe_board_of_rig(
     looks: list[list[_Look]] = []
     n_done = 0
     for source in sources:
-        own = []
+        own: list[_Look] = []
         for look in _looks(source, board):
             if own and look.size != own[0].size:
                 raise _other_size(own[0], look)
@@ -106,7 +106,7 @@ def observe_board_of_rig(
         names.append(looks[c][i].name)
     sizes = tuple(own[0].size for own in looks)
     views = Views(board, tuple(names), pixels, sizes)
-    is_seen = views.seen.any(axis=(1, 2))
+    is_seen = np.any(views.found, axis=1)
     unseen = tuple(n for n, seen in zip(names, is_seen, strict=True) if not seen)
     return ObservedBoard(views.chosen(is_seen), unseen)
 
@@ -151,7 +151,7 @@ def _other_size(first: _Look, other: _Look) -> FileError:
 def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     """Return what the images show in place of the board."""
     images = [load() for load in islice(source.open(), EXAMINED)]
-    if _is_found([image[:, ::-1] for image in images], board):
+    if _is_found([np.array(image[:, ::-1]) for image in images], board):
         return sentence(
             "intrinsics.mirrored",
             "The images show the board {board} mirrored. Switch off the mirroring of "
@@ -201,6 +201,4 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
 
 
 def _is_found(images: Sequence[Image], board: Board) -> bool:
-    return any(
-        find_points(np.ascontiguousarray(image), board) is not None for image in images
-    )
+    return any(find_points(image, board) is not None for image in images)

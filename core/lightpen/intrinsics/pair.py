@@ -169,7 +169,7 @@ def calibrate_pair(
             None if camera.covariance is None else stated_information(camera.covariance)
             for camera in cameras
         )
-    both = views.seen.any(axis=2).all(axis=1)
+    both = np.all(views.found, axis=1)
     if both.sum() < MIN_PAIRS:
         raise CalibrationError(
             sentence(
@@ -194,7 +194,7 @@ def calibrate_pair(
     correlation = fitted.correlation
     correlation = correlation if correlation > SIGNIFICANT else 1.0
     rig = _rig(fitted, names, tolerances, correlation)
-    both = views.seen.any(axis=2).all(axis=1)
+    both = np.all(views.found, axis=1)
     lag = _lag(views, fitted, both, interval_ms)
     return PairCalibration(
         rig=rig,
@@ -257,7 +257,7 @@ def _ordered(
     translations = np.stack([each.translations[both] for each in places])
     alike = _alike(rotations, translations)
     votes = alike.any(axis=2).sum(axis=-1)
-    order, view = np.unravel_index(int(np.argmax(votes)), votes.shape)
+    order, view = divmod(int(np.argmax(votes)), votes.shape[1])
     if votes[order, view] <= both.sum() / 2:
         raise CalibrationError(
             sentence(

@@ -64,9 +64,22 @@ def find_points(
         points = _marked(grey, board)
     else:
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
+        points = None if points is None else _from_front(points, board)
     if points is None or np.isfinite(points[:, 0]).sum() < FEWEST:
         return None
     return _refined(image, points, board)
+
+
+def _from_front(points: FloatArray, board: Board) -> FloatArray:
+    """Return points that were numbered in mirrored rows as they are seen from ahead."""
+    rows = np.arange(board.n_points).reshape(board.rows, board.columns)
+    corners = points[rows[[0, 0, -1, -1], [0, -1, -1, 0]]]
+    x, y = (corners - corners.mean(axis=0)).T
+    turns = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    if turns >= 0:
+        return points
+    is_set_off = board.kind is BoardKind.ASYMMETRIC_CIRCLES
+    return points[(rows[::-1] if is_set_off else rows[:, ::-1]).ravel()]
 
 
 def count_corners(image: Image) -> tuple[int, int] | None:
@@ -152,7 +165,8 @@ def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
     """Return corners placed by the gradients round them."""
     reach = REFINED * _least_distance(points, board)
     if board.kind.has_markers and board.kind is not BoardKind.MARKERS:
-        reach = min(reach, reach * (1 - board.detail / board.pitch) / REFINED)
+        to_marker = 0.5 * (1 - board.detail / board.pitch)
+        reach = min(reach, reach * to_marker / REFINED)
     half = int(np.clip(round(reach), MIN_REFINED, MAX_REFINED))
     height, width = image.shape
     inside = np.isfinite(points[:, 0])
@@ -196,17 +210,17 @@ def _circles(
                 seen, (board.columns, board.rows), None, way, _blobs(small.size)
             )
             if found:
-                rough = _whole(centers, scale)
+                rough = _from_front(_whole(centers, scale), board)
                 return _rim_centers(image, rough, board, is_dark=is_dark)
     return None
 
 
 def _blobs(n_pixels: int) -> cv2.SimpleBlobDetector:
-    parameters = cv2.SimpleBlobDetector_Params()
+    parameters = cv2.SimpleBlobDetector.Params()
     parameters.minArea = 12.0
     parameters.maxArea = n_pixels / 50
     parameters.minDistBetweenBlobs = 3.0
-    return cv2.SimpleBlobDetector_create(parameters)
+    return cv2.SimpleBlobDetector.create(parameters)
 
 
 def _rim_centers(

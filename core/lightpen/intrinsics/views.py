@@ -55,7 +55,12 @@ class Views:
     @property
     def seen(self) -> BoolArray:
         """Which points were seen, (V, C, N)."""
-        return np.isfinite(self.pixels).all(axis=-1)
+        return np.asarray(np.isfinite(self.pixels).all(axis=-1))
+
+    @property
+    def found(self) -> BoolArray:
+        """Which views each camera saw the board in, (V, C)."""
+        return np.asarray(self.seen.any(axis=-1))
 
     def chosen(self, which: BoolArray) -> "Views":
         """Return some of the views."""
@@ -70,4 +75,4 @@ class Views:
             *(self.board, self.names, self.pixels[:, camera : camera + 1]),
             (self.image_sizes[camera],),
         )
-        return own.chosen(own.seen.any(axis=(1, 2)))
+        return own.chosen(own.found[:, 0])

@@ -1,0 +1,39 @@
+"""Where an operator holds a board before a camera."""
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.start import BoardPoses
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import rotation_from_vector
+
+MAX_TILT = np.radians(35.0)
+FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the board
+ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
+MARGIN = 0.03  # of the image, that stays free of points
+MAX_TRIES = 100
+
+
+def simulate_board_poses(
+    camera: Camera, board: Board, n_views: int, rng: np.random.Generator
+) -> BoardPoses:
+    """Return poses in which the whole board is seen, in all parts of the image."""
+    size = np.array(camera.image_size)
+    longer = 2 * float(np.abs(board.points[:, :2]).max())
+    rotations: list[FloatArray] = []
+    translations: list[FloatArray] = []
+    for _ in range(MAX_TRIES * n_views):
+        if len(rotations) == n_views:
+            break
+        tilt = np.append(rng.uniform(-MAX_TILT, MAX_TILT, 2), 0.0)
+        roll = np.array([0.0, 0.0, rng.choice(ROLLS)])
+        R = rotation_from_vector(tilt) @ rotation_from_vector(roll)
+        depth = camera.fx * longer / (rng.uniform(*FILLED) * size.min())
+        place = camera.unproject(rng.uniform(0.2, 0.8, 2) * size)
+        t = depth * np.append(place, 1.0)
+        pixels = camera.project(board.outline @ R.T + t) / size
+        if np.all((pixels > MARGIN) & (pixels < 1 - MARGIN)):
+            rotations.append(R)
+            translations.append(t)
+    return BoardPoses(np.array(rotations), np.array(translations))
