@@ -20,6 +20,7 @@ from lightpen.intrinsics.calibration import calibrate_camera
 from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
 from lightpen.simulator.board_views import simulate_board_poses
 from lightpen.simulator.boards import expose_board, render_board
@@ -37,6 +38,15 @@ FOCAL_LIMIT, CENTER_LIMIT, RMS_LIMIT, N_VIEWS = 0.15, 0.4, 0.03, 24  # px
 N_TRIALS, N_POSES, N_CHOSEN = 240, 120, 16
 N_PARTS = 12
 CORNER_NOISE, LED_NOISE, N_IMAGES = 0.03, 0.03, 60  # px
+# All that enters the tip's U but the camera and the noise.
+NOTHING_ELSE = Assumptions(
+    scale=0.0,
+    warmth=0.0,
+    temperature=0.0,
+    diameter=0.0,
+    form_error=0.0,
+    center_bias=0.0,
+)
 NORMAL_95 = 1.959964
 COVERED = (93.0, 97.0)  # per cent
 CHANCE = 3.0  # per cent: two standard deviations of a share of 240 trials
@@ -129,7 +139,8 @@ def _rendered_deviations(part: int) -> FloatArray:
 
 def _tip_deviations(part: int) -> FloatArray:
     """Return errors of the tip by cameras calibrated so, likewise."""
-    truth, pen = replace(paper_camera(), covariance=None), paper_pen()
+    truth = replace(paper_camera(), covariance=None)
+    pen = replace(paper_pen(), scale_sigma=0.0, diameter_sigma=0.0, expansion_sigma=0.0)
     board = parse_board(SET_BOARD)
     deviations = []
     for trial in range(part, N_TRIALS, N_PARTS):
@@ -147,7 +158,7 @@ def _tip_deviations(part: int) -> FloatArray:
         )
         centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
         observations = observe_centers(centers, camera, pen)
-        solved = calibrate(camera, pen, observations)
+        solved = calibrate(camera, pen, observations, NOTHING_ELSE)
         sigmas = np.sqrt(np.diag(solved.budget.covariance)[:3])
         deviations.append((solved.joint.tip_pen - swing.tip_pen) / sigmas)
     return np.array(deviations)
