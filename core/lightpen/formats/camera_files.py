@@ -577,7 +577,7 @@ def _quality_lines(camera: Camera, tag: str = "") -> list[str]:
     if camera.calibrated_on is not None:
         lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
     if camera.serial:
-        lines.append(f"camera_serial: {json.dumps(camera.serial)}")
+        lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
     if camera.temperature_c is not None:
         lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
     return lines

@@ -36,7 +36,7 @@ CORNERS = 4  # of a marker
 FORMS = (
     "chessboard:11x8:20, charuco:12x9:20:15:DICT_5X5_100, "
     "charuco-legacy:12x9:20:15:DICT_5X5_100, markers:5x7:30:6:DICT_6X6_250, "
-    "circles:9x7:20:10 or asymmetric-circles:4x11:20:10"
+    "circles:9x7:20:10, asymmetric-circles:4x11:20:10"
 )
 
 

@@ -37,6 +37,7 @@ WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
 SIGMAS = 2.0  # of the mean gain
 OFF_POINT = 6.0  # robust standard deviations
 OFF_VIEW = 4.0  # times the median rms of the views
+FINEST = 1e-3  # px; exact points are off by rounding alone
 MOST_OFF = 0.2  # of the points
 WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
 LARGEST_FOCAL_SIGMA = 0.02  # relative
@@ -267,9 +268,9 @@ def _without_outliers(
         They are so many that it is the board which is another.
     """
     rms = fitted.view_rms[:, 0]
-    kept = rms <= OFF_VIEW * float(np.median(rms))
+    kept = rms <= OFF_VIEW * max(float(np.median(rms)), FINEST)
     distances = np.linalg.norm(fitted.residuals, axis=-1)
-    usual = MAD * float(np.nanmedian(np.abs(fitted.residuals)))
+    usual = max(MAD * float(np.nanmedian(np.abs(fitted.residuals))), FINEST)
     off = distances > OFF_POINT * usual
     pixels = np.where(off[..., None], np.nan, views.pixels)
     left = replace(views, pixels=pixels).chosen(kept)

@@ -30,6 +30,7 @@ REFINED = 0.4  # of the distance of neighbours: no other edge is that near
 MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
 REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
 FEWEST = 6  # points by which a pose is known, and that it is no other thing
+SPREAD = 0.3  # of a square: least standard deviation across
 SPOT_SPREAD = 0.25  # of the distance of neighbours, standard deviation of a circle
 OFF_SPOT = 0.35  # of the distance of neighbours: a rim farther off is another's
 QUICK = (
@@ -65,9 +66,19 @@ def find_points(
     else:
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
         points = None if points is None else _from_front(points, board)
-    if points is None or np.isfinite(points[:, 0]).sum() < FEWEST:
+    if points is None or not _is_spread(points, board):
         return None
-    return _refined(image, points, board)
+    refined = _refined(image, points, board)
+    return refined if _is_spread(refined, board) else None
+
+
+def _is_spread(points: FloatArray, board: Board) -> bool:
+    """Tell whether the points seen fix a pose: enough, and not in one row."""
+    seen = board.points[np.isfinite(points[:, 0]), :2]
+    if len(seen) < FEWEST:
+        return False
+    across = float(np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1])
+    return across > SPREAD * board.pitch * len(seen) ** 0.5
 
 
 def _from_front(points: FloatArray, board: Board) -> FloatArray:

@@ -23,7 +23,7 @@ def test_a_board_is_told_by_the_word_that_names_it(word: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("word", "n_points"), zip(WORDS, (88, 88, 77, 140, 63, 44), strict=True)
+    ("word", "n_points"), list(zip(WORDS, (88, 88, 77, 140, 63, 44), strict=True))
 )
 def test_a_board_has_as_many_points_as_are_found(word: str, n_points: int) -> None:
     board = parse_board(word)

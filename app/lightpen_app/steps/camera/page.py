@@ -413,6 +413,7 @@ class CameraPage(Rearranged, Page):
         self._stray.set_live(is_live)
         self._stray.set_has_operator(self._live.operator is not None)
         caps = self._live.caps if is_live else None
+        self._intrinsics.set_serial(self._live.serial if is_live else "")
         self._exposure.set_camera(caps, self._settings)
         self._more.set_camera(caps, self._settings)
 
