@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import add_json, add_pen_options, finite
+from lightpen.commands.arguments import add_json, add_pen_options, celsius
 from lightpen.commands.console import (
     printing,
     progress,
@@ -38,7 +38,7 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
     add_pen_options(parser)
     parser.add_argument(
-        "--temperature", type=finite, metavar="CELSIUS", help="at the station"
+        "--temperature", type=celsius, metavar="CELSIUS", help="at the station"
     )
     add_json(parser)
 

@@ -1,13 +1,14 @@
 """``lightpen intrinsics`` and ``lightpen extrinsics``: cameras by views of a board."""
 
 import argparse
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import above_zero, add_json, finite
+from lightpen.commands.arguments import above_zero, add_json, celsius
 from lightpen.commands.console import (
     are_same,
     printing,
@@ -151,7 +152,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
 def _add_temperature(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--temperature",
-        type=finite,
+        type=celsius,
         metavar="CELSIUS",
         help="at the camera, kept in its file",
     )
@@ -166,6 +167,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
     board, tolerances = parse_board(options.board), _tolerances(options)
     source = find_images(*options.images)
     require_other_file(options.json, *source.files, options.out)
+    _require_new_file(options.out, *source.files)
     with progress("Finding the board") as report:
         observed = observe_board(source, board, _part(report, 0.0, 0.7))
         views = observed.views
@@ -192,19 +194,12 @@ def _intrinsics(options: argparse.Namespace) -> None:
 def _extrinsics(options: argparse.Namespace) -> None:
     board, tolerances = parse_board(options.board), _tolerances(options)
     names = (options.names[0], options.names[1])
-    if names[0] == names[1]:
-        raise UsageError(
-            sentence(
-                "cli.same-names",
-                "Both cameras are called {name}. Give each a name of its own.",
-                name=names[0],
-            )
-        )
+    _require_names(names)
     sources = [find_images(options.left), find_images(options.right)]
     files = [file for source in sources for file in source.files]
     given = options.cameras or []
     require_other_file(options.json, *files, *given, options.out)
-    require_other_file(options.out, *files, *given)
+    _require_new_file(options.out, *files, *given)
     cameras = tuple(read_camera(file) for file in given)
     pairing = pair_images([source.names for source in sources], names)
     with progress("Finding the board") as report:
@@ -255,6 +250,34 @@ def _part(
     report: Callable[[float], None], begin: float, end: float
 ) -> Callable[[float], None]:
     return lambda fraction: report(begin + (end - begin) * fraction)
+
+
+def _require_names(names: tuple[str, str]) -> None:
+    """Refuse names that are alike, or that no file can have."""
+    are_plain = all(re.fullmatch(r"[\w.-]+", name) for name in names)
+    if names[0] == names[1] or not are_plain:
+        raise UsageError(
+            sentence(
+                "cli.camera-names",
+                "The cameras cannot be called {one} and {other}: two names of letters, "
+                "digits, dots and dashes are needed. Give each such a name of its own.",
+                one=printable(names[0]),
+                other=printable(names[1]),
+            )
+        )
+
+
+def _require_new_file(out: Path, *inputs: Path) -> None:
+    """Refuse to write over one of the files that it is made from."""
+    if any(are_same(path, out) for path in inputs):
+        raise UsageError(
+            sentence(
+                "cli.out-over-input",
+                "--out {out} would replace the input file of that name. Give another "
+                "name.",
+                out=printable(str(out)),
+            )
+        )
 
 
 def _require_known(left_out: list[str], names: tuple[str, ...]) -> None:

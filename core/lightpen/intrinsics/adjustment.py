@@ -352,7 +352,7 @@ def _away(state: State, origin: State) -> FloatArray:
         for one, other in zip(state.cameras, origin.cameras, strict=True)
     ]
     places = np.zeros(N_POSE * (len(state.cameras) - 1))
-    return np.concatenate([*intrinsics, places, state.shape])
+    return np.concatenate([*intrinsics, places, state.shape - origin.shape])
 
 
 def _moved(state: State, step: FloatArray, poses_step: FloatArray) -> State:
@@ -410,13 +410,12 @@ def _residuals(views: Views, state: State) -> FloatArray:
     _, points = _points_cam(views.board, state)
     normals = _normals(state)
     residuals = np.empty_like(views.pixels)
-    with np.errstate(all="ignore"):  # a step too far is not taken: its cost is NaN
+    with np.errstate(all="ignore"):  # a step too far is not taken
         for c, camera in enumerate(state.cameras):
             at = _modelled(camera, points[:, c], views.board, normals[:, c])
-            behind = points[:, c, :, 2] <= 0
-            residuals[:, c] = np.where(
-                behind[..., None], np.inf, views.pixels[:, c] - at
-            )
+            left = views.pixels[:, c] - at
+            is_far = (points[:, c, :, 2:] <= 0) | ~np.isfinite(left)
+            residuals[:, c] = np.where(is_far, np.inf, left)
     residuals[~views.seen] = np.nan
     return residuals
 

@@ -101,19 +101,23 @@ def cover(views: Views, poses: BoardPoses) -> BoardCoverage:
     poses : BoardPoses
         Of cam_from_board.
     """
-    width, height = views.image_sizes[0]
-    places = views.pixels[views.seen] / np.array([width, height])
-    at = np.floor(places * np.array([COLUMNS, ROWS])).astype(np.int64)
-    at = np.clip(at, 0, [COLUMNS - 1, ROWS - 1])
-    cells = np.zeros((ROWS, COLUMNS), dtype=np.int64)
-    np.add.at(cells, (at[:, 1], at[:, 0]), 1)
     normals = poses.rotations[..., 2]
     tilts = np.arccos(np.clip(np.abs(normals[:, 2]), 0, 1))
     # The board's z points away from the camera: it faces against it.
     facing = np.arctan2(-normals[:, 1], -normals[:, 0])
     side = np.round(facing / (np.pi / 2)).astype(np.int64) % 4
     tilted = np.bincount(side[tilts > TILTED], minlength=4)
-    return BoardCoverage(cells, _sizes(views), tilts, tilted)
+    return BoardCoverage(cells_of(views), _sizes(views), tilts, tilted)
+
+
+def cells_of(views: Views) -> IntArray:
+    """Return how many points of one camera lie in each part of the image, (6, 8)."""
+    places = views.pixels[views.seen] / np.array(views.image_sizes[0])
+    at = np.floor(places * np.array([COLUMNS, ROWS])).astype(np.int64)
+    at = np.clip(at, 0, [COLUMNS - 1, ROWS - 1])
+    cells = np.zeros((ROWS, COLUMNS), dtype=np.int64)
+    np.add.at(cells, (at[:, 1], at[:, 0]), 1)
+    return cells
 
 
 def _sizes(views: Views) -> FloatArray:

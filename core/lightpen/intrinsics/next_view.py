@@ -17,7 +17,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.adjustment import Adjustment, view_information
 from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.start import BoardPoses
+from lightpen.intrinsics.start import USUAL_FOCAL_LENGTH, BoardPoses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector
@@ -25,6 +25,7 @@ from lightpen.model.rigid import rotation_from_vector
 PLACES = (0.25, 0.5, 0.75)  # of width and height
 FILLED = (0.45, 0.7)  # of the image's shorter side
 TILT = np.radians(32.0)
+TURNS = ((0, 0), (TILT, 0), (-TILT, 0), (0, TILT), (0, -TILT), (TILT, TILT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +62,25 @@ def choose_next_view(adjustment: Adjustment, board: Board) -> WantedView:
     return WantedView(camera.project(outline), 1 - float(np.sqrt(left[best] / before)))
 
 
+def first_views(board: Board, image_size: tuple[int, int]) -> list[FloatArray]:
+    """Return outlines to begin with: in the middle, then tilted to each side."""
+    width, height = image_size
+    focal = USUAL_FOCAL_LENGTH * max(image_size)
+    camera = Camera(
+        *(width, height, focal, focal, 0.5 * (width - 1), 0.5 * (height - 1))
+    )
+    longer = 2 * float(np.abs(board.points[:, :2]).max())
+    depth = focal * longer / (FILLED[-1] * min(image_size))
+    outlines = []
+    for about_x, about_y in TURNS:
+        turn = rotation_from_vector(np.array([about_x, about_y, 0.0]))
+        outline = board.outline @ turn.T + np.array([0.0, 0.0, depth])
+        outlines.append(camera.project(outline))
+    return outlines
+
+
 def _candidates(camera: Camera, board: Board) -> BoardPoses:
     """Return views that show the whole board."""
-    turns = np.array(
-        [[0, 0], [TILT, 0], [-TILT, 0], [0, TILT], [0, -TILT], [TILT, TILT]]
-    )
     longer = 2 * float(np.abs(board.points[:, :2]).max())
     rotations, translations = [], []
     for filled in FILLED:
@@ -76,7 +91,7 @@ def _candidates(camera: Camera, board: Board) -> BoardPoses:
                 direction = np.append(camera.unproject(pixel), 1.0)
                 for quarter in (0.0, np.pi / 2):
                     roll = rotation_from_vector(np.array([0.0, 0.0, quarter]))
-                    for about_x, about_y in turns:
+                    for about_x, about_y in TURNS:
                         turn = rotation_from_vector(np.array([about_x, about_y, 0.0]))
                         rotations.append(turn @ roll)
                         translations.append(depth * direction)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lightpen.arrays import BoolArray, FloatArray
+from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import (
     N_SHAPE,
@@ -27,6 +27,7 @@ from lightpen.model.rigid import vector_from_rotation
 from lightpen.sentences import Sentence, sentence
 
 MIN_PAIRS = 3
+MAX_VOTED = 60  # views that are compared with all
 ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view
 ALIKE_SHIFT = 0.15  # of its distance
 PEN_SPEED = 100.0  # mm/s
@@ -255,7 +256,9 @@ def _ordered(
     places = [_between((first, start_poses(cameras[1], each, 1))) for each in turned]
     rotations = np.stack([each.rotations[both] for each in places])
     translations = np.stack([each.translations[both] for each in places])
-    alike = _alike(rotations, translations)
+    n_places = rotations.shape[1]
+    some = np.linspace(0, n_places - 1, min(n_places, MAX_VOTED)).astype(np.int64)
+    alike = _alike(rotations, translations, some)
     votes = alike.any(axis=2).sum(axis=-1)
     order, view = divmod(int(np.argmax(votes)), votes.shape[1])
     if votes[order, view] <= both.sum() / 2:
@@ -269,7 +272,10 @@ def _ordered(
                 n_pairs=int(both.sum()),
             )
         )
-    found = BoardPoses(rotations[order, view][None], translations[order, view][None])
+    chosen = some[view]
+    found = BoardPoses(
+        rotations[order, chosen][None], translations[order, chosen][None]
+    )
     choice = np.zeros(views.n_views, dtype=np.int64)
     choice[both] = np.argmax(alike[order, view], axis=0)
     pixels = np.stack([turned[k].pixels[v] for v, k in enumerate(choice.tolist())])
@@ -278,12 +284,15 @@ def _ordered(
     return replace(views, pixels=pixels).chosen(agree), found
 
 
-def _alike(rotations: FloatArray, translations: FloatArray) -> BoolArray:
-    """Tell which places (K, V) agree with which: (K, V, K, V)."""
-    between = np.einsum("kvij,lwmj->kvlwim", rotations, rotations)
+def _alike(
+    rotations: FloatArray, translations: FloatArray, some: IntArray
+) -> BoolArray:
+    """Tell which places (K, V) agree with some (S,) of them: (K, S, K, V)."""
+    between = np.einsum("kvij,lwmj->kvlwim", rotations[:, some], rotations)
     turns = np.linalg.norm(vector_from_rotation(between), axis=-1)
-    apart = np.linalg.norm(translations[:, :, None, None] - translations, axis=-1)
-    far = np.linalg.norm(translations, axis=-1)[:, :, None, None]
+    ours = translations[:, some, None, None]
+    apart = np.linalg.norm(ours - translations, axis=-1)
+    far = np.linalg.norm(ours, axis=-1)
     return np.asarray((turns < ALIKE_TURN) & (apart < ALIKE_SHIFT * far))
 
 

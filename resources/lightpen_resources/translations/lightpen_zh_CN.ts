@@ -24,6 +24,121 @@
     </message>
 </context>
 <context>
+    <name>BoardWindow</name>
+    <message>
+        <source>Images of the board</source>
+        <translation>标定板的图像</translation>
+    </message>
+    <message>
+        <source>Calibrating: {0:.0%}</source>
+        <translation>正在标定：{0:.0%}</translation>
+    </message>
+    <message>
+        <source>{0}: {1:.4f} px, by the others {2:.4f} px</source>
+        <translation>{0}：{1:.4f} px，由其他视图得 {2:.4f} px</translation>
+    </message>
+    <message>
+        <source>Calibrated.</source>
+        <translation>标定完成。</translation>
+    </message>
+    <message>
+        <source>Save the camera file</source>
+        <translation>保存相机文件</translation>
+    </message>
+    <message>
+        <source>Saved and in use: {0}</source>
+        <translation>已保存并使用：{0}</translation>
+    </message>
+    <message>
+        <source>Calibrate this camera</source>
+        <translation>标定此相机</translation>
+    </message>
+    <message>
+        <source>Board</source>
+        <translation>标定板</translation>
+    </message>
+    <message>
+        <source>Kind, columns x rows, lengths in mm: chessboard:11x8:20 (inner corners, square), charuco:12x9:20:15:DICT_5X5_100 (squares, square, marker), circles:9x7:20:10 (distance, diameter), asymmetric-circles:4x11:20:10</source>
+        <translation>类型、列数 x 行数、长度（mm）：chessboard:11x8:20（内角点、格边长），charuco:12x9:20:15:DICT_5X5_100（格数、格边长、标记边长），circles:9x7:20:10（圆心距、直径），asymmetric-circles:4x11:20:10</translation>
+    </message>
+    <message>
+        <source>From a folder...</source>
+        <translation>从文件夹...</translation>
+    </message>
+    <message>
+        <source>Calibrate</source>
+        <translation>标定</translation>
+    </message>
+    <message>
+        <source>Views, the worst first</source>
+        <translation>视图（最差的在前）</translation>
+    </message>
+    <message>
+        <source>Leave out and calibrate again</source>
+        <translation>剔除并重新标定</translation>
+    </message>
+    <message>
+        <source>Save and use...</source>
+        <translation>保存并使用...</translation>
+    </message>
+    <message>
+        <source>Start, and hold the board as the outline shows.</source>
+        <translation>开始后，请按轮廓所示放置标定板。</translation>
+    </message>
+    <message>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <source>Start</source>
+        <translation>开始</translation>
+    </message>
+    <message>
+        <source>Views kept: {0}</source>
+        <translation>已保留的视图：{0}</translation>
+    </message>
+    <message>
+        <source>At least {0} views are needed.</source>
+        <translation>至少需要 {0} 幅视图。</translation>
+    </message>
+    <message>
+        <source>Calibrate first.</source>
+        <translation>请先标定。</translation>
+    </message>
+    <message>
+        <source>Choose a view.</source>
+        <translation>请选择一幅视图。</translation>
+    </message>
+    <message>
+        <source>The board is not seen.</source>
+        <translation>看不到标定板。</translation>
+    </message>
+    <message>
+        <source>Hold it still.</source>
+        <translation>请保持静止。</translation>
+    </message>
+    <message>
+        <source>Keep it still.</source>
+        <translation>请继续保持静止。</translation>
+    </message>
+    <message>
+        <source>Kept. Move the board into the outline.</source>
+        <translation>已保留。请把标定板移到轮廓处。</translation>
+    </message>
+    <message>
+        <source>There is such a view already. Move the board into the outline.</source>
+        <translation>已有类似的视图。请把标定板移到轮廓处。</translation>
+    </message>
+    <message>
+        <source>Residuals {0:.4f} px rms, in views left out {1:.4f} px</source>
+        <translation>残差 {0:.4f} px（均方根），留出视图 {1:.4f} px</translation>
+    </message>
+    <message>
+        <source>Projection uncertain by {0:.3f} px, at worst {1:.3f} px</source>
+        <translation>投影不确定度 {0:.3f} px，最差处 {1:.3f} px</translation>
+    </message>
+</context>
+<context>
     <name>CameraPage</name>
     <message>
         <source>Camera</source>
@@ -632,6 +747,10 @@
     <message>
         <source>Open...</source>
         <translation>打开...</translation>
+    </message>
+    <message>
+        <source>Calibrate this camera...</source>
+        <translation>标定此相机...</translation>
     </message>
     <message>
         <source>In use</source>
@@ -3323,11 +3442,11 @@
     </message>
     <message>
         <source>The cameras are not synchronised: {camera} is out of step by {lag:.1f} ± {u:.1f} ms, which costs {px:.2f} px at a pen&apos;s speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 相差 {lag:.1f} ± {u:.1f} ms，测笔以 100 mm/s 移动时相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
+        <translation>两台相机不同步：{camera} 相差 {lag:.1f} ± {u:.1f} ms，光笔以 100 mm/s 移动时相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
     <message>
         <source>The cameras are not synchronised: {camera} is out of step by {lag:.2f} ± {u:.2f} of the time between two views. Each millisecond costs {px:.2f} px at a pen&apos;s speed of 100 mm/s. Trigger both cameras by one signal.</source>
-        <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。测笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
+        <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。光笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
     <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>

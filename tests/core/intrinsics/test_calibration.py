@@ -73,6 +73,15 @@ def test_views_left_out_are_met_nearly_as_well_as_those_fitted(
     assert found.adjustment.rms < found.held_out_rms < 1.2 * found.adjustment.rms
 
 
+def test_views_left_out_are_met_by_the_board_as_it_is_bent(
+    make_views: MakeViews,
+) -> None:
+    bent = make_views(shape=np.array([0, 0, 0.3, -0.1, 0.15]))
+    found = calibrate_camera(bent, BoardTolerances())
+
+    assert found.held_out_rms < 1.2 * found.adjustment.rms
+
+
 def test_a_view_that_fits_no_other_is_left_out(make_views: MakeViews) -> None:
     views = make_views()
     pixels = views.pixels.copy()

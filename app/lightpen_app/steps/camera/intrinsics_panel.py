@@ -36,9 +36,12 @@ class IntrinsicsPanel(Translated, QGroupBox):
     -------
     path_chosen(str)
         A file is to be read.
+    calibration_requested()
+        The camera is to be calibrated by a board.
     """
 
     path_chosen = Signal(str)
+    calibration_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -50,6 +53,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path = PathField()
         self._open = PushButton()
         self._path.add_button(self._open)
+        self._calibrate = PushButton()
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()
@@ -72,12 +76,14 @@ class IntrinsicsPanel(Translated, QGroupBox):
         layout.addWidget(self._problem)
         layout.addWidget(self._check)
         layout.addWidget(self._doubt)
+        layout.addWidget(self._calibrate)
         layout.addLayout(grid)
 
         # Connections
         self._path.value_changed.connect(self._on_path_changed)
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
+        self._calibrate.clicked.connect(self.calibration_requested)
 
         self._retranslate()
 
@@ -128,6 +134,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))
+        self._calibrate.setText(self.tr("Calibrate this camera..."))
         for label, name in zip(
             self._names,
             (
