@@ -259,8 +259,18 @@ def _settled(
     views: Views, start: State, origin: State, prior: FloatArray, sigma: float
 ) -> tuple[State, _System]:
     state, damping = start, FIRST_DAMPING
+    if np.isinf(_residuals(views, state)).any():
+        raise CalibrationError(
+            sentence(
+                "intrinsics.no-start",
+                "No camera sees a flat board {board} as the points have it: it has "
+                "other squares than said, or the images are not of one camera. Count "
+                "and measure its squares again.",
+                board=views.board.name,
+            )
+        )
     system = _system(views, state)
-    cost = _cost(system, state, origin, prior, sigma)
+    cost = _cost_of(system.residuals, state, origin, prior, sigma)
     for _ in range(MAX_STEPS):
         step, poses_step = _step(system, state, origin, prior, sigma, damping)
         moved = _moved(state, step, poses_step)
@@ -327,12 +337,6 @@ def _eliminated(system: _System) -> tuple[FloatArray, FloatArray]:
 
 def _diagonals(matrices: FloatArray) -> FloatArray:
     return np.asarray(matrices * np.eye(matrices.shape[-1]))
-
-
-def _cost(
-    system: _System, state: State, origin: State, prior: FloatArray, sigma: float
-) -> float:
-    return _cost_of(system.residuals, state, origin, prior, sigma)
 
 
 def _cost_of(

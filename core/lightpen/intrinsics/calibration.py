@@ -12,7 +12,7 @@ from datetime import date
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
+from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import (
     N_SHAPE,
@@ -44,7 +44,7 @@ LARGEST_FOCAL_SIGMA = 0.02  # relative
 LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
 CONTRADICTED = 3.0  # standard deviations
 STRETCHED = 1e-3  # relative: less is no printer's doing
-LET_GO = 0.1  # squareness of a board that is not what it was said to be
+LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
 MAD = 1.4826
 
 
@@ -183,13 +183,18 @@ def calibrate_camera(
         The views do not determine the camera; the text says what is missing.
     """
     require_views(views)
-    first = _fit(views, tolerances, FEW)
+    first = _fit(views, tolerances, start_camera(views, FEW))
     kept, left_out = _without_outliers(views, first)
-    remarks = _remarks_on_board(_fit(kept, tolerances, FEW), kept, tolerances)
-    if remarks:  # then the views tell how it is, and not what was said of it
-        tolerances = replace(tolerances, squareness=LET_GO)
+    fitted = _fit(kept, tolerances, first.state.cameras[0])
+    denied = _denied(fitted, tolerances)
+    remarks: tuple[Sentence, ...] = ()
+    if denied.any():  # then the views tell how it is, and not what was said of it
+        let_go = BoardTolerances(LET_GO_MM, LET_GO, tolerances.scale)
+        fitted = _fit(kept, let_go, fitted.state.cameras[0])
+        remarks = _remarks_on_board(fitted, denied, tolerances)
+        tolerances = let_go
     report(0.2)
-    choice, fitted, held_out = _chosen(kept, tolerances, report)
+    choice, fitted, held_out = _chosen(kept, tolerances, fitted, report)
     _require_determined(fitted)
     correlation = _significant(fitted)
     at = fitted.of_intrinsics(0)
@@ -208,7 +213,7 @@ def calibrate_camera(
         choice=choice,
         held_out=held_out,
         correlation=correlation,
-        halves=_halves(kept, tolerances, choice),
+        halves=_halves(kept, tolerances, camera, choice),
         remarks=remarks,
     )
 
@@ -238,22 +243,24 @@ def require_views(views: Views) -> None:
 def _fit(
     views: Views,
     tolerances: BoardTolerances,
-    n_coefficients: int,
+    near: Camera,
     *,
     k3_held: bool = False,
 ) -> Adjustment:
-    camera = start_camera(views, n_coefficients)
-    state = State(
-        (camera,),
-        np.eye(3)[None],
-        np.zeros((1, 3)),
-        start_poses(camera, views),
-        np.zeros(N_SHAPE),
-    )
+    """Return the fit of all, from a camera on; k3 is held at 0, or is not."""
     known = None
     if k3_held:
-        known = np.zeros((len(camera.intrinsics),) * 2)
+        distortion = np.where(np.arange(len(near.distortion)) == K3 - 4, 0.0, 1.0)
+        near = replace(near, distortion=distortion * near.distortion)
+        known = np.zeros((len(near.intrinsics),) * 2)
         known[K3, K3] = HELD
+    state = State(
+        (near,),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+        start_poses(near, views),
+        np.zeros(N_SHAPE),
+    )
     return adjust(views, state, tolerances, (known,))
 
 
@@ -302,16 +309,19 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
     return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
 
 
-def _remarks_on_board(
-    fitted: Adjustment, views: Views, tolerances: BoardTolerances
-) -> tuple[Sentence, ...]:
-    """Return what the views deny of the board: that its squares are square, or flat."""
-    at = fitted.of_shape
-    values = fitted.state.shape
-    sigmas = np.sqrt(np.diag(fitted.covariance)[at])
+def _denied(fitted: Adjustment, tolerances: BoardTolerances) -> BoolArray:
+    """Tell which errors of the board are larger than was said of it, (5,)."""
+    sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
     priors = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
     learned = np.sqrt(np.maximum(priors**2 - sigmas**2, 1e-30))
-    denied = np.abs(values) > CONTRADICTED * learned
+    return np.asarray(np.abs(fitted.state.shape) > CONTRADICTED * learned)
+
+
+def _remarks_on_board(
+    fitted: Adjustment, denied: BoolArray, tolerances: BoardTolerances
+) -> tuple[Sentence, ...]:
+    """Return how the board is, that it is not as was said."""
+    values = fitted.state.shape
     remarks = []
     stretch, shear = values[:2].tolist()
     if denied[:2].any() and max(abs(stretch), abs(shear)) > STRETCHED:
@@ -322,7 +332,7 @@ def _remarks_on_board(
                 "{stretch:+.2%} longer than down the columns, and its right angles are "
                 "off by {shear:+.2f} degrees. It may be printed to fit the page, or "
                 "its squares are none. Print it at true scale, or measure it again.",
-                board=views.board.name,
+                board=fitted.board.name,
                 stretch=stretch,
                 shear=float(np.degrees(shear)),
             )
@@ -341,46 +351,44 @@ def _remarks_on_board(
 
 
 def _chosen(
-    views: Views, tolerances: BoardTolerances, report: Callable[[float], None]
+    views: Views,
+    tolerances: BoardTolerances,
+    fitted: Adjustment,
+    report: Callable[[float], None],
 ) -> tuple[Choice, Adjustment, FloatArray]:
     """Return how many coefficients, the fit with them, and the held-out errors."""
-    fitted = _fit(views, tolerances, FEW)
     held = _folds(fitted.state.cameras[0])
     if held:
-        fitted = _fit(views, tolerances, FEW, k3_held=True)
-    errors = _held_out(views, tolerances, FEW, k3_held=held)
+        fitted = _fit(views, tolerances, fitted.state.cameras[0], k3_held=True)
+    camera = fitted.state.cameras[0]
+    errors = _held_out(views, tolerances, camera, k3_held=held)
     report(0.5)
-    rms = _together(errors, views)
-    if held:
-        return Choice(FEW, rms, None, k3_held=True), fitted, errors
+    rms, rms_more = _together(errors, views), None
     try:
-        more = _fit(views, tolerances, MANY)
-        errors_more = _held_out(views, tolerances, MANY)
-    except CalibrationError:
-        return Choice(FEW, rms, None), fitted, errors
+        richer = replace(camera, distortion=np.append(camera.distortion, np.zeros(3)))
+        more = _fit(views, tolerances, richer)
+        errors_more = _held_out(views, tolerances, more.state.cameras[0])
+        rms_more = _together(errors_more, views)
+        gains = errors**2 - errors_more**2
+        chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
+        is_better = rms_more < (1 - WORTH) * rms and gains.mean() > SIGMAS * chance
+        if is_better and not _folds(more.state.cameras[0]):
+            return Choice(MANY, rms, rms_more), more, errors_more
+    except CalibrationError:  # so many are not told apart
+        pass
     report(0.8)
-    rms_more = _together(errors_more, views)
-    gains = errors**2 - errors_more**2
-    mean, scatter = float(gains.mean()), float(gains.std(ddof=1)) / len(gains) ** 0.5
-    is_better = rms_more < (1 - WORTH) * rms and mean > SIGMAS * scatter
-    if is_better and not _folds(more.state.cameras[0]):
-        return Choice(MANY, rms, rms_more), more, errors_more
-    return Choice(FEW, rms, rms_more), fitted, errors
+    return Choice(FEW, rms, rms_more, k3_held=held), fitted, errors
 
 
 def _held_out(
-    views: Views,
-    tolerances: BoardTolerances,
-    n_coefficients: int,
-    *,
-    k3_held: bool = False,
+    views: Views, tolerances: BoardTolerances, near: Camera, *, k3_held: bool = False
 ) -> FloatArray:
     """Return the error of each view by a fit of the others, (V,), px rms."""
     errors = np.full(views.n_views, np.nan)
     fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
     for fold in range(int(fold_of.max()) + 1):
         others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
-        fitted = _fit(others, tolerances, n_coefficients, k3_held=k3_held).state
+        fitted = _fit(others, tolerances, near, k3_held=k3_held).state
         poses = start_poses(fitted.cameras[0], own)
         residuals = fit_poses(own, replace(fitted, poses=poses))
         squares = np.square(residuals).sum(axis=-1)
@@ -445,19 +453,14 @@ def _significant(fitted: Adjustment) -> float:
 
 
 def _halves(
-    views: Views, tolerances: BoardTolerances, choice: Choice
+    views: Views, tolerances: BoardTolerances, near: Camera, choice: Choice
 ) -> ViewHalves | None:
     if views.n_views < 2 * MIN_VIEWS:
         return None
     is_even = np.arange(views.n_views) % 2 == 0
     try:
         one, other = (
-            _fit(
-                views.chosen(which),
-                tolerances,
-                choice.n_coefficients,
-                k3_held=choice.k3_held,
-            )
+            _fit(views.chosen(which), tolerances, near, k3_held=choice.k3_held)
             for which in (is_even, ~is_even)
         )
     except CalibrationError:  # half of the views are too alike

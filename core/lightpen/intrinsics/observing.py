@@ -151,7 +151,7 @@ def _other_size(first: _Look, other: _Look) -> FileError:
 def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     """Return what the images show in place of the board."""
     images = [load() for load in islice(source.open(), EXAMINED)]
-    if _is_found([np.array(image[:, ::-1]) for image in images], board):
+    if _is_found([image[:, ::-1].copy() for image in images], board):
         return sentence(
             "intrinsics.mirrored",
             "The images show the board {board} mirrored. Switch off the mirroring of "

@@ -78,7 +78,7 @@ def _is_spread(points: FloatArray, board: Board) -> bool:
     if len(seen) < FEWEST:
         return False
     across = float(np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1])
-    return across > SPREAD * board.pitch * len(seen) ** 0.5
+    return bool(across > SPREAD * board.pitch * float(np.sqrt(len(seen))))
 
 
 def _from_front(points: FloatArray, board: Board) -> FloatArray:

@@ -11,16 +11,17 @@ from lightpen.model.rigid import rotation_from_vector
 MAX_TILT = np.radians(35.0)
 FILLED = (0.5, 0.8)  # of the image's shorter side, by the longer side of the board
 ROLLS = np.radians([-90.0, -15.0, 0.0, 10.0, 90.0])
-MARGIN = 0.03  # of the image, that stays free of points
+RIM = 2.0  # squares or distances beyond the points, which stay in the image, too
 MAX_TRIES = 100
 
 
 def simulate_board_poses(
     camera: Camera, board: Board, n_views: int, rng: np.random.Generator
 ) -> BoardPoses:
-    """Return poses in which the whole board is seen, in all parts of the image."""
+    """Return poses in which the whole board is seen, its rim included."""
     size = np.array(camera.image_size)
     longer = 2 * float(np.abs(board.points[:, :2]).max())
+    sheet = board.outline + RIM * board.pitch * np.sign(board.outline)
     rotations: list[FloatArray] = []
     translations: list[FloatArray] = []
     for _ in range(MAX_TRIES * n_views):
@@ -32,8 +33,8 @@ def simulate_board_poses(
         depth = camera.fx * longer / (rng.uniform(*FILLED) * size.min())
         place = camera.unproject(rng.uniform(0.2, 0.8, 2) * size)
         t = depth * np.append(place, 1.0)
-        pixels = camera.project(board.outline @ R.T + t) / size
-        if np.all((pixels > MARGIN) & (pixels < 1 - MARGIN)):
+        pixels = camera.project(sheet @ R.T + t) / size
+        if np.all((pixels > 0) & (pixels < 1)):
             rotations.append(R)
             translations.append(t)
     return BoardPoses(np.array(rotations), np.array(translations))

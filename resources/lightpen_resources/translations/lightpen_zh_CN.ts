@@ -3217,6 +3217,10 @@
         <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
     <message>
+        <source>No camera sees a flat board {board} as the points have it: it has other squares than said, or the images are not of one camera. Count and measure its squares again.</source>
+        <translation>没有相机会把平整标定板 {board} 看成这些点的样子：格子与所指定的不符，或图像不是同一相机拍摄。请重新数并测量格子。</translation>
+    </message>
+    <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
         <translation>{waited:.1f} s 内没有收到图像。请检查相机。</translation>
     </message>

@@ -128,7 +128,7 @@ def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> N
 
     (remark,) = found.remarks
     assert remark.code == "intrinsics.board-stretched"
-    assert "+3.00%" in str(remark)
+    assert "+3.0" in str(remark)
 
 
 def test_a_bent_board_is_remarked(make_views: MakeViews) -> None:

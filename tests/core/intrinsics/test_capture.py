@@ -21,7 +21,7 @@ def capture() -> Capture:
 
 def held(capture: Capture, points: FloatArray, begin: float = 0.0) -> Capture:
     """Return the capture after the board was held still for long enough."""
-    for time_s in begin + STILL_TIME * np.array([0.0, 0.5, 1.0]):
+    for time_s in begin + STILL_TIME * np.array([0.0, 0.5, 1.1]):
         capture = capture.after(points, float(time_s))
     return capture
 

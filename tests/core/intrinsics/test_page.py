@@ -74,9 +74,9 @@ def test_the_places_of_objects_are_those_of_the_table() -> None:
 
 
 def test_the_smallest_paper_is_taken() -> None:
-    assert b"/MediaBox [0 0 841.8898 595.2756]" in board_page(parse_board(WORDS[0]))
+    assert b"/MediaBox [0 0 595.2756 841.8898]" in board_page(parse_board(WORDS[0]))
 
 
 def test_a_board_larger_than_the_paper_is_refused() -> None:
-    with pytest.raises(UsageError, match="220 x 180 mm"):
-        board_page(parse_board("chessboard:10x8:20"), "A4")
+    with pytest.raises(UsageError, match="260 x 200 mm"):
+        board_page(parse_board("chessboard:12x9:20"), "A4")

