@@ -30,6 +30,7 @@ REFINED = 0.4  # of the distance of neighbours: no other edge is that near
 MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
 REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
 FEWEST = 6  # points by which a pose is known, and that it is no other thing
+UNEVEN = 0.5  # of a step, by which the next may differ; tilt and lens make up to 0.2
 SPREAD = 0.3  # of a square: least standard deviation across
 SPOT_SPREAD = 0.25  # of the distance of neighbours, standard deviation of a circle
 OFF_SPOT = 0.35  # of the distance of neighbours: a rim farther off is another's
@@ -129,7 +130,7 @@ def _chessboard(
 ) -> FloatArray | None:
     small, scale = _smaller(grey)
     found, points = cv2.findChessboardCorners(small, corners, flags=QUICK)
-    if found:
+    if found and _is_even(points, corners):
         return _whole(points, scale)
     if quick:
         return None
@@ -139,9 +140,23 @@ def _chessboard(
     if scale == 1.0 or grey.size > SEARCHED_WHOLE:
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
         found, points = cv2.findChessboardCorners(small, corners, flags=flags)
-        return _whole(points, scale) if found else None
+        is_found = found and _is_even(points, corners)
+        return _whole(points, scale) if is_found else None
     found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
     return _whole(points, 1.0) if found else None
+
+
+def _is_even(points: Any, corners: tuple[int, int]) -> bool:
+    """Tell whether rows and columns go on evenly; some corners may be another's."""
+    columns, rows = corners
+    grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
+    for along in (grid, np.swapaxes(grid, 0, 1)):
+        steps = np.diff(along, axis=1)
+        bends = np.linalg.norm(np.diff(steps, axis=1), axis=-1)
+        lengths = np.linalg.norm(steps, axis=-1)
+        if np.any(bends > UNEVEN * np.minimum(lengths[:, 1:], lengths[:, :-1])):
+            return False
+    return True
 
 
 def _marked(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:

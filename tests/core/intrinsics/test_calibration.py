@@ -28,6 +28,11 @@ def found(make_views: MakeViews) -> CameraCalibration:
     return calibrate_camera(make_views(), BoardTolerances(), date(2026, 3, 1))
 
 
+@pytest.fixture(scope="module")
+def few(make_views: MakeViews) -> CameraCalibration:
+    return calibrate_camera(make_views(n_views=6), BoardTolerances())
+
+
 def test_the_truth_lies_within_the_intervals(
     found: CameraCalibration, camera: Camera
 ) -> None:
@@ -128,7 +133,7 @@ def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> N
 
     (remark,) = found.remarks
     assert remark.code == "intrinsics.board-stretched"
-    assert "+3.0" in str(remark)
+    assert remark.values["stretch"] == pytest.approx(0.03, abs=5e-4)
 
 
 def test_a_bent_board_is_remarked(make_views: MakeViews) -> None:
@@ -153,13 +158,13 @@ def test_what_the_views_do_not_reach_is_said(make_views: MakeViews) -> None:
     found = calibrate_camera(some, BoardTolerances())
     missing = cover(some, found.adjustment.state.poses).missing
 
-    assert "top right, bottom right" in str(missing[0])
+    assert "top right" in str(missing[0])
+    assert "bottom right" in str(missing[0])
 
 
 def test_the_next_view_takes_more_of_the_uncertainty_where_little_is_known(
-    make_views: MakeViews, found: CameraCalibration
+    few: CameraCalibration, found: CameraCalibration
 ) -> None:
-    few = calibrate_camera(make_views(n_views=6), BoardTolerances())
     wanted = [
         choose_next_view(each.adjustment, each.views.board) for each in (few, found)
     ]
@@ -170,15 +175,13 @@ def test_the_next_view_takes_more_of_the_uncertainty_where_little_is_known(
 
 
 def test_more_views_lessen_the_uncertainty_over_the_image(
-    make_views: MakeViews,
+    few: CameraCalibration, found: CameraCalibration
 ) -> None:
-    few = calibrate_camera(make_views(n_views=8), BoardTolerances())
-    more = calibrate_camera(make_views(n_views=16), BoardTolerances())
     assert few.camera.covariance is not None
-    assert more.camera.covariance is not None
+    assert found.camera.covariance is not None
 
     before = map_uncertainty(few.camera, few.camera.covariance)
-    after = map_uncertainty(more.camera, more.camera.covariance)
+    after = map_uncertainty(found.camera, found.camera.covariance)
     assert after.typical < before.typical
     assert before.center < before.typical < before.worst
 

@@ -13,6 +13,7 @@ from lightpen_app.widgets.image_view import ImageView
 
 EMPTY_OPACITY = 0.28  # of the parts in which nothing was seen yet
 POINT = 2.5  # px of the screen, radius
+FOOT = 1.5  # px of the screen, radius of an arrow's foot
 LONGEST_ARROW = 40.0  # px of the screen
 
 
@@ -104,3 +105,4 @@ class BoardView(ImageView):
         for x, y, u, v in arrows.tolist():
             foot = self.place_of(x, y)
             painter.drawLine(QLineF(foot, foot + QPointF(scale * u, scale * v)))
+            painter.drawEllipse(foot, FOOT, FOOT)
