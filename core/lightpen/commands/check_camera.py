@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import add_json, add_pen_options, celsius
+from lightpen.commands.arguments import add_json, add_pen_options, number_from
 from lightpen.commands.console import (
     printing,
     progress,
@@ -19,7 +19,7 @@ from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.contradictions import COEFFICIENTS
 from lightpen.estimation.report import plain
 from lightpen.estimation.rig_report import intrinsics_record
-from lightpen.formats.camera_files import read_camera
+from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
@@ -38,7 +38,10 @@ def add_check_camera(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
     add_pen_options(parser)
     parser.add_argument(
-        "--temperature", type=celsius, metavar="CELSIUS", help="at the station"
+        "--temperature",
+        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
+        metavar="CELSIUS",
+        help="at the station",
     )
     add_json(parser)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.commands.arguments import above_zero, add_json, celsius
+from lightpen.commands.arguments import above_zero, add_json, number_from
 from lightpen.commands.console import (
     are_same,
     printing,
@@ -19,7 +19,7 @@ from lightpen.commands.console import (
 )
 from lightpen.errors import UsageError
 from lightpen.estimation.report import plain
-from lightpen.formats.camera_files import read_camera, write_camera
+from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera, write_camera
 from lightpen.formats.files import printable
 from lightpen.formats.images import find_images
 from lightpen.formats.pairing import pair_images
@@ -152,7 +152,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
 def _add_temperature(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--temperature",
-        type=celsius,
+        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
         metavar="CELSIUS",
         help="at the camera, kept in its file",
     )
