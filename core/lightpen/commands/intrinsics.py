@@ -272,7 +272,7 @@ def _require_new_file(out: Path, *inputs: Path) -> None:
     if any(are_same(path, out) for path in inputs):
         raise UsageError(
             sentence(
-                "cli.out-over-input",
+                "cli.cameras-over-input",
                 "--out {out} would replace the input file of that name. Give another "
                 "name.",
                 out=printable(str(out)),

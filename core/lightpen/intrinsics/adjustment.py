@@ -42,7 +42,7 @@ VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class BoardState:
     """Everything that the points of the views depend on.
 
     Attributes
@@ -65,7 +65,7 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Adjustment:
+class BoardFit:
     """A state that fits the views, and how well it is known.
 
     Attributes
@@ -83,7 +83,7 @@ class Adjustment:
     """
 
     board: Board
-    state: State
+    state: BoardState
     residuals: FloatArray
     sigma: float
     information: FloatArray
@@ -159,15 +159,15 @@ class _System(NamedTuple):
 
 def adjust(
     views: Views,
-    start: State,
+    start: BoardState,
     tolerances: BoardTolerances,
     stated: tuple[FloatArray | None, ...] = (),
-) -> Adjustment:
+) -> BoardFit:
     """Fit everything to the points of all views.
 
     Parameters
     ----------
-    start : State
+    start : BoardState
         With the intrinsics as their files have them, where ``stated`` says so.
     stated : tuple of (4 + n, 4 + n) array or None
         Information of the intrinsics of each camera beside the views; none where None.
@@ -193,7 +193,7 @@ def adjust(
         if abs(sigma - before) < 1e-3 * sigma:
             break
     covariance = _inverse(information.sum(axis=0) / sigma**2 + prior)
-    return Adjustment(
+    return BoardFit(
         views.board,
         state,
         system.residuals,
@@ -205,12 +205,12 @@ def adjust(
     )
 
 
-def fit_poses(views: Views, state: State) -> FloatArray:
+def fit_poses(views: Views, state: BoardState) -> FloatArray:
     """Return the residuals of views of which only the poses are fitted.
 
     Parameters
     ----------
-    state : State
+    state : BoardState
         All but the poses holds.
 
     Returns
@@ -225,13 +225,13 @@ def fit_poses(views: Views, state: State) -> FloatArray:
 
 
 def view_information(
-    board: Board, state: State, image_size: tuple[int, int]
+    board: Board, state: BoardState, image_size: tuple[int, int]
 ) -> FloatArray:
     """Return what views of a single camera would tell of all but their poses.
 
     Parameters
     ----------
-    state : State
+    state : BoardState
         With the poses of these views.
     image_size : tuple of int
         Outside of which no point is seen.
@@ -256,8 +256,8 @@ def board_points(board: Board, shape: FloatArray) -> FloatArray:
 
 
 def _settled(
-    views: Views, start: State, origin: State, prior: FloatArray, sigma: float
-) -> tuple[State, _System]:
+    views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
+) -> tuple[BoardState, _System]:
     state, damping = start, FIRST_DAMPING
     if np.isinf(_residuals(views, state)).any():
         raise CalibrationError(
@@ -298,8 +298,8 @@ def _settled(
 
 def _step(
     system: _System,
-    state: State,
-    origin: State,
+    state: BoardState,
+    origin: BoardState,
     prior: FloatArray,
     sigma: float,
     damping: float,
@@ -340,13 +340,17 @@ def _diagonals(matrices: FloatArray) -> FloatArray:
 
 
 def _cost_of(
-    residuals: FloatArray, state: State, origin: State, prior: FloatArray, sigma: float
+    residuals: FloatArray,
+    state: BoardState,
+    origin: BoardState,
+    prior: FloatArray,
+    sigma: float,
 ) -> float:
     away = _away(state, origin)
     return float(np.nansum(np.square(residuals)) / sigma**2 + away @ prior @ away)
 
 
-def _away(state: State, origin: State) -> FloatArray:
+def _away(state: BoardState, origin: BoardState) -> FloatArray:
     """Return how far the unknowns are from where the priors have them.
 
     No prior is about the cameras' places.
@@ -359,7 +363,7 @@ def _away(state: State, origin: State) -> FloatArray:
     return np.concatenate([*intrinsics, places, state.shape - origin.shape])
 
 
-def _moved(state: State, step: FloatArray, poses_step: FloatArray) -> State:
+def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> BoardState:
     places = _places_at(state.cameras)
     cameras = tuple(
         moved_camera(camera, step[at])
@@ -367,7 +371,7 @@ def _moved(state: State, step: FloatArray, poses_step: FloatArray) -> State:
     )
     extrinsics = np.zeros((len(cameras), N_POSE))
     extrinsics[1:] = step[places].reshape(-1, N_POSE)
-    return State(
+    return BoardState(
         cameras,
         rotation_from_vector(extrinsics[:, :3]) @ state.rotations,
         state.translations + extrinsics[:, 3:],
@@ -385,7 +389,7 @@ def moved_camera(camera: Camera, step: FloatArray) -> Camera:
     return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=np.array(distortion))
 
 
-def _points_cam(board: Board, state: State) -> tuple[FloatArray, FloatArray]:
+def _points_cam(board: Board, state: BoardState) -> tuple[FloatArray, FloatArray]:
     """Return the points in the rig, less the poses' translations, and in the cameras.
 
     (V, N, 3) and (V, C, N, 3).
@@ -404,13 +408,13 @@ def _modelled(
     return ellipse_centers(camera, points, normals[:, None], 0.5 * board.detail)
 
 
-def _normals(state: State) -> FloatArray:
+def _normals(state: BoardState) -> FloatArray:
     """Return the normals of the board, (V, C, 3), in the cameras."""
     normals = state.poses.rotations[..., 2]
     return np.asarray(np.einsum("cij,vj->vci", state.rotations, normals))
 
 
-def _residuals(views: Views, state: State) -> FloatArray:
+def _residuals(views: Views, state: BoardState) -> FloatArray:
     _, points = _points_cam(views.board, state)
     normals = _normals(state)
     residuals = np.empty_like(views.pixels)
@@ -424,7 +428,7 @@ def _residuals(views: Views, state: State) -> FloatArray:
     return residuals
 
 
-def _system(views: Views, state: State) -> _System:
+def _system(views: Views, state: BoardState) -> _System:
     turned, points = _points_cam(views.board, state)
     deformations = _deformations(views.board)
     residuals = _residuals(views, state)
@@ -485,7 +489,9 @@ def _deformations(board: Board) -> FloatArray:
 
 
 def _prior(
-    start: State, tolerances: BoardTolerances, stated: tuple[FloatArray | None, ...]
+    start: BoardState,
+    tolerances: BoardTolerances,
+    stated: tuple[FloatArray | None, ...],
 ) -> FloatArray:
     places = _places_at(start.cameras)
     information = np.zeros((places.stop + N_SHAPE,) * 2)

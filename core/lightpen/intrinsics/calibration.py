@@ -16,8 +16,8 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import (
     N_SHAPE,
-    Adjustment,
-    State,
+    BoardFit,
+    BoardState,
     adjust,
     fit_poses,
 )
@@ -148,7 +148,7 @@ class CameraCalibration:
 
     camera: Camera
     views: Views
-    adjustment: Adjustment
+    adjustment: BoardFit
     left_out: tuple[str, ...]
     n_points_left_out: int
     choice: Choice
@@ -246,7 +246,7 @@ def _fit(
     near: Camera,
     *,
     k3_held: bool = False,
-) -> Adjustment:
+) -> BoardFit:
     """Return the fit of all, from a camera on; k3 is held at 0, or is not."""
     known = None
     if k3_held:
@@ -254,7 +254,7 @@ def _fit(
         near = replace(near, distortion=distortion * near.distortion)
         known = np.zeros((len(near.intrinsics),) * 2)
         known[K3, K3] = HELD
-    state = State(
+    state = BoardState(
         (near,),
         np.eye(3)[None],
         np.zeros((1, 3)),
@@ -264,9 +264,7 @@ def _fit(
     return adjust(views, state, tolerances, (known,))
 
 
-def _without_outliers(
-    views: Views, fitted: Adjustment
-) -> tuple[Views, tuple[str, ...]]:
+def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str, ...]]:
     """Return the views without points, and without views, that fit no others.
 
     Raises
@@ -309,7 +307,7 @@ def _n_points_left_out(views: Views, kept: Views) -> int:
     return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
 
 
-def _denied(fitted: Adjustment, tolerances: BoardTolerances) -> BoolArray:
+def _denied(fitted: BoardFit, tolerances: BoardTolerances) -> BoolArray:
     """Tell which errors of the board are larger than was said of it, (5,)."""
     sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
     priors = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
@@ -318,7 +316,7 @@ def _denied(fitted: Adjustment, tolerances: BoardTolerances) -> BoolArray:
 
 
 def _remarks_on_board(
-    fitted: Adjustment, denied: BoolArray, tolerances: BoardTolerances
+    fitted: BoardFit, denied: BoolArray, tolerances: BoardTolerances
 ) -> tuple[Sentence, ...]:
     """Return how the board is, that it is not as was said."""
     values = fitted.state.shape
@@ -353,9 +351,9 @@ def _remarks_on_board(
 def _chosen(
     views: Views,
     tolerances: BoardTolerances,
-    fitted: Adjustment,
+    fitted: BoardFit,
     report: Callable[[float], None],
-) -> tuple[Choice, Adjustment, FloatArray]:
+) -> tuple[Choice, BoardFit, FloatArray]:
     """Return how many coefficients, the fit with them, and the held-out errors."""
     held = _folds(fitted.state.cameras[0])
     if held:
@@ -423,7 +421,7 @@ def _require_no_fold(camera: Camera) -> None:
         )
 
 
-def _require_determined(fitted: Adjustment) -> None:
+def _require_determined(fitted: BoardFit) -> None:
     """Refuse views that are too alike to tell the focal length."""
     at = fitted.of_intrinsics(0).start
     focal = fitted.state.cameras[0].fx
@@ -444,7 +442,7 @@ def _require_determined(fitted: Adjustment) -> None:
         )
 
 
-def _significant(fitted: Adjustment) -> float:
+def _significant(fitted: BoardFit) -> float:
     """Return how much residuals hang together, 1 where chance explains it."""
     n_unknowns = fitted.scores.shape[1] - N_SHAPE
     chance = 1 + SIGMAS * float(np.sqrt(2 / n_unknowns))

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import N_SHAPE, State, adjust
+from lightpen.intrinsics.adjustment import N_SHAPE, BoardState, adjust
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import FEW, MIN_VIEWS
 from lightpen.intrinsics.coverage import cells_of
@@ -93,7 +93,7 @@ def wanted_outline(capture: Capture) -> FloatArray:
     if views.n_views < MIN_VIEWS:
         return guesses[views.n_views]
     camera = start_camera(views, FEW)
-    state = State(
+    state = BoardState(
         (camera,),
         np.eye(3)[None],
         np.zeros((1, 3)),

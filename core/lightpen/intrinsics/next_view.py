@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import Adjustment, view_information
+from lightpen.intrinsics.adjustment import BoardFit, view_information
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.start import USUAL_FOCAL_LENGTH, BoardPoses
 from lightpen.intrinsics.uncertainty_map import error_fields
@@ -44,7 +44,7 @@ class WantedView:
     gain: float
 
 
-def choose_next_view(adjustment: Adjustment, board: Board) -> WantedView:
+def choose_next_view(adjustment: BoardFit, board: Board) -> WantedView:
     """Return the view that would lessen the uncertainty of one camera most."""
     camera = adjustment.state.cameras[0]
     poses = _candidates(camera, board)

@@ -13,8 +13,8 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import (
     N_SHAPE,
-    Adjustment,
-    State,
+    BoardFit,
+    BoardState,
     adjust,
     stated_information,
 )
@@ -66,7 +66,7 @@ class PairLag:
         """The same in ms, where the time between two views is known."""
         return None if self.interval_ms is None else self.views * self.interval_ms
 
-    def sentence(self, name: str) -> Sentence:
+    def told(self, name: str) -> Sentence:
         """Return it in words, of a camera of that name."""
         if self.lag_ms is None:
             return sentence(
@@ -114,7 +114,7 @@ class PairCalibration:
 
     rig: Rig
     views: Views
-    adjustment: Adjustment
+    adjustment: BoardFit
     alone: tuple[CameraCalibration, ...]
     n_pairs: int
     left_out: tuple[str, ...]
@@ -184,7 +184,7 @@ def calibrate_pair(
     names_of_all = views.names
     views, place = _ordered(views, cameras, both)
     poses = _poses(views, cameras, place)
-    state = State(
+    state = BoardState(
         cameras,
         np.stack([np.eye(3), place.rotations[0]]),
         np.stack([np.zeros(3), place.translations[0]]),
@@ -211,7 +211,7 @@ def calibrate_pair(
 
 
 def _rig(
-    fitted: Adjustment,
+    fitted: BoardFit,
     names: tuple[str, str],
     tolerances: BoardTolerances,
     correlation: float,
@@ -309,7 +309,7 @@ def _poses(views: Views, cameras: tuple[Camera, ...], place: BoardPoses) -> Boar
 
 
 def _lag(
-    views: Views, fitted: Adjustment, both: BoolArray, interval_ms: float | None
+    views: Views, fitted: BoardFit, both: BoolArray, interval_ms: float | None
 ) -> PairLag | None:
     """Return by how much the second camera is late, from how the board moves.
 
@@ -348,7 +348,7 @@ def _means(pixels: FloatArray) -> FloatArray:
 
 
 def _remarks(
-    fitted: Adjustment,
+    fitted: BoardFit,
     alone: tuple[CameraCalibration, ...],
     both: BoolArray,
     lag: PairLag | None,
@@ -356,7 +356,7 @@ def _remarks(
 ) -> tuple[Sentence, ...]:
     remarks = [remark for each in alone for remark in each.remarks]
     if lag is not None and lag.is_significant:
-        return (*remarks, lag.sentence(name))
+        return (*remarks, lag.told(name))
     usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
     rms = np.nanmax(fitted.view_rms[both], axis=1)
     n_apart = int(np.sum(rms > APART * usual))

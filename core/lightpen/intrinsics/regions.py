@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen.intrinsics.adjustment import Adjustment
+from lightpen.intrinsics.adjustment import BoardFit
 from lightpen.model.camera import Camera
 
 COLUMNS, ROWS = 4, 3
@@ -29,7 +29,7 @@ class Regions:
     means: FloatArray
 
 
-def measure_regions(fitted: Adjustment, camera: Camera) -> Regions:
+def measure_regions(fitted: BoardFit, camera: Camera) -> Regions:
     """Return the residuals of a single camera by region."""
     residuals = fitted.residuals[:, 0]
     seen = np.isfinite(residuals[..., 0])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import Adjustment
+from lightpen.intrinsics.adjustment import BoardFit
 from lightpen.intrinsics.calibration import CameraCalibration
 from lightpen.intrinsics.coverage import BoardCoverage, cover
 from lightpen.intrinsics.next_view import choose_next_view
@@ -228,7 +228,7 @@ def _halves_lines(calibration: CameraCalibration) -> list[str]:
     ]
 
 
-def _board_lines(fitted: Adjustment) -> list[str]:
+def _board_lines(fitted: BoardFit) -> list[str]:
     stretch, shear, *bends = fitted.state.shape.tolist()
     return [
         f"{'Board':<{TITLE}}stretched by {1e6 * stretch:+.0f} ppm, sheared by "
@@ -238,7 +238,7 @@ def _board_lines(fitted: Adjustment) -> list[str]:
     ]
 
 
-def _region_lines(fitted: Adjustment, camera: Camera) -> str:
+def _region_lines(fitted: BoardFit, camera: Camera) -> str:
     regions = measure_regions(fitted, camera)
     lines = ["Residuals by region of the image: px rms (mean u, mean v)"]
     for rms, mean, n_points in zip(
@@ -301,7 +301,7 @@ def _map_record(camera: Camera) -> dict[str, Any]:
     }
 
 
-def _regions_record(fitted: Adjustment, camera: Camera) -> dict[str, Any]:
+def _regions_record(fitted: BoardFit, camera: Camera) -> dict[str, Any]:
     regions = measure_regions(fitted, camera)
     return {
         "points": regions.n_points,
@@ -321,7 +321,7 @@ def _halves_record(calibration: CameraCalibration) -> dict[str, Any] | None:
     }
 
 
-def _board_record(fitted: Adjustment) -> dict[str, dict[str, float]]:
+def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
     sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
     return {
         name: {"value": value, "standard_uncertainty": sigma}

@@ -9,8 +9,8 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.intrinsics.adjustment import (
     N_SHAPE,
-    Adjustment,
-    State,
+    BoardFit,
+    BoardState,
     adjust,
     fit_poses,
     moved_camera,
@@ -25,10 +25,10 @@ EXACT = 1e-6  # px
 VAGUE = BoardTolerances(flatness=1.0, squareness=0.01)
 
 
-def fitted(views: Views, tolerances: BoardTolerances = VAGUE, n: int = 5) -> Adjustment:
+def fitted(views: Views, tolerances: BoardTolerances = VAGUE, n: int = 5) -> BoardFit:
     camera = start_camera(views, n)
     poses = start_poses(camera, views)
-    state = State(
+    state = BoardState(
         (camera,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE)
     )
     return adjust(views, state, tolerances)
