@@ -958,6 +958,7 @@ def test_every_control_is_named_and_reached_by_tab(
         "Use its files",
         "Intrinsics file",
         "Open...",
+        "Calibrate this camera...",
         "Search",
         "Cover the LEDs",
         "Live image",
