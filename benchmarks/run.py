@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.guided import guided_rows
 from benchmarks.hard_scene import hard_scene_rows
@@ -43,6 +44,7 @@ SECTIONS: dict[str, Section] = {
     "repeat": repeat_rows,
     "bound": lambda workers, data: cramer_rao_rows(workers),
     "files": lambda workers, data: wrong_file_rows(workers),
+    "cameras": camera_calibration_rows,
     "hard": lambda workers, data: hard_scene_rows(workers),
     "labels": lambda workers, data: labelling_rows(workers),
     "tracker": tracker_rows,

@@ -14,9 +14,12 @@ from typing import NoReturn
 
 import cv2
 
+from lightpen.commands.board import add_board
 from lightpen.commands.calibrate import add_calibrate
+from lightpen.commands.check_camera import add_check_camera
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import Desktop, add_desktop, add_open
+from lightpen.commands.intrinsics import add_extrinsics, add_intrinsics
 from lightpen.commands.pen import add_pen
 from lightpen.commands.pen_health import add_improve_pen
 from lightpen.commands.pivot import add_pivot
@@ -120,6 +123,18 @@ def _parser(
     )
     add_improve_pen(
         commands.add_parser("improve-pen", help="a better LED file by several swings")
+    )
+    add_intrinsics(
+        commands.add_parser("intrinsics", help="calibrate a camera by a board")
+    )
+    add_extrinsics(
+        commands.add_parser("extrinsics", help="find how two cameras stand, by a board")
+    )
+    add_board(commands.add_parser("board", help="make a board to be printed"))
+    add_check_camera(
+        commands.add_parser(
+            "check-camera", help="whether camera and file agree, by a swing"
+        )
     )
     return parser, commands.choices
 

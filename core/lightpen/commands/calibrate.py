@@ -44,10 +44,13 @@ from lightpen.formats.pairing import pair_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.formats.rig_files import read_rig
 from lightpen.formats.simulated_files import is_simulated
+from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
+from lightpen.model.camera_validity import doubts_about
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
+from lightpen.model.rig import of_camera
 from lightpen.record.reading import (
     is_record,
     missing_parts,
@@ -186,6 +189,12 @@ def _note_unacknowledged(names: Sequence[str]) -> None:
     _note(note)
 
 
+def _note_doubts(camera: Camera, options: argparse.Namespace, name: str = "") -> None:
+    """Tell why the intrinsics of a camera, of a rig if named, may not hold any more."""
+    for doubt in doubts_about(camera, local_now().date(), options.temperature):
+        _note(of_camera(name, doubt) if name else doubt)
+
+
 def _note(note: Sentence) -> None:
     print(shown(f"lightpen: {note}"), file=sys.stderr)
 
@@ -213,6 +222,7 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         if file is None:
             raise _lacking(name, options.images)
     camera = read_camera(options.camera)
+    _note_doubts(camera, options)
     pen = _read_pen(options)
     separation = separation_of(options)
     if options.centers is not None:
@@ -276,6 +286,8 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
         raise _lacking("--pen", ())
     rig_file = read_rig(options.rig)
     rig = rig_file.rig
+    for name, camera in zip(rig.names, rig.cameras, strict=True):
+        _note_doubts(camera, options, name)
     pen = _read_pen(options)
     in_order = sentence(
         "cli.one-of-each-camera",

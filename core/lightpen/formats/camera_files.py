@@ -20,10 +20,12 @@ MATLAB       cameraParameters or cameraIntrinsics by ``jsonencode``:
 Optional in all: ``intrinsics_covariance``, square, of fx fy cx cy and the distortion
 coefficients; or their standard deviations ``std_deviations_intrinsics``, in the order
 of OpenCV's ``calibrateCameraExtended``, fx and fy being taken as off together, as they
-are; and the day of the calibration,
-``calibration_date`` or ``calibration_time``.
+are; the day of the calibration, ``calibration_date`` or ``calibration_time``; the
+serial number of the camera, ``camera_serial``; and how warm it was,
+``calibration_temperature``, in degrees Celsius.
 """
 
+import json
 import re
 from collections.abc import Sequence
 from datetime import date
@@ -47,6 +49,8 @@ SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
 LARGEST_ASPECT = 1.5  # of a pixel
 FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
 SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
+LONGEST_SERIAL = 60  # characters
+COLDEST, WARMEST = -50.0, 100.0  # degrees Celsius
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
 
 _WIDTH = ("image_width", "width")
@@ -63,6 +67,8 @@ _DEVIATIONS = (
     *("std_deviations", "standard_deviations"),
 )
 _DATE = ("calibration_date", "calibration_time")
+_SERIAL = ("camera_serial",)
+_TEMPERATURE = ("calibration_temperature",)
 _MODELS = {"plumb_bob", "rational_polynomial", "radtan", "none"}
 _FISHEYE = {"equidistant", "fisheye", "kannala_brandt", "kannala_brandt4", "fov"}
 _MONTHS = [
@@ -304,6 +310,8 @@ def _camera(
         distortion=distortion,
         covariance=_covariance(entries, len(coefficients), len(distortion)),
         calibrated_on=_day(entries),
+        serial=_serial(entries),
+        temperature_c=_temperature(entries),
     )
     _check_fold(camera, entries)
     return camera
@@ -505,6 +513,33 @@ def _day(entries: Entries) -> date | None:
     return None
 
 
+def _serial(entries: Entries) -> str:
+    if not entries.has(*_SERIAL):
+        return ""
+    value = entries.value(*_SERIAL)
+    is_plain = isinstance(value, str | int)
+    return printable(str(value))[:LONGEST_SERIAL] if is_plain else ""
+
+
+def _temperature(entries: Entries) -> float | None:
+    if not entries.has(*_TEMPERATURE):
+        return None
+    celsius = float(entries.counted(1, *_TEMPERATURE)[0])
+    if not COLDEST <= celsius <= WARMEST:
+        raise FileError(
+            sentence(
+                "camera-file.temperature",
+                "{name} has the calibration_temperature {celsius:g}; degrees Celsius "
+                "from {coldest:g} to {warmest:g} are needed. Correct or remove it.",
+                name=entries.name,
+                celsius=celsius,
+                coldest=COLDEST,
+                warmest=WARMEST,
+            )
+        )
+    return celsius
+
+
 def _opencv_lines(camera: Camera) -> list[str]:
     lines = [
         "%YAML:1.0",
@@ -541,6 +576,10 @@ def _quality_lines(camera: Camera, tag: str = "") -> list[str]:
         lines += _matrix_lines("intrinsics_covariance", camera.covariance, tag)
     if camera.calibrated_on is not None:
         lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
+    if camera.serial:
+        lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
+    if camera.temperature_c is not None:
+        lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
     return lines
 
 

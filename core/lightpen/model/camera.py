@@ -65,6 +65,10 @@ class Camera:
         calibration of the camera states it.
     calibrated_on : date or None
         Day of the camera's calibration.
+    serial : str
+        Serial number of the camera; empty where its file does not say.
+    temperature_c : float or None
+        Of the camera at its calibration, degrees Celsius.
     """
 
     width: int
@@ -76,6 +80,8 @@ class Camera:
     distortion: FloatArray = field(default_factory=lambda: np.zeros(5))
     covariance: FloatArray | None = None
     calibrated_on: date | None = None
+    serial: str = ""
+    temperature_c: float | None = None
 
     @property
     def image_size(self) -> tuple[int, int]:

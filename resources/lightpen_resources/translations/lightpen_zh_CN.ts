@@ -102,6 +102,121 @@
     </message>
 </context>
 <context>
+    <name>BoardWindow</name>
+    <message>
+        <source>Images of the board</source>
+        <translation>标定板的图像</translation>
+    </message>
+    <message>
+        <source>Calibrating: {0:.0%}</source>
+        <translation>正在标定：{0:.0%}</translation>
+    </message>
+    <message>
+        <source>{0}: {1:.4f} px, by the others {2:.4f} px</source>
+        <translation>{0}：{1:.4f} px，由其他视图得 {2:.4f} px</translation>
+    </message>
+    <message>
+        <source>Calibrated.</source>
+        <translation>标定完成。</translation>
+    </message>
+    <message>
+        <source>Save the camera file</source>
+        <translation>保存相机文件</translation>
+    </message>
+    <message>
+        <source>Saved and in use: {0}</source>
+        <translation>已保存并使用：{0}</translation>
+    </message>
+    <message>
+        <source>Calibrate this camera</source>
+        <translation>标定此相机</translation>
+    </message>
+    <message>
+        <source>Board</source>
+        <translation>标定板</translation>
+    </message>
+    <message>
+        <source>Kind, columns x rows, lengths in mm: chessboard:11x8:20 (inner corners, square), charuco:12x9:20:15:DICT_5X5_100 (squares, square, marker), circles:9x7:20:10 (distance, diameter), asymmetric-circles:4x11:20:10</source>
+        <translation>类型、列数 x 行数、长度（mm）：chessboard:11x8:20（内角点、格边长），charuco:12x9:20:15:DICT_5X5_100（格数、格边长、标记边长），circles:9x7:20:10（圆心距、直径），asymmetric-circles:4x11:20:10</translation>
+    </message>
+    <message>
+        <source>From a folder...</source>
+        <translation>从文件夹...</translation>
+    </message>
+    <message>
+        <source>Calibrate</source>
+        <translation>标定</translation>
+    </message>
+    <message>
+        <source>Views, the worst first</source>
+        <translation>视图（最差的在前）</translation>
+    </message>
+    <message>
+        <source>Leave out and calibrate again</source>
+        <translation>剔除并重新标定</translation>
+    </message>
+    <message>
+        <source>Save and use...</source>
+        <translation>保存并使用...</translation>
+    </message>
+    <message>
+        <source>Start, and hold the board as the outline shows.</source>
+        <translation>开始后，请按轮廓所示放置标定板。</translation>
+    </message>
+    <message>
+        <source>Stop</source>
+        <translation>停止</translation>
+    </message>
+    <message>
+        <source>Start</source>
+        <translation>开始</translation>
+    </message>
+    <message>
+        <source>Views kept: {0}</source>
+        <translation>已保留的视图：{0}</translation>
+    </message>
+    <message>
+        <source>At least {0} views are needed.</source>
+        <translation>至少需要 {0} 幅视图。</translation>
+    </message>
+    <message>
+        <source>Calibrate first.</source>
+        <translation>请先标定。</translation>
+    </message>
+    <message>
+        <source>Choose a view.</source>
+        <translation>请选择一幅视图。</translation>
+    </message>
+    <message>
+        <source>The board is not seen.</source>
+        <translation>看不到标定板。</translation>
+    </message>
+    <message>
+        <source>Hold it still.</source>
+        <translation>请保持静止。</translation>
+    </message>
+    <message>
+        <source>Keep it still.</source>
+        <translation>请继续保持静止。</translation>
+    </message>
+    <message>
+        <source>Kept. Move the board into the outline.</source>
+        <translation>已保留。请把标定板移到轮廓处。</translation>
+    </message>
+    <message>
+        <source>There is such a view already. Move the board into the outline.</source>
+        <translation>已有类似的视图。请把标定板移到轮廓处。</translation>
+    </message>
+    <message>
+        <source>Residuals {0:.4f} px rms, in views left out {1:.4f} px</source>
+        <translation>残差 {0:.4f} px（均方根），留出视图 {1:.4f} px</translation>
+    </message>
+    <message>
+        <source>Projection uncertain by {0:.3f} px, at worst {1:.3f} px</source>
+        <translation>投影不确定度 {0:.3f} px，最差处 {1:.3f} px</translation>
+    </message>
+</context>
+<context>
     <name>CameraPage</name>
     <message>
         <source>Camera</source>
@@ -718,6 +833,10 @@
     <message>
         <source>Open...</source>
         <translation>打开...</translation>
+    </message>
+    <message>
+        <source>Calibrate this camera...</source>
+        <translation>标定此相机...</translation>
     </message>
     <message>
         <source>In use</source>
@@ -2908,6 +3027,18 @@
         <translation>1 个数</translation>
     </message>
     <message>
+        <source>5 coefficients, as 8 do not lessen the error in views left out: {held_out:.4f} px with 5, {held_out_more:.4f} px with 8.</source>
+        <translation>采用 5 个畸变系数：8 个系数并未减小留出视图的误差（5 个系数 {held_out:.4f} px，8 个系数 {held_out_more:.4f} px）。</translation>
+    </message>
+    <message>
+        <source>5 coefficients, as the views do not tell 8 apart. Error in views left out: {held_out:.4f} px.</source>
+        <translation>采用 5 个畸变系数：这些视图无法区分 8 个系数。留出视图的误差：{held_out:.4f} px。</translation>
+    </message>
+    <message>
+        <source>8 coefficients, as they lessen the error in views left out from {held_out:.4f} to {held_out_more:.4f} px.</source>
+        <translation>采用 8 个畸变系数：留出视图的误差由 {held_out:.4f} px 减小到 {held_out_more:.4f} px。</translation>
+    </message>
+    <message>
         <source>A camera file is written as YAML, but {name} does not end in .yaml. Choose such a name.</source>
         <translation>内参文件以 YAML 保存，但 {name} 不以 .yaml 结尾。请选择这样的名称。</translation>
     </message>
@@ -2944,6 +3075,10 @@
         <translation>{run} 的全部触测点都在 {extent:.3f} mm 之内：同一端被重复触测，另一端没有触测。请触测两端。</translation>
     </message>
     <message>
+        <source>All views are from one distance. Hold the board nearer, too.</source>
+        <translation>所有视图的距离都相同。请也把标定板拿近一些拍摄。</translation>
+    </message>
+    <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
         <translation>另一个程序正在写入 {folder} 中的摆动。请在那里继续，或关闭该程序后重试。</translation>
     </message>
@@ -2962,6 +3097,10 @@
     <message>
         <source>Basler (pylon)</source>
         <translation>Basler (pylon)</translation>
+    </message>
+    <message>
+        <source>Both cameras see the board in {n_pairs} views; at least {least} are needed. Hold the board where both cameras see it whole.</source>
+        <translation>两台相机同时看到标定板的视图有 {n_pairs} 组，至少需要 {least} 组。请把标定板放在两台相机都能看到整块板的位置。</translation>
     </message>
     <message>
         <source>Calibrate each of both from a file of its own.</source>
@@ -3058,6 +3197,10 @@
     <message>
         <source>Images of the upright pen still needed: {n_images}.</source>
         <translation>还需 {n_images} 幅光笔竖直的图像。</translation>
+    </message>
+    <message>
+        <source>In {n_views} of {n_pairs} views the two cameras do not see the board at one place; they differ by up to {rms:.2f} px. It moved between the two exposures, or a camera did. Hold it still, or trigger both cameras by one signal.</source>
+        <translation>{n_pairs} 组视图中有 {n_views} 组，两台相机看到的标定板位置不一致，最大相差 {rms:.2f} px。两次曝光之间标定板或某台相机移动了。请保持静止，或用同一信号触发两台相机。</translation>
     </message>
     <message>
         <source>It agrees with them if it holds rig_from_cam; cam_from_rig is needed. Of each camera transpose the rotation R, and put -R^T t in place of the translation t.</source>
@@ -3308,6 +3451,10 @@
         <translation>在 {n_swings} 次摆动中，没有 LED 相对其他 LED 移动。</translation>
     </message>
     <message>
+        <source>No camera sees a flat board {board} as the points have it: it has other squares than said, or the images are not of one camera. Count and measure its squares again.</source>
+        <translation>没有相机会把平整标定板 {board} 看成这些点的样子：格子与所指定的不符，或图像不是同一相机拍摄。请重新数并测量格子。</translation>
+    </message>
+    <message>
         <source>No image came for {waited:.1f} s. Check the camera.</source>
         <translation>{waited:.1f} s 内没有收到图像。请检查相机。</translation>
     </message>
@@ -3316,12 +3463,32 @@
         <translation>{place} 的图像已无法读取。请连接磁盘或放回图像，或选择其他图像。</translation>
     </message>
     <message>
+        <source>No image shows a chessboard of {columns} x {rows} inner corners, but one of {seen_columns} x {seen_rows}. Count its inner corners again.</source>
+        <translation>图像中没有 {columns} x {rows} 内角点的棋盘格，看到的是 {seen_columns} x {seen_rows}。请重新数内角点。</translation>
+    </message>
+    <message>
+        <source>No image shows the board {board}, but they show {other}: OpenCV laid it out otherwise until 4.6. Give that board.</source>
+        <translation>图像中没有标定板 {board}，看到的是 {other}：OpenCV 4.6 及更早版本的排布不同。请指定该标定板。</translation>
+    </message>
+    <message>
+        <source>No image shows the board {board}, but they show {other}: columns and rows are the other way round. Give that board.</source>
+        <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
+    </message>
+    <message>
+        <source>No view reaches these corners of the image: {corners}.</source>
+        <translation>没有视图覆盖图像的这些角：{corners}。</translation>
+    </message>
+    <message>
         <source>Nominal tip, {axis}: {flaw}</source>
         <translation>标称测头，{axis}：{flaw}</translation>
     </message>
     <message>
         <source>None of the {n_images} images can be read. {why}</source>
         <translation>{n_images} 幅图像都无法读取。{why}</translation>
+    </message>
+    <message>
+        <source>None of the {n_images} images shows the board {board}. The whole board must be in the image, sharp, with a bright rim round it; check its kind and count.</source>
+        <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
     </message>
     <message>
         <source>Odd and even images put the tip {difference:.4f} mm apart, {usual:.4f} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
@@ -3428,8 +3595,48 @@
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
     </message>
     <message>
+        <source>The adjustment did not settle in {n_steps} steps. The views may be too alike, or of another board than was said: check both.</source>
+        <translation>平差在 {n_steps} 步内未收敛。视图可能过于相似，或标定板与所指定的不符：请检查这两点。</translation>
+    </message>
+    <message>
+        <source>The board faces fewer than {least} times {sides}.</source>
+        <translation>标定板朝以下方向倾斜的视图不足 {least} 幅：{sides}。</translation>
+    </message>
+    <message>
+        <source>The board is bent by {bend:.2f} mm, {stated:.2f} mm was assumed. That is taken into account, but mount it on a flat plate.</source>
+        <translation>标定板弯曲 {bend:.2f} mm，假定值为 {stated:.2f} mm。计算中已考虑，但请将其固定在平板上。</translation>
+    </message>
+    <message>
+        <source>The board is not what {board} says: its lengths along the rows are {stretch:+.2%} longer than down the columns, and its right angles are off by {shear:+.2f} degrees. It may be printed to fit the page, or its squares are none. Print it at true scale, or measure it again.</source>
+        <translation>标定板与 {board} 不符：沿行方向的长度比沿列方向长 {stretch:+.2%}，直角偏差 {shear:+.2f} 度。打印时可能选择了“适合页面”，或格子不是正方形。请按实际尺寸打印，或重新测量。</translation>
+    </message>
+    <message>
+        <source>The board is seen in {n_views} images; at least {least} are needed, {enough} are better. Add views with the board tilted by 20 to 40 degrees to each side, and in each corner of the image.</source>
+        <translation>有 {n_views} 幅图像看到标定板，至少需要 {least} 幅，最好有 {enough} 幅。请补充标定板向各侧倾斜 20 至 40 度以及位于图像各角的视图。</translation>
+    </message>
+    <message>
+        <source>The board {board} is {width:.0f} x {height:.0f} mm large and needs {foot:g} mm of white round it, more than the paper has. Choose a larger paper, or a smaller board.</source>
+        <translation>标定板 {board} 大小为 {width:.0f} x {height:.0f} mm，四周还需 {foot:g} mm 白边，超出纸张。请选更大的纸张或更小的标定板。</translation>
+    </message>
+    <message>
+        <source>The board {text} has {columns} x {rows} points or squares; {least} to {most} are needed along each side. Count them again: of a chessboard it is the inner corners that count.</source>
+        <translation>标定板 {text} 有 {columns} x {rows} 个点或格子，每边需要 {least} 至 {most} 个。请重新数：棋盘格按内角点计。</translation>
+    </message>
+    <message>
+        <source>The board {text} names markers that are not known here. Name the dictionary as OpenCV does, such as DICT_5X5_100.</source>
+        <translation>标定板 {text} 指定的标记字典未知。请按 OpenCV 的写法命名字典，例如 DICT_5X5_100。</translation>
+    </message>
+    <message>
+        <source>The board {text} needs {needed} markers, {dictionary} has {known}. Name the dictionary that it was printed from.</source>
+        <translation>标定板 {text} 需要 {needed} 个标记，而 {dictionary} 只有 {known} 个。请指定打印时所用的字典。</translation>
+    </message>
+    <message>
         <source>The calibration {path} is not as it was written: it was changed or damaged since. Restore it from a copy, or calibrate again.</source>
         <translation>标定结果 {path} 与写出时不同：此后被改动或损坏。请从副本恢复，或重新标定。</translation>
+    </message>
+    <message>
+        <source>The camera file is of the camera {stated}, the camera in use is {used}. Give the file of this camera.</source>
+        <translation>相机文件属于相机 {stated}，而当前使用的相机是 {used}。请提供该相机的文件。</translation>
     </message>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
@@ -3446,6 +3653,14 @@
     <message>
         <source>The camera sends {sent:.1f} images a second, not the {wanted:.1f} that are set: its link or its exposure allows no more. Lower the frame rate, or take a smaller region or a shorter exposure.</source>
         <translation>相机每秒送来 {sent:.1f} 幅图像，而不是设定的 {wanted:.1f} 幅：其链路或曝光不允许更多。请降低帧率，或使用更小的区域或更短的曝光。</translation>
+    </message>
+    <message>
+        <source>The camera was calibrated at {stated:.1f} degrees Celsius, the station is at {used:.1f}. Check it by a swing, or calibrate it again at this temperature.</source>
+        <translation>相机标定时为 {stated:.1f} 摄氏度，工位现为 {used:.1f} 摄氏度。请用一次摆动检查，或在此温度下重新标定。</translation>
+    </message>
+    <message>
+        <source>The camera was calibrated {age} days ago, on {day}. Check it by a swing, or calibrate it again.</source>
+        <translation>相机标定于 {age} 天前（{day}）。请用一次摆动检查，或重新标定。</translation>
     </message>
     <message>
         <source>The camera {serial} did not stop within {waited:.0f} s. Unplug it, and start the program again before you use it.</source>
@@ -3468,12 +3683,24 @@
         <translation>相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆和触发。</translation>
     </message>
     <message>
+        <source>The cameras are not synchronised: {camera} is out of step by {lag:.1f} ± {u:.1f} ms, which costs {px:.2f} px at a pen&apos;s speed of 100 mm/s. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：{camera} 相差 {lag:.1f} ± {u:.1f} ms，光笔以 100 mm/s 移动时相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
+        <source>The cameras are not synchronised: {camera} is out of step by {lag:.2f} ± {u:.2f} of the time between two views. Each millisecond costs {px:.2f} px at a pen&apos;s speed of 100 mm/s. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。光笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
         <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm。请将两者夹紧，待相机预热后重做。该影响已计入不确定度。</translation>
     </message>
     <message>
         <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
         <translation>{name} 的畸变系数使 {width} × {height} px 的图像折叠：有些像素没有视线方向，或有两个。请检查这些系数，或用覆盖到图像边角的视图重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The distortion that the views tell turns the image over in its corners, where no view shows the board. Add views with the board in each corner of the image.</source>
+        <translation>由这些视图得出的畸变使图像在角部翻折，而那里没有视图显示标定板。请补充标定板位于图像各角的视图。</translation>
     </message>
     <message>
         <source>The file has {n_leds} LEDs.</source>
@@ -3552,6 +3779,10 @@
         <translation>相机 {camera} 的图像与其他时刻的图像配成了对：它的第 {own} 幅图像对应其他相机的第 {others} 幅，依此类推。请让同一时刻的图像同名；开头可能缺少若干图像。</translation>
     </message>
     <message>
+        <source>The images show the board {board} mirrored. Switch off the mirroring of the camera, or print the board anew.</source>
+        <translation>图像中的标定板 {board} 是镜像的。请关闭相机的镜像功能，或重新打印标定板。</translation>
+    </message>
+    <message>
         <source>The intrinsics_covariance of {name} is not a covariance: it must be symmetric, with correlations from -1 to 1. Correct or remove it.</source>
         <translation>{name} 的 intrinsics_covariance 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除。</translation>
     </message>
@@ -3574,6 +3805,10 @@
     <message>
         <source>The length is off by {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
         <translation>长度最大偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The lengths of the board {text} cannot be: they are in mm, above 0, and markers or circles are smaller than what they stand in. Measure them again.</source>
+        <translation>标定板 {text} 的尺寸不合理：单位为 mm，须大于 0，且标记或圆须小于其所在的格子。请重新测量。</translation>
     </message>
     <message>
         <source>The lens distortion of the camera file cannot be undone for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
@@ -3634,6 +3869,10 @@
     <message>
         <source>The point wanders within a sphere of {error:.4f} mm as the pen leans (limit {limit:.4f} mm).</source>
         <translation>光笔倾斜时，该点在直径 {error:.4f} mm 的球内游移（限值 {limit:.4f} mm）。</translation>
+    </message>
+    <message>
+        <source>The points lie {rms:.2f} px from where a flat board {board} has them: it has other squares than said, is bent, or the images are not of one camera with one focus. Count and measure its squares again.</source>
+        <translation>各点与平整标定板 {board} 的应有位置相差 {rms:.2f} px：格子与所指定的不符、板面弯曲，或图像不是同一相机在同一对焦下拍摄。请重新数并测量格子。</translation>
     </message>
     <message>
         <source>The poses are of two tips, {distance:.2f} mm apart in the pen, as if the tip had been exchanged or had slipped in its holder. One: poses {first}. The other: poses {second}. {consequence}</source>
@@ -3760,6 +3999,18 @@
         <translation>验证已完成。可以放下光笔。</translation>
     </message>
     <message>
+        <source>The views are too alike: the board is tilted by {apart:.0f} degrees from view to view at most, and the focal length is known to {share:.1%} only. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
+        <translation>视图过于相似：各视图间标定板的倾斜最多相差 {apart:.0f} 度，焦距只能确定到 {share:.1%}。请补充标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
+    </message>
+    <message>
+        <source>The views do not agree on where the second camera stands: {n_agree} of {n_pairs} do. Either a camera was moved meanwhile, or the images that are taken for one moment are not. Check their names and order.</source>
+        <translation>各视图给出的第二台相机位置不一致：{n_pairs} 组中只有 {n_agree} 组一致。可能期间移动了某台相机，或配成一组的图像不是同一时刻。请检查图像的名称和顺序。</translation>
+    </message>
+    <message>
+        <source>The views leave the camera open: they are too alike. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
+        <translation>这些视图无法确定相机：它们过于相似。请补充标定板向各侧倾斜 20 至 40 度并伸入图像各角的视图。</translation>
+    </message>
+    <message>
         <source>The witness moved by {distance:.4f} mm between {first} and {visit} (U {uncertainty:.4f} mm, limit {limit:.4f} mm): the camera or the witness is not clamped, or the camera was not warm yet. What was measured in between is off by as much.</source>
         <translation>监视点在 {first} 与 {visit} 之间移动了 {distance:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）：相机或监视点没有夹紧，或相机尚未预热。其间的测量结果也有同样的偏差。</translation>
     </message>
@@ -3820,6 +4071,14 @@
         <translation>测球与锥孔不够圆。请换用更好的，并给出其形状误差</translation>
     </message>
     <message>
+        <source>bottom left</source>
+        <translation>左下</translation>
+    </message>
+    <message>
+        <source>bottom right</source>
+        <translation>右下</translation>
+    </message>
+    <message>
         <source>calibration</source>
         <translation>标定结果</translation>
     </message>
@@ -3840,12 +4099,20 @@
         <translation>发光圆面的直径</translation>
     </message>
     <message>
+        <source>downwards</source>
+        <translation>向下</translation>
+    </message>
+    <message>
         <source>further turn of cam_from_rig about {axis}</source>
         <translation>cam_from_rig 绕 {axis} 轴的附加转角</translation>
     </message>
     <message>
         <source>inches</source>
         <translation>英寸</translation>
+    </message>
+    <message>
+        <source>k3 is held at 0: the views do not reach the corners, where it would fold the image. Error in views left out: {held_out:.4f} px.</source>
+        <translation>k3 固定为 0：视图未到达图像角部，否则 k3 会使图像在那里翻折。留出视图的误差：{held_out:.4f} px。</translation>
     </message>
     <message>
         <source>metres</source>
@@ -3882,6 +4149,26 @@
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
+    </message>
+    <message>
+        <source>top left</source>
+        <translation>左上</translation>
+    </message>
+    <message>
+        <source>top right</source>
+        <translation>右上</translation>
+    </message>
+    <message>
+        <source>upwards</source>
+        <translation>向上</translation>
+    </message>
+    <message>
+        <source>{name} has the calibration_temperature {celsius:g}; degrees Celsius from {coldest:g} to {warmest:g} are needed. Correct or remove it.</source>
+        <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
+    </message>
+    <message>
+        <source>{name} has {width} x {height} px, {first} has {first_width} x {first_height} px. Give images of one camera, with one region and binning.</source>
+        <translation>{name} 为 {width} x {height} px，{first} 为 {first_width} x {first_height} px。请提供同一相机、相同区域和像素合并设置的图像。</translation>
     </message>
     <message>
         <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
@@ -4894,6 +5181,10 @@
     <message>
         <source>{run}: the pen was held still nowhere for {n_frames} images. Hold it still on each point, or take each image for a touch.</source>
         <translation>{run}：光笔没有在任何一处保持不动达 {n_frames} 幅图像。请在每个点上保持不动，或把每幅图像当作一次触测。</translation>
+    </message>
+    <message>
+        <source>{text} is no board. Name it in a form such as {forms}; lengths are in mm.</source>
+        <translation>{text} 不是标定板。请按如下形式命名：{forms}；长度单位为 mm。</translation>
     </message>
     <message>
         <source>{told} They have the size of {other}: the images may be given in another order than the cameras of the rig file.</source>

@@ -108,6 +108,8 @@ def assert_same(found: Camera, expected: Camera, atol: float = 0.0) -> None:
     assert (found.width, found.height) == (expected.width, expected.height)
     np.testing.assert_allclose(found.intrinsics, expected.intrinsics, rtol=0, atol=atol)
     assert found.calibrated_on == expected.calibrated_on
+    assert found.serial == expected.serial
+    assert found.temperature_c == expected.temperature_c
     if expected.covariance is None:
         assert found.covariance is None
     else:
@@ -339,6 +341,24 @@ def test_a_date_is_kept_if_it_can_be_told(
 
 
 @pytest.mark.parametrize(
+    ("text", "serial"),
+    [
+        ('camera_serial: "21704342"', "21704342"),
+        ("camera_serial: 21704342", "21704342"),
+        ("camera_serial: [1, 2]", ""),
+    ],
+)
+def test_the_serial_number_is_kept(tmp_path: Path, text: str, serial: str) -> None:
+    assert read_camera(saved(tmp_path, OPENCV + text)).serial == serial
+
+
+def test_a_temperature_that_no_camera_has_is_refused(tmp_path: Path) -> None:
+    words = refusal(tmp_path, OPENCV + "calibration_temperature: 293.15")
+
+    assert "degrees Celsius from -50 to 100" in words
+
+
+@pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         ("image_width: 2448\n", "", "does not say how large the images are"),
@@ -561,6 +581,7 @@ def test_a_huge_camera_file_is_refused(tmp_path: Path) -> None:
     assert "more than the 4 MB" in refusal(tmp_path, OPENCV + "#" * 5_000_000)
 
 
+SERIAL_LETTERS = st.characters(min_codepoint=33, max_codepoint=126)
 mild = st.floats(-1e-14, 1e-14)  # at the corner of the widest image r^6 is 5e10
 
 
@@ -584,6 +605,8 @@ def cameras(draw: st.DrawFn) -> Camera:
         distortion=np.array(draw(st.lists(mild, min_size=n, max_size=n))),
         covariance=covariance,
         calibrated_on=draw(st.none() | st.dates()),
+        serial=draw(st.text(SERIAL_LETTERS, max_size=20)),
+        temperature_c=draw(st.none() | st.floats(-50, 100)),
     )
 
 

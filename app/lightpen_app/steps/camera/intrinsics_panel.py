@@ -12,7 +12,10 @@ from PySide6.QtWidgets import (
 )
 
 from lightpen.formats.opened_files import CameraFile
+from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
+from lightpen.model.camera_validity import doubts_about
+from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.widgets.file_drops import FileDrops
@@ -33,21 +36,27 @@ class IntrinsicsPanel(Translated, QGroupBox):
     -------
     path_chosen(str)
         A file is to be read.
+    calibration_requested()
+        The camera is to be calibrated by a board.
     """
 
     path_chosen = Signal(str)
+    calibration_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
+        self._serial = ""
 
         # Widgets
         self._path = PathField()
         self._open = PushButton()
         self._path.add_button(self._open)
+        self._calibrate = PushButton()
         self._problem = SignLabel()
         self._check = SignLabel()
+        self._doubt = SignLabel()
         self._names = [text_label(TextSize.SMALL, Tone.QUIET) for _ in range(N_FACTS)]
         self._facts = [text_label(TextSize.SMALL) for _ in range(N_FACTS)]
 
@@ -66,12 +75,15 @@ class IntrinsicsPanel(Translated, QGroupBox):
         layout.addWidget(self._path)
         layout.addWidget(self._problem)
         layout.addWidget(self._check)
+        layout.addWidget(self._doubt)
+        layout.addWidget(self._calibrate)
         layout.addLayout(grid)
 
         # Connections
         self._path.value_changed.connect(self._on_path_changed)
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
+        self._calibrate.clicked.connect(self.calibration_requested)
 
         self._retranslate()
 
@@ -91,6 +103,12 @@ class IntrinsicsPanel(Translated, QGroupBox):
         """Compare with other live images, width and height in px, or with none."""
         if image_size != self._image_size:
             self._image_size = image_size
+            self._refresh()
+
+    def set_serial(self, serial: str) -> None:
+        """Compare with the serial number of another camera, empty if it has none."""
+        if serial != self._serial:
+            self._serial = serial
             self._refresh()
 
     def set_problem(self, sentence: str) -> None:
@@ -116,6 +134,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         edit.setAccessibleName(self.tr("Intrinsics file"))
         edit.setPlaceholderText(self.tr("Intrinsics file"))
         self._open.setText(self.tr("Open..."))
+        self._calibrate.setText(self.tr("Calibrate this camera..."))
         for label, name in zip(
             self._names,
             (
@@ -133,6 +152,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
     def _refresh(self) -> None:
         camera = None if self._file is None else self._file.camera
         self._check.set_value(self._checked(camera))
+        self._doubt.set_value(self._doubted(camera))
         facts = [""] * N_FACTS if camera is None else self._told(camera)
         for name, label, fact in zip(self._names, self._facts, facts, strict=True):
             label.setText(fact)
@@ -162,6 +182,14 @@ class IntrinsicsPanel(Translated, QGroupBox):
         )
         sent = self._size_text(*self._image_size)
         return Remark(words.format(sent, made_for), Sign.WARNING, Tone.BAD)
+
+    def _doubted(self, camera: Camera | None) -> Remark:
+        """Return why the file may not hold any more."""
+        if camera is None:
+            return Remark()
+        doubts = doubts_about(camera, local_now().date(), serial=self._serial)
+        words = " ".join(map(worded, doubts))
+        return Remark(words, Sign.WARNING, Tone.WARN)
 
     def _told(self, camera: Camera) -> list[str]:
         """Return what is in the file, a text for each name."""

@@ -29,6 +29,7 @@ from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
@@ -69,6 +70,7 @@ class CameraPage(Rearranged, Page):
         self._looking: Job | None = None
         self._looked_beside = SourceChoice()
         self._beside = FilesBeside()
+        self._board: BoardWindow | None = None  # made when it is asked for
 
         # Widgets
         self._swing_remark = SignLabel()
@@ -90,6 +92,7 @@ class CameraPage(Rearranged, Page):
         self._more.settings_changed.connect(self._live.configure)
         self._source.files_requested.connect(self._workbench.use_files)
         self._intrinsics.path_chosen.connect(self._on_path_chosen)
+        self._intrinsics.calibration_requested.connect(self._on_calibration_requested)
         self._source.samples_requested.connect(self._on_samples_requested)
         self._stray.found_changed.connect(self._mark)
         self._stray.mask_requested.connect(self._on_mask_requested)
@@ -159,6 +162,8 @@ class CameraPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
+        if self._board is not None:
+            self._board.close()
         for job in (self._reading, self._looking):
             if job is not None:
                 job.cancel()
@@ -318,6 +323,15 @@ class CameraPage(Rearranged, Page):
         job.failed.connect(self._on_file_refused)
         job.start()
 
+    def _on_calibration_requested(self) -> None:
+        if self._board is None:
+            self._board = BoardWindow(self._live, self)
+
+            # Connections
+            self._board.saved.connect(self._on_path_chosen)
+        self._board.show()
+        self._board.raise_()
+
     def _on_file_read(self, camera_file: CameraFile) -> None:
         self._reading = None
         now = self._workbench.preparation
@@ -430,6 +444,7 @@ class CameraPage(Rearranged, Page):
         self._stray.set_live(is_live)
         self._stray.set_has_operator(self._live.operator is not None)
         caps = self._live.caps if is_live else None
+        self._intrinsics.set_serial(self._live.serial if is_live else "")
         self._exposure.set_camera(caps, self._settings)
         self._more.set_camera(caps, self._settings)
 

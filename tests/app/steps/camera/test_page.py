@@ -291,6 +291,19 @@ def test_date_and_uncertainty_of_the_intrinsics_are_shown(
     assert "no uncertainty" not in live.words
 
 
+def test_intrinsics_of_another_camera_and_of_long_ago_are_doubted(
+    live: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    path = intrinsics(
+        workbench, tmp_path, serial="DEV-99", calibrated_on=date(2020, 1, 2)
+    )
+
+    live.enter("Intrinsics file", str(path))
+
+    live.wait("The camera file is of the camera DEV-99")
+    assert "on 2020-01-02" in live.words
+
+
 def test_facts_that_are_not_known_take_no_focus(
     live: "Seen", workbench: Workbench
 ) -> None:
@@ -968,6 +981,7 @@ def test_every_control_is_named_and_reached_by_tab(
         "Use its files",
         "Intrinsics file",
         "Open...",
+        "Calibrate this camera...",
         "Search",
         "Cover the LEDs",
         "Live image",

@@ -1,0 +1,108 @@
+"""The live image while a camera is calibrated: the board, and where it is wanted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen_app.look.theme import DARK, Tone
+from lightpen_app.widgets.image_view import ImageView
+
+EMPTY_OPACITY = 0.28  # of the parts in which nothing was seen yet
+POINT = 2.5  # px of the screen, radius
+FOOT = 1.5  # px of the screen, radius of an arrow's foot
+LONGEST_ARROW = 40.0  # px of the screen
+
+
+@dataclass(frozen=True, eq=False)
+class BoardOverlay:
+    """What is drawn on the image.
+
+    Attributes
+    ----------
+    points : (N, 2) array or None
+        Of the board, px; NaN where not seen.
+    outline : (4, 2) array or None
+        Where the board is wanted, px, from its first corner on.
+    cells : (R, C) array or None
+        Points seen in each part of the image; empty ones are filled.
+    arrows : (M, 4) array or None
+        Residuals: place and value, px; drawn enlarged.
+    """
+
+    points: FloatArray | None = None
+    outline: FloatArray | None = None
+    cells: IntArray | None = None
+    arrows: FloatArray | None = None
+
+
+class BoardView(ImageView):
+    """Shows the newest image with what is known of the board."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._overlay = BoardOverlay()
+
+    def overlay(self) -> BoardOverlay:
+        """Return what is drawn on the image."""
+        return self._overlay
+
+    def set_overlay(self, overlay: BoardOverlay) -> None:
+        """Draw something else on the image."""
+        self._overlay = overlay
+        self.update()
+
+    @override
+    def _draw(self, painter: QPainter) -> None:
+        super()._draw(painter)
+        if self.image_size().isEmpty():
+            return
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        shown = self._overlay
+        if shown.cells is not None:
+            self._fill_empty(painter, shown.cells)
+        if shown.outline is not None:
+            self._draw_outline(painter, shown.outline)
+        if shown.points is not None:
+            self._draw_points(painter, shown.points)
+        if shown.arrows is not None:
+            self._draw_arrows(painter, shown.arrows)
+
+    def _fill_empty(self, painter: QPainter, cells: IntArray) -> None:
+        color = QColor(DARK.accent)
+        color.setAlphaF(EMPTY_OPACITY)
+        rows, columns = cells.shape
+        size = self.image_size()
+        width, height = size.width() / columns, size.height() / rows
+        for row, column in np.argwhere(cells == 0).tolist():
+            x, y = column * width - 0.5, row * height - 0.5
+            corners = self.place_of(x, y), self.place_of(x + width, y + height)
+            painter.fillRect(QRectF(*corners), color)
+
+    def _draw_outline(self, painter: QPainter, outline: FloatArray) -> None:
+        places = [self.place_of(x, y) for x, y in outline.tolist()]
+        pen = QPen(QColor(DARK.pointer), 3)
+        pen.setDashPattern([4, 3])
+        painter.setPen(pen)
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawPolygon(QPolygonF(places))
+
+    def _draw_points(self, painter: QPainter, points: FloatArray) -> None:
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(DARK.tone(Tone.GOOD))
+        for x, y in points[np.isfinite(points[:, 0])].tolist():
+            painter.drawEllipse(self.place_of(x, y), POINT, POINT)
+
+    def _draw_arrows(self, painter: QPainter, arrows: FloatArray) -> None:
+        longest = float(np.linalg.norm(arrows[:, 2:], axis=1).max(initial=0.0))
+        if longest == 0:
+            return
+        scale = LONGEST_ARROW / longest
+        painter.setPen(QPen(DARK.tone(Tone.WARN), 1.5))
+        for x, y, u, v in arrows.tolist():
+            foot = self.place_of(x, y)
+            painter.drawLine(QLineF(foot, foot + QPointF(scale * u, scale * v)))
+            painter.drawEllipse(foot, FOOT, FOOT)

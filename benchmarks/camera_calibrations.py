@@ -1,0 +1,166 @@
+"""Cameras calibrated by boards: the image set, and intervals by Monte Carlo."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from benchmarks.rows import Row, numbers, without_data
+from benchmarks.workers import Workers
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.errors import CalibrationError
+from lightpen.estimation.calibrate import calibrate
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.images import find_images
+from lightpen.formats.observation_files import Centers
+from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.calibration import calibrate_camera
+from lightpen.intrinsics.observing import observe_board
+from lightpen.intrinsics.sightings import find_points
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.assumptions import Assumptions
+from lightpen.model.camera import Camera
+from lightpen.simulator.board_views import simulate_board_poses
+from lightpen.simulator.boards import expose_board, render_board
+from lightpen.simulator.sensor import Sensor
+from lightpen.simulator.swings import (
+    paper_camera,
+    paper_pen,
+    simulate_centers,
+    swing_poses,
+)
+
+TOLERANCES = BoardTolerances()
+SET_BOARD = "chessboard:11x8:20"
+FOCAL_LIMIT, CENTER_LIMIT, RMS_LIMIT, N_VIEWS = 0.15, 0.4, 0.03, 24  # px
+N_TRIALS, N_RENDERED = 240, 16  # of which each trial has its own
+N_PARTS = 12
+CORNER_NOISE, LED_NOISE, N_IMAGES = 0.03, 0.03, 60  # px
+# All that enters the tip's U but the camera and the noise.
+TINY = 1e-9
+NOTHING_ELSE = Assumptions(warmth=TINY, form_error=0.0, center_bias=0.0)
+NORMAL_95 = 1.959964
+COVERED = (93.0, 97.0)  # per cent
+TIP_COVERED = (93.0, 100.0)  # what the seat may do is in U, and does not happen here
+CHANCE = 3.0  # per cent: two standard deviations of a share of 240 trials
+STREAM = 23  # of the seeds
+SMALL_BOARD = "chessboard:8x6:20"
+SMALL = Camera(
+    *(320, 256, 600.0, 599.7, 161.2, 126.3),
+    distortion=np.array([-0.12, 0.08, 0.0003, -0.0002, 0.0]),
+)
+WATCHED = [0, 2, 4]  # fx, cx, k1
+
+
+def camera_calibration_rows(workers: Workers, data: Path | None) -> list[Row]:
+    """Return what calibrations by a board reach."""
+    parts = list(range(N_PARTS))
+    rendered = np.concatenate(workers.map(_rendered_deviations, parts))
+    tips = np.concatenate(workers.map(_tip_deviations, parts))
+    return [
+        *(without_data("`chessboard`") if data is None else [_of_set(data)]),
+        _covered(
+            f"fx, cx, k1 by {len(rendered)} sets of rendered boards", rendered, COVERED
+        ),
+        _covered(
+            f"Tip x y z with {len(tips)} cameras calibrated so", tips, TIP_COVERED
+        ),
+    ]
+
+
+def _of_set(data: Path) -> Row:
+    truth = read_camera(data / "chessboard" / "camera_truth.yaml")
+    source = find_images(str(data / "chessboard"))
+    observed = observe_board(source, parse_board(SET_BOARD), lambda fraction: None)
+    found = calibrate_camera(observed.views, TOLERANCES)
+    assert found.camera.covariance is not None
+    errors = found.camera.intrinsics - truth.intrinsics
+    sigmas = np.sqrt(np.diag(found.camera.covariance))
+    inside = np.abs(errors) < NORMAL_95 * sigmas
+    n_found, rms = observed.views.n_views, found.adjustment.rms
+    met = (
+        n_found == N_VIEWS
+        and rms <= RMS_LIMIT
+        and bool(inside.all())
+        and bool(np.all(np.abs(errors[:2]) <= FOCAL_LIMIT))
+        and bool(np.all(np.abs(errors[2:4]) <= CENTER_LIMIT))
+    )
+    return Row(
+        "`chessboard`: views found; errors of fx fy cx cy; rms; 95 % intervals that "
+        "hold the truth",
+        f"{n_found}; {numbers(errors[:4], 2)} px; {rms:.4f} px; {inside.sum()} of "
+        f"{len(inside)}",
+        f"{N_VIEWS}; {FOCAL_LIMIT} and {CENTER_LIMIT} px; {RMS_LIMIT} px; all",
+        met=met,
+    )
+
+
+def _covered(what: str, deviations: FloatArray, limits: tuple[float, float]) -> Row:
+    shares = 100 * np.mean(np.abs(deviations) < NORMAL_95, axis=0)
+    low, high = limits
+    return Row(
+        f"{what}: in their 95 % intervals",
+        f"{numbers(shares, 1)} %",
+        f"{low:.0f} to {high:.0f} %, by chance {CHANCE:.0f} % off",
+        met=bool(np.all((shares >= low - CHANCE) & (shares <= high + CHANCE))),
+    )
+
+
+def _rendered_deviations(part: int) -> FloatArray:
+    """Return errors of fx, cx and k1 in standard uncertainties, (T, 3)."""
+    board = parse_board(SMALL_BOARD)
+    deviations = []
+    for trial in range(part, N_TRIALS, N_PARTS):
+        rng = np.random.default_rng([STREAM, trial])
+        poses = simulate_board_poses(SMALL, board, N_RENDERED, rng)
+        seen = []
+        for R, t in zip(poses.rotations, poses.translations, strict=True):
+            light = render_board(SMALL, board, R, t)
+            seen.append(find_points(expose_board(light, Sensor(), rng), board))
+        found = [points for points in seen if points is not None]
+        names = tuple(map(str, range(len(found))))
+        views = Views(board, names, np.array(found)[:, None], (SMALL.image_size,))
+        deviations.append(_deviations(_calibrated(views), SMALL)[WATCHED])
+    return np.array(deviations)
+
+
+def _tip_deviations(part: int) -> FloatArray:
+    """Return errors of the tip by cameras calibrated so, likewise."""
+    truth = replace(paper_camera(), covariance=None)
+    pen = replace(paper_pen(), scale_sigma=TINY, diameter_sigma=TINY)
+    board = parse_board(SET_BOARD)
+    deviations = []
+    for trial in range(part, N_TRIALS, N_PARTS):
+        rng = np.random.default_rng([STREAM, 1, trial])
+        poses = simulate_board_poses(truth, board, N_VIEWS, rng)
+        points = board.points @ np.swapaxes(poses.rotations, 1, 2)
+        pixels = truth.project(points + poses.translations[:, None])
+        pixels += rng.normal(0, CORNER_NOISE / np.sqrt(2), pixels.shape)
+        names = tuple(map(str, range(N_VIEWS)))
+        views = Views(board, names, pixels[:, None], (truth.image_size,))
+        camera = _calibrated(views)
+        swing = swing_poses(N_IMAGES, rng)
+        pixels = simulate_centers(
+            truth, pen, swing.rotations, swing.translations, LED_NOISE, rng
+        )
+        centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+        observations = observe_centers(centers, camera, pen)
+        solved = calibrate(camera, pen, observations, NOTHING_ELSE)
+        sigmas = np.sqrt(np.diag(solved.budget.covariance)[:3])
+        deviations.append((solved.joint.tip_pen - swing.tip_pen) / sigmas)
+    return np.array(deviations)
+
+
+def _calibrated(views: Views) -> Camera:
+    try:
+        return calibrate_camera(views, TOLERANCES).camera
+    except CalibrationError as error:
+        raise RuntimeError(f"A set of boards was refused: {error}") from error
+
+
+def _deviations(found: Camera, truth: Camera) -> FloatArray:
+    assert found.covariance is not None
+    n = min(len(found.intrinsics), len(truth.intrinsics))
+    errors = found.intrinsics[:n] - truth.intrinsics[:n]
+    return np.asarray(errors / np.sqrt(np.diag(found.covariance))[:n])

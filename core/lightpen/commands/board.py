@@ -1,0 +1,44 @@
+"""``lightpen board``: a board to be printed."""
+
+import argparse
+from pathlib import Path
+
+from lightpen.commands.console import printing, shown
+from lightpen.errors import UsageError
+from lightpen.formats.files import printable, write_whole
+from lightpen.intrinsics.boards import parse_board
+from lightpen.intrinsics.page import PAPERS, board_page
+from lightpen.sentences import sentence
+
+
+def add_board(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen board``."""
+    parser.set_defaults(run=_board)
+    parser.add_argument(
+        "board", metavar="BOARD", help="such as chessboard:11x8:20, as for intrinsics"
+    )
+    parser.add_argument("out", type=Path, metavar="OUT.pdf")
+    parser.add_argument(
+        "--paper", choices=PAPERS, help="the smallest that holds the board unless given"
+    )
+
+
+@printing
+def _board(options: argparse.Namespace) -> None:
+    if options.out.suffix.lower() != ".pdf":
+        raise UsageError(
+            sentence(
+                "cli.board-suffix",
+                "A board is written as PDF, but {name} does not end in .pdf. Choose "
+                "such a name.",
+                name=printable(options.out.name),
+            )
+        )
+    board = parse_board(options.board)
+    write_whole(options.out, board_page(board, options.paper))
+    print(
+        shown(
+            f"The board {board.name} is in {options.out}. Print it at 100 %, not to "
+            "fit the page; its scale must be 100 mm long. Mount it on a flat plate."
+        )
+    )

@@ -1,0 +1,96 @@
+"""``lightpen check-camera``: whether camera and file still agree, by one swing."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.commands.arguments import add_json, add_pen_options, number_from
+from lightpen.commands.console import (
+    printing,
+    progress,
+    require_other_file,
+    shown,
+    write_record,
+)
+from lightpen.detection.observations import observe_images
+from lightpen.errors import CalibrationError
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.contradictions import COEFFICIENTS
+from lightpen.estimation.report import plain
+from lightpen.estimation.rig_report import intrinsics_record
+from lightpen.formats.camera_files import COLDEST, WARMEST, read_camera
+from lightpen.formats.images import find_images
+from lightpen.formats.pen_files import read_pen
+from lightpen.local_time import local_now
+from lightpen.model.camera_validity import doubts_about
+
+COVERAGE_FACTOR = 2.0
+
+
+def add_check_camera(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen check-camera``."""
+    parser.set_defaults(run=_check_camera)
+    parser.add_argument(
+        "images", nargs="+", metavar="IMAGES", help="of one swing of the pen"
+    )
+    parser.add_argument("--camera", type=Path, required=True, metavar="FILE")
+    parser.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--temperature",
+        type=number_from(COLDEST, WARMEST, "temperature", "degrees Celsius"),
+        metavar="CELSIUS",
+        help="at the station",
+    )
+    add_json(parser)
+
+
+@printing
+def _check_camera(options: argparse.Namespace) -> None:
+    source = find_images(*options.images)
+    require_other_file(options.json, options.camera, options.pen, *source.files)
+    camera = read_camera(options.camera)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    with progress("Finding LEDs") as report:
+        observations = observe_images(source, camera, pen, report)
+    calibration = calibrate(camera, pen, observations)
+    doubts = doubts_about(camera, local_now().date(), options.temperature)
+    denied = [each for each in calibration.contradictions if not each.of_pen]
+    print(shown(_text(calibration, camera.intrinsics.tolist())))
+    for doubt in doubts:
+        print(shown(str(doubt)))
+    if options.json is not None:
+        record = {
+            "kind": "camera check",
+            "agrees": not denied,
+            "intrinsics": intrinsics_record(calibration, 0),
+            "contradictions": [each.sentence for each in denied],
+            "doubts": doubts,
+        }
+        write_record(options.json, plain(record))
+    if denied:
+        raise CalibrationError(denied[0].sentence)
+    print("\nFile and camera agree.")
+
+
+def _text(calibration: Calibration, stated: list[float]) -> str:
+    fitted = calibration.bundle
+    place = fitted.columns.cameras[0]
+    camera = fitted.state.rig.cameras[0]
+    u = COVERAGE_FACTOR * np.sqrt(np.diag(fitted.covariance)[place])
+    before = COVERAGE_FACTOR * np.sqrt(
+        np.diag(calibration.priors.cameras[0].covariance)
+    )
+    lines = [
+        f"{'':8}{'file':>14}{'U (k = 2)':>12}{'with the swing':>16}{'U (k = 2)':>12}"
+    ]
+    lines += [
+        f"  {name:<6}{of_file:14.6g}{known:12.2g}{value:16.6g}{now:12.2g}"
+        for name, of_file, known, value, now in zip(
+            ("fx", "fy", "cx", "cy", *COEFFICIENTS),
+            *(stated, before.tolist(), camera.intrinsics.tolist(), u.tolist()),
+            strict=False,
+        )
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Calibrating a camera, or two beside each other, by views of a board."""

@@ -1,0 +1,551 @@
+"""Bundle adjustment of a board: cameras, their places, and how true the board is.
+
+Point n of the board in view v, seen by camera c, lies at
+
+    X_c = R_c (R_v (x_n + s(x_n)) + t_v) + t_c,
+
+R_c, t_c being the identity for the first camera. The board's own error ``s`` has five
+numbers: a stretch along x against y, a shear, and a bend of its corners by three
+paraboloids; each has a prior, as have the intrinsics where a file states them. A disc
+is seen as its ellipse, the centre of which is not its image. The poses are eliminated
+view by view [1]_, and the rest is solved by Levenberg's and Marquardt's method.
+
+References
+----------
+.. [1] B. Triggs et al., "Bundle adjustment - a modern synthesis", LNCS 1883 (2000)
+   298-372, section 6.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.start import BoardPoses
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.rigid import rotation_from_vector, skew
+from lightpen.sentences import sentence
+
+N_POSE, N_SHAPE = 6, 5
+MAX_STEPS = 100
+MAX_DAMPING = 1e12
+FIRST_DAMPING = 1e-3
+CONVERGED = 1e-7  # of the sum of squares; far below what changes a digit that is shown
+FINEST = 1e-4  # px; exact points that weigh more drown the priors in rounding
+NOISE_ROUNDS = 3
+VAGUE = 1e-13  # least eigenvalue of an information matrix scaled to ones
+
+
+@dataclass(frozen=True, eq=False)
+class BoardState:
+    """Everything that the points of the views depend on.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        C of them.
+    rotations, translations : (C, 3, 3) and (C, 3) array
+        Of cam_from_rig, mm.
+    poses : BoardPoses
+        Of rig_from_board.
+    shape : (5,) array
+        Stretch, shear, and three bends, mm.
+    """
+
+    cameras: tuple[Camera, ...]
+    rotations: FloatArray
+    translations: FloatArray
+    poses: BoardPoses
+    shape: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BoardFit:
+    """A state that fits the views, and how well it is known.
+
+    Attributes
+    ----------
+    residuals : (V, C, N, 2) array
+        Observed minus modelled, px; NaN where not seen.
+    sigma : float
+        Noise of one coordinate, px.
+    information, scores : (V, p, p) and (V, p) array
+        Of each view about all but its pose, for points of 1 px noise; their gradient.
+    prior : (p, p) array
+        Information of the priors.
+    covariance : (p, p) array
+        Of the unknowns but the poses, noise being independent.
+    """
+
+    board: Board
+    state: BoardState
+    residuals: FloatArray
+    sigma: float
+    information: FloatArray
+    scores: FloatArray
+    prior: FloatArray
+    covariance: FloatArray
+
+    @property
+    def board_points(self) -> FloatArray:
+        """Points of the board as it was found to be, (N, 3), mm."""
+        return board_points(self.board, self.state.shape)
+
+    @property
+    def rms(self) -> float:
+        """Distance of the points from where they should be, px rms."""
+        squares = np.square(self.residuals).sum(axis=-1)
+        return float(np.sqrt(np.nanmean(squares)))
+
+    @property
+    def view_rms(self) -> FloatArray:
+        """The same of each view and camera, (V, C); NaN where nothing was seen."""
+        squares = np.square(self.residuals).sum(axis=-1)
+        counts = np.isfinite(squares).sum(axis=-1)
+        sums = np.nansum(squares, axis=-1)
+        return np.asarray(np.sqrt(sums / np.where(counts > 0, counts, np.nan)))
+
+    def of_intrinsics(self, camera: int) -> slice:
+        """Return where the intrinsics of a camera stand among the unknowns."""
+        return _intrinsics_at(self.state.cameras)[camera]
+
+    @property
+    def correlation(self) -> float:
+        """How many times the variance of independent noise the views vary by.
+
+        The scores of views scatter as the information of independent noise says, if it
+        is that; where they scatter more, residuals hang together within a view [1]_.
+
+        References
+        ----------
+        .. [1] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized
+           linear models", Biometrika 73 (1986) 13-22.
+        """
+        S, weight = self.covariance, self.sigma**-2
+        information, scores = weight * self.information, weight * self.scores
+        found = np.einsum("vi,ij,vj->", scores, S, scores)
+        leverages = S @ information
+        expected = np.einsum("vii->", leverages)
+        expected -= np.einsum("vij,vji->", leverages, leverages)
+        return float(found / expected)
+
+    @property
+    def of_places(self) -> slice:
+        """Where the places of all cameras but the first stand."""
+        return _places_at(self.state.cameras)
+
+    @property
+    def of_shape(self) -> slice:
+        """Where the errors of the board stand."""
+        at = self.of_places
+        return slice(at.stop, at.stop + N_SHAPE)
+
+
+class _System(NamedTuple):
+    """Normal equations for points of 1 px noise, view by view."""
+
+    residuals: FloatArray
+    shared: FloatArray
+    right: FloatArray
+    cross: FloatArray
+    own: FloatArray
+    own_right: FloatArray
+
+
+def adjust(
+    views: Views,
+    start: BoardState,
+    tolerances: BoardTolerances,
+    stated: tuple[FloatArray | None, ...] = (),
+) -> BoardFit:
+    """Fit everything to the points of all views.
+
+    Parameters
+    ----------
+    start : BoardState
+        With the intrinsics as their files have them, where ``stated`` says so.
+    stated : tuple of (4 + n, 4 + n) array or None
+        Information of the intrinsics of each camera beside the views; none where None.
+
+    Raises
+    ------
+    CalibrationError
+        The points do not settle, or leave the camera open.
+    """
+    prior = _prior(start, tolerances, stated)
+    origin, state = start, start
+    sigma = max(_rms(_residuals(views, state)), FINEST)
+    for _ in range(NOISE_ROUNDS):
+        state, system = _settled(views, state, origin, prior, sigma)
+        information, scores = _eliminated(system)
+        both = information.sum(axis=0) / sigma**2 + prior
+        covariance = _inverse(both)
+        n_points = int(views.seen.sum())
+        n_known = float(np.sum(covariance * prior))
+        n_free = 2 * n_points - N_POSE * views.n_views - len(prior) + n_known
+        squares = float(np.nansum(np.square(system.residuals)))
+        before, sigma = sigma, max(np.sqrt(squares / max(n_free, 1.0)), FINEST)
+        if abs(sigma - before) < 1e-3 * sigma:
+            break
+    covariance = _inverse(information.sum(axis=0) / sigma**2 + prior)
+    return BoardFit(
+        views.board,
+        state,
+        system.residuals,
+        float(sigma),
+        information,
+        scores,
+        prior,
+        covariance,
+    )
+
+
+def fit_poses(views: Views, state: BoardState) -> FloatArray:
+    """Return the residuals of views of which only the poses are fitted.
+
+    Parameters
+    ----------
+    state : BoardState
+        All but the poses holds.
+
+    Returns
+    -------
+    (V, C, N, 2) array
+        px.
+    """
+    n = sum(len(camera.intrinsics) for camera in state.cameras)
+    held = np.diag(np.full(n + N_POSE * (len(state.cameras) - 1) + N_SHAPE, 1e20))
+    _, system = _settled(views, state, state, held, 1.0)
+    return system.residuals
+
+
+def view_information(
+    board: Board, state: BoardState, image_size: tuple[int, int]
+) -> FloatArray:
+    """Return what views of a single camera would tell of all but their poses.
+
+    Parameters
+    ----------
+    state : BoardState
+        With the poses of these views.
+    image_size : tuple of int
+        Outside of which no point is seen.
+
+    Returns
+    -------
+    (V, p, p) array
+        For points of 1 px noise.
+    """
+    _, points = _points_cam(board, state)
+    pixels = np.array(state.cameras[0].project(points))
+    inside = (pixels >= 0).all(axis=-1) & (pixels < np.array(image_size)).all(axis=-1)
+    pixels[~inside | (points[..., 2] <= 0)] = np.nan
+    names = ("",) * len(pixels)
+    system = _system(Views(board, names, pixels, (image_size,)), state)
+    return _eliminated(system)[0]
+
+
+def board_points(board: Board, shape: FloatArray) -> FloatArray:
+    """Return the points of a board as it is, (N, 3), mm."""
+    return np.asarray(board.points + _deformations(board) @ shape)
+
+
+def _settled(
+    views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
+) -> tuple[BoardState, _System]:
+    state, damping = start, FIRST_DAMPING
+    if np.isinf(_residuals(views, state)).any():
+        raise CalibrationError(
+            sentence(
+                "intrinsics.no-start",
+                "No camera sees a flat board {board} as the points have it: it has "
+                "other squares than said, or the images are not of one camera. Count "
+                "and measure its squares again.",
+                board=views.board.name,
+            )
+        )
+    system = _system(views, state)
+    cost = _cost_of(system.residuals, state, origin, prior, sigma)
+    for _ in range(MAX_STEPS):
+        step, poses_step = _step(system, state, origin, prior, sigma, damping)
+        moved = _moved(state, step, poses_step)
+        there = _residuals(views, moved)
+        reached = _cost_of(there, moved, origin, prior, sigma)
+        if not reached <= cost:
+            damping *= 10
+            if damping > MAX_DAMPING:
+                return state, system
+            continue
+        gained = cost - reached
+        state, cost, damping = moved, reached, max(damping / 10, 1e-12)
+        system = _system(views, state)
+        if gained <= CONVERGED * (cost + 1e-12):
+            return state, system
+    raise CalibrationError(
+        sentence(
+            "intrinsics.not-settled",
+            "The adjustment did not settle in {n_steps} steps. The views may be too "
+            "alike, or of another board than was said: check both.",
+            n_steps=MAX_STEPS,
+        )
+    )
+
+
+def _step(
+    system: _System,
+    state: BoardState,
+    origin: BoardState,
+    prior: FloatArray,
+    sigma: float,
+    damping: float,
+) -> tuple[FloatArray, FloatArray]:
+    weight = sigma**-2
+    own = weight * system.own
+    # A view without points leaves nothing to divide by.
+    own = own + (damping * _diagonals(own) + 1e-12 * np.eye(N_POSE))
+    shared = weight * system.shared.sum(axis=0) + prior
+    shared = shared + damping * np.diag(np.diag(shared))
+    right = weight * system.right.sum(axis=0) - prior @ _away(state, origin)
+    cross = weight * system.cross
+    solved = np.linalg.solve(own, np.swapaxes(cross, 1, 2))
+    own_right = weight * system.own_right
+    reduced = shared - np.einsum("vpi,viq->pq", cross, solved)
+    reduced_right = right - np.einsum("viq,vi->q", solved, own_right)
+    scale = 1 / np.sqrt(np.maximum(np.diag(shared), 1e-300))
+    step = scale * np.linalg.solve(
+        reduced * np.outer(scale, scale) + VAGUE * np.eye(len(scale)),
+        scale * reduced_right,
+    )
+    left = own_right - np.einsum("vpi,p->vi", cross, step)
+    return step, np.linalg.solve(own, left[..., None])[..., 0]
+
+
+def _eliminated(system: _System) -> tuple[FloatArray, FloatArray]:
+    """Return information and score of each view about all but its pose."""
+    solved = np.linalg.solve(
+        system.own + 1e-12 * np.eye(N_POSE), np.swapaxes(system.cross, 1, 2)
+    )
+    information = system.shared - system.cross @ solved
+    scores = system.right - np.einsum("viq,vi->vq", solved, system.own_right)
+    return information, scores
+
+
+def _diagonals(matrices: FloatArray) -> FloatArray:
+    return np.asarray(matrices * np.eye(matrices.shape[-1]))
+
+
+def _cost_of(
+    residuals: FloatArray,
+    state: BoardState,
+    origin: BoardState,
+    prior: FloatArray,
+    sigma: float,
+) -> float:
+    away = _away(state, origin)
+    return float(np.nansum(np.square(residuals)) / sigma**2 + away @ prior @ away)
+
+
+def _away(state: BoardState, origin: BoardState) -> FloatArray:
+    """Return how far the unknowns are from where the priors have them.
+
+    No prior is about the cameras' places.
+    """
+    intrinsics = [
+        one.intrinsics - other.intrinsics
+        for one, other in zip(state.cameras, origin.cameras, strict=True)
+    ]
+    places = np.zeros(N_POSE * (len(state.cameras) - 1))
+    return np.concatenate([*intrinsics, places, state.shape - origin.shape])
+
+
+def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> BoardState:
+    places = _places_at(state.cameras)
+    cameras = tuple(
+        moved_camera(camera, step[at])
+        for camera, at in zip(state.cameras, _intrinsics_at(state.cameras), strict=True)
+    )
+    extrinsics = np.zeros((len(cameras), N_POSE))
+    extrinsics[1:] = step[places].reshape(-1, N_POSE)
+    return BoardState(
+        cameras,
+        rotation_from_vector(extrinsics[:, :3]) @ state.rotations,
+        state.translations + extrinsics[:, 3:],
+        BoardPoses(
+            rotation_from_vector(poses_step[:, :3]) @ state.poses.rotations,
+            state.poses.translations + poses_step[:, 3:],
+        ),
+        state.shape + step[places.stop :],
+    )
+
+
+def moved_camera(camera: Camera, step: FloatArray) -> Camera:
+    """Return a camera whose intrinsics are changed by a step."""
+    fx, fy, cx, cy, *distortion = (camera.intrinsics + step).tolist()
+    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=np.array(distortion))
+
+
+def _points_cam(board: Board, state: BoardState) -> tuple[FloatArray, FloatArray]:
+    """Return the points in the rig, less the poses' translations, and in the cameras.
+
+    (V, N, 3) and (V, C, N, 3).
+    """
+    turned = board_points(board, state.shape) @ np.swapaxes(state.poses.rotations, 1, 2)
+    in_rig = turned + state.poses.translations[:, None]
+    in_cameras = np.einsum("cij,vnj->vcni", state.rotations, in_rig)
+    return turned, in_cameras + state.translations[None, :, None]
+
+
+def _modelled(
+    camera: Camera, points: FloatArray, board: Board, normals: FloatArray
+) -> FloatArray:
+    if not board.kind.is_circles:
+        return camera.project(points)
+    return ellipse_centers(camera, points, normals[:, None], 0.5 * board.detail)
+
+
+def _normals(state: BoardState) -> FloatArray:
+    """Return the normals of the board, (V, C, 3), in the cameras."""
+    normals = state.poses.rotations[..., 2]
+    return np.asarray(np.einsum("cij,vj->vci", state.rotations, normals))
+
+
+def _residuals(views: Views, state: BoardState) -> FloatArray:
+    _, points = _points_cam(views.board, state)
+    normals = _normals(state)
+    residuals = np.empty_like(views.pixels)
+    with np.errstate(all="ignore"):  # a step too far is not taken
+        for c, camera in enumerate(state.cameras):
+            at = _modelled(camera, points[:, c], views.board, normals[:, c])
+            left = views.pixels[:, c] - at
+            is_far = (points[:, c, :, 2:] <= 0) | ~np.isfinite(left)
+            residuals[:, c] = np.where(is_far, np.inf, left)
+    residuals[~views.seen] = np.nan
+    return residuals
+
+
+def _system(views: Views, state: BoardState) -> _System:
+    turned, points = _points_cam(views.board, state)
+    deformations = _deformations(views.board)
+    residuals = _residuals(views, state)
+    seen = views.seen
+    n_views, _, n_points, _ = views.pixels.shape
+    intrinsics_at, places = _intrinsics_at(state.cameras), _places_at(state.cameras)
+    n_shared = places.stop + N_SHAPE
+    total = _System(
+        residuals,
+        np.zeros((n_views, n_shared, n_shared)),
+        np.zeros((n_views, n_shared)),
+        np.zeros((n_views, n_shared, N_POSE)),
+        np.zeros((n_views, N_POSE, N_POSE)),
+        np.zeros((n_views, N_POSE)),
+    )
+    for c, camera in enumerate(state.cameras):
+        X, R = points[:, c], state.rotations[c]
+        by_point = camera.project_with_jacobian(X).jacobian
+        shared = np.zeros((n_views, n_points, 2, n_shared))
+        shared[..., intrinsics_at[c]] = camera.intrinsics_jacobian(
+            X[..., :2] / X[..., 2:]
+        )
+        if c > 0:
+            at = places.start + N_POSE * (c - 1)
+            arms = X - state.translations[c]
+            shared[..., at : at + 3] = -by_point @ skew(arms)
+            shared[..., at + 3 : at + 6] = by_point
+        by_rig = by_point @ R
+        by_board = by_rig @ state.poses.rotations[:, None]
+        shared[..., places.stop :] = by_board @ deformations
+        own = np.concatenate([-by_rig @ skew(turned), by_rig], axis=-1)
+        missing = ~seen[:, c]
+        shared[missing], own[missing] = 0.0, 0.0
+        left = np.where(missing[..., None], 0.0, residuals[:, c])
+        shared = shared.reshape(n_views, -1, n_shared)
+        own = own.reshape(n_views, -1, N_POSE)
+        left = left.reshape(n_views, -1, 1)
+        across = np.swapaxes(shared, 1, 2)
+        total.shared[:] += across @ shared
+        total.right[:] += (across @ left)[..., 0]
+        total.cross[:] += across @ own
+        total.own[:] += np.swapaxes(own, 1, 2) @ own
+        total.own_right[:] += (np.swapaxes(own, 1, 2) @ left)[..., 0]
+    return total
+
+
+def _deformations(board: Board) -> FloatArray:
+    """Return how each error of a board moves its points, (N, 3, 5)."""
+    points = board.points
+    x, y = points[:, 0], points[:, 1]
+    u, v = x / np.abs(x).max(), y / np.abs(y).max()
+    moves = np.zeros((len(points), 3, N_SHAPE))
+    moves[:, 0, 0], moves[:, 1, 0] = 0.5 * x, -0.5 * y
+    moves[:, 0, 1], moves[:, 1, 1] = 0.5 * y, 0.5 * x
+    for k, bend in enumerate((u * u, u * v, v * v), 2):
+        moves[:, 2, k] = bend - bend.mean()
+    return moves
+
+
+def _prior(
+    start: BoardState,
+    tolerances: BoardTolerances,
+    stated: tuple[FloatArray | None, ...],
+) -> FloatArray:
+    places = _places_at(start.cameras)
+    information = np.zeros((places.stop + N_SHAPE,) * 2)
+    for at, known in zip(_intrinsics_at(start.cameras), stated, strict=False):
+        if known is not None:
+            information[at, at] = known
+    sigmas = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
+    information[places.stop :, places.stop :] = np.diag(sigmas**-2.0)
+    return information
+
+
+def stated_information(covariance: FloatArray) -> FloatArray:
+    """Return what a file tells, its covariance given; exact is nearly so."""
+    sigmas = np.sqrt(np.diag(covariance))
+    sigmas = np.where(sigmas > 0, sigmas, 1e-9)
+    correlations = covariance / np.outer(sigmas, sigmas)
+    np.fill_diagonal(correlations, 1.0)
+    correlations += 1e-9 * np.eye(len(sigmas))
+    return np.asarray(np.linalg.inv(correlations) / np.outer(sigmas, sigmas))
+
+
+def _inverse(information: FloatArray) -> FloatArray:
+    """Return a covariance.
+
+    Raises
+    ------
+    CalibrationError
+        Something is left open.
+    """
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    if values[0] < VAGUE:
+        raise CalibrationError(
+            sentence(
+                "intrinsics.open",
+                "The views leave the camera open: they are too alike. Add views with "
+                "the board tilted by 20 to 40 degrees to each side, and reaching into "
+                "each corner of the image.",
+            )
+        )
+    inverse = (vectors / values) @ vectors.T
+    return np.asarray(inverse * np.outer(scale, scale))
+
+
+def _rms(residuals: FloatArray) -> float:
+    finite = residuals[np.isfinite(residuals)]
+    return float(np.sqrt(np.mean(np.square(finite)))) if len(finite) else 0.0
+
+
+def _intrinsics_at(cameras: tuple[Camera, ...]) -> list[slice]:
+    ends = np.cumsum([len(camera.intrinsics) for camera in cameras]).tolist()
+    return [slice(b, e) for b, e in zip([0, *ends[:-1]], ends, strict=True)]
+
+
+def _places_at(cameras: tuple[Camera, ...]) -> slice:
+    begin = sum(len(camera.intrinsics) for camera in cameras)
+    return slice(begin, begin + N_POSE * (len(cameras) - 1))

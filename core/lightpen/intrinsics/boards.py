@@ -1,0 +1,275 @@
+"""Boards that cameras are calibrated by, and how they are named in one word.
+
+A board is told as ``KIND:COLUMNSxROWS:...`` with lengths in mm:
+
+================================================ =====================================
+``chessboard:11x8:20``                           inner corners, side of a square
+``charuco:12x9:20:15:DICT_5X5_100``              squares, their side, side of a marker,
+                                                 dictionary of the markers
+``charuco-legacy:...``                           the same, as OpenCV laid it out until
+                                                 4.6
+``markers:5x7:30:6:DICT_6X6_250``                markers, their side, the gap between
+                                                 them, dictionary
+``circles:9x7:20:10``                            circles, their distance, diameter
+``asymmetric-circles:4x11:20:10``                circles; each second row is set off by
+                                                 the distance, and twice that apart
+================================================ =====================================
+
+The frame of a board has x along its rows, y down its columns and z away from whoever
+looks at it; its origin is the middle of its points.
+"""
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+
+import cv2
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import UsageError
+from lightpen.sentences import sentence
+
+MIN_SIDE, MAX_SIDE = 2, 100  # points or squares along a side
+MAX_LENGTH = 10_000.0  # mm
+CORNERS = 4  # of a marker
+FORMS = (
+    "chessboard:11x8:20, charuco:12x9:20:15:DICT_5X5_100, "
+    "charuco-legacy:12x9:20:15:DICT_5X5_100, markers:5x7:30:6:DICT_6X6_250, "
+    "circles:9x7:20:10, asymmetric-circles:4x11:20:10"
+)
+
+
+class BoardKind(StrEnum):
+    """What a board shows."""
+
+    CHESSBOARD = "chessboard"
+    CHARUCO = "charuco"
+    LEGACY_CHARUCO = "charuco-legacy"
+    MARKERS = "markers"
+    CIRCLES = "circles"
+    ASYMMETRIC_CIRCLES = "asymmetric-circles"
+
+    @property
+    def is_circles(self) -> bool:
+        """Whether its points are the centres of discs."""
+        return self in (BoardKind.CIRCLES, BoardKind.ASYMMETRIC_CIRCLES)
+
+    @property
+    def has_markers(self) -> bool:
+        """Whether each of its points has a number of its own."""
+        return self in (
+            BoardKind.CHARUCO,
+            BoardKind.LEGACY_CHARUCO,
+            BoardKind.MARKERS,
+        )
+
+
+@dataclass(frozen=True)
+class Board:
+    """A flat board with known points.
+
+    Attributes
+    ----------
+    columns, rows : int
+        Inner corners of a chessboard, squares of a ChArUco board, markers, or circles.
+    pitch : float
+        Side of a square, side of a marker of a board of markers alone, or distance of
+        the circles (half of that within a row, if they are asymmetric), mm.
+    detail : float
+        Side of a marker of a ChArUco board, gap between markers, or diameter of the
+        circles, mm; 0 of a chessboard.
+    dictionary : str
+        Of the markers, as OpenCV names it; empty without markers.
+    """
+
+    kind: BoardKind
+    columns: int
+    rows: int
+    pitch: float
+    detail: float = 0.0
+    dictionary: str = ""
+
+    @property
+    def name(self) -> str:
+        """The word that tells the board."""
+        parts = [self.kind.value, f"{self.columns}x{self.rows}", f"{self.pitch:g}"]
+        if self.kind is not BoardKind.CHESSBOARD:
+            parts.append(f"{self.detail:g}")
+        return ":".join([*parts, self.dictionary] if self.dictionary else parts)
+
+    @property
+    def points(self) -> FloatArray:
+        """Points in the frame of the board, (N, 3), mm."""
+        points = np.zeros((len(self._grid), 3))
+        points[:, :2] = self._grid - self._middle
+        return points
+
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self._grid)
+
+    @property
+    def outline(self) -> FloatArray:
+        """Corners of the rectangle round its points, (4, 3), mm, one after another."""
+        x, y = np.abs(self.points[:, :2]).max(axis=0)
+        return np.array([[-x, -y, 0.0], [x, -y, 0.0], [x, y, 0.0], [-x, y, 0.0]])
+
+    @property
+    def orders(self) -> tuple[IntArray, ...]:
+        """Numbers of the points for each turn that looks the same, itself first."""
+        numbers = np.arange(self.n_points)
+        if self.kind not in (BoardKind.CHESSBOARD, BoardKind.CIRCLES):
+            return (numbers,)
+        turned = [numbers, numbers[::-1]]
+        if self.columns == self.rows:
+            quarter = np.rot90(numbers.reshape(self.rows, self.columns)).ravel()
+            turned += [quarter, quarter[::-1]]
+        return tuple(turned)
+
+    @property
+    def _middle(self) -> FloatArray:
+        return np.asarray(0.5 * (self._grid.min(axis=0) + self._grid.max(axis=0)))
+
+    @property
+    def _grid(self) -> FloatArray:
+        """Points from the first one on, (N, 2), mm, in the order they are found in."""
+        if self.kind is BoardKind.MARKERS:
+            step = self.pitch + self.detail
+            square = self.pitch * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+            corners = step * _lattice(self.columns, self.rows)[:, None] + square
+            return np.asarray(corners.reshape(-1, 2))
+        if self.kind is BoardKind.ASYMMETRIC_CIRCLES:
+            lattice = _lattice(self.columns, self.rows)
+            lattice[:, 0] = 2 * lattice[:, 0] + lattice[:, 1] % 2
+            return np.asarray(self.pitch * lattice)
+        fewer = 1 if self.kind.has_markers else 0
+        return np.asarray(
+            self.pitch * _lattice(self.columns - fewer, self.rows - fewer)
+        )
+
+
+def marker_dictionary(board: Board) -> cv2.aruco.Dictionary:
+    """Return the markers of a board that has some."""
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+
+
+def parse_board(text: str) -> Board:
+    """Return the board that a word tells; see the module for the forms.
+
+    Raises
+    ------
+    UsageError
+        The word tells none.
+    """
+    kind_word, *parts = text.strip().split(":")
+    kinds = {kind.value: kind for kind in BoardKind}
+    kind = kinds.get(kind_word.casefold())
+    counts = re.fullmatch(r"(?a:(\d{1,3})x(\d{1,3}))", parts[0]) if parts else None
+    if kind is None or counts is None:
+        raise _no_board(text)
+    n_lengths = 1 if kind is BoardKind.CHESSBOARD else 2
+    lengths = [_length(part, text) for part in parts[1 : 1 + n_lengths]]
+    words = parts[1 + n_lengths :]
+    if len(lengths) != n_lengths or len(words) != (1 if kind.has_markers else 0):
+        raise _no_board(text)
+    board = Board(
+        kind=kind,
+        columns=int(counts[1]),
+        rows=int(counts[2]),
+        pitch=lengths[0],
+        detail=lengths[1] if n_lengths > 1 else 0.0,
+        dictionary=words[0].upper() if words else "",
+    )
+    _check(board, text)
+    return board
+
+
+def _length(word: str, text: str) -> float:
+    if not re.fullmatch(r"(?a:\d+(\.\d*)?|\.\d+)", word):
+        raise _no_board(text)
+    return float(word)
+
+
+def _check(board: Board, text: str) -> None:
+    """Refuse what cannot be."""
+    if not all(MIN_SIDE <= n <= MAX_SIDE for n in (board.columns, board.rows)):
+        raise UsageError(
+            sentence(
+                "board.size",
+                "The board {text} has {columns} x {rows} points or squares; {least} to "
+                "{most} are needed along each side. Count them again: of a chessboard "
+                "it is the inner corners that count.",
+                text=text,
+                columns=board.columns,
+                rows=board.rows,
+                least=MIN_SIDE,
+                most=MAX_SIDE,
+            )
+        )
+    is_smaller = (
+        board.kind is BoardKind.MARKERS
+        or board.detail
+        < (2**0.5 if board.kind is BoardKind.ASYMMETRIC_CIRCLES else 1) * board.pitch
+    )
+    has_detail = board.detail > 0 or board.kind is BoardKind.CHESSBOARD
+    if not (0 < board.pitch <= MAX_LENGTH and has_detail and is_smaller):
+        raise UsageError(
+            sentence(
+                "board.lengths",
+                "The lengths of the board {text} cannot be: they are in mm, above 0, "
+                "and markers or circles are smaller than what they stand in. Measure "
+                "them again.",
+                text=text,
+            )
+        )
+    if not board.kind.has_markers:
+        return
+    if not board.dictionary.startswith("DICT_") or not hasattr(
+        cv2.aruco, board.dictionary
+    ):
+        raise UsageError(
+            sentence(
+                "board.dictionary",
+                "The board {text} names markers that are not known here. Name the "
+                "dictionary as OpenCV does, such as DICT_5X5_100.",
+                text=text,
+            )
+        )
+    known = len(marker_dictionary(board).bytesList)
+    if n_markers(board) > known:
+        raise UsageError(
+            sentence(
+                "board.markers",
+                "The board {text} needs {needed} markers, {dictionary} has {known}. "
+                "Name the dictionary that it was printed from.",
+                text=text,
+                needed=n_markers(board),
+                dictionary=board.dictionary,
+                known=known,
+            )
+        )
+
+
+def n_markers(board: Board) -> int:
+    """Return how many markers a board shows."""
+    squares = board.columns * board.rows
+    return squares if board.kind is BoardKind.MARKERS else squares // 2
+
+
+def _no_board(text: str) -> UsageError:
+    return UsageError(
+        sentence(
+            "board.form",
+            "{text} is no board. Name it in a form such as {forms}; lengths are in mm.",
+            text=text,
+            forms=FORMS,
+        )
+    )
+
+
+def _lattice(columns: int, rows: int) -> FloatArray:
+    """Return the points of a lattice row by row, (columns rows, 2)."""
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    return np.stack([x.ravel(), y.ravel()], axis=-1).astype(np.float64)

@@ -1,0 +1,475 @@
+"""The intrinsics of a camera from views of a board, and how far they are to be trusted.
+
+Residuals alone certify nothing: what a model with more coefficients gains is asked of
+views that it was not fitted to, halves of the views are compared by what their
+difference may be, and where residuals hang together within a view the covariance is
+enlarged by as much.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import date
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import (
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust,
+    fit_poses,
+)
+from lightpen.intrinsics.start import start_camera, start_poses
+from lightpen.intrinsics.uncertainty_map import error_fields
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+from lightpen.sentences import Sentence, sentence
+
+FEW, MANY = 5, 8  # distortion coefficients
+K3 = 8  # its place among the intrinsics
+HELD = 1e20  # information of what is held
+N_FOLDS = 5
+MIN_VIEWS = 5
+ENOUGH_VIEWS = 15
+WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
+SIGMAS = 2.0  # of the mean gain
+OFF_POINT = 6.0  # robust standard deviations
+OFF_VIEW = 4.0  # times the median rms of the views
+FINEST = 1e-3  # px; exact points are off by rounding alone
+MOST_OFF = 0.2  # of the points
+WORST_RMS = 0.004  # of the image's longer side: no flat board of these squares
+LARGEST_FOCAL_SIGMA = 0.02  # relative
+LEAST_TILT = np.radians(10.0)  # between the views that are tilted apart most
+CONTRADICTED = 3.0  # standard deviations
+STRETCHED = 1e-3  # relative: less is no printer's doing
+LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
+MAD = 1.4826
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Why so many distortion coefficients.
+
+    Attributes
+    ----------
+    n_coefficients : int
+    held_out : float
+        Distance of points in views that were not fitted to, with 5 coefficients, px
+        rms.
+    held_out_more : float or None
+        The same with 8; None where the views do not tell so many.
+    k3_held : bool
+        Whether k3 is held at 0, as it folded the image.
+    """
+
+    n_coefficients: int
+    held_out: float
+    held_out_more: float | None
+    k3_held: bool = False
+
+    @property
+    def sentence(self) -> Sentence:
+        """It in words."""
+        if self.k3_held:
+            return sentence(
+                "intrinsics.k3-held",
+                "k3 is held at 0: the views do not reach the corners, where it would "
+                "fold the image. Error in views left out: {held_out:.4f} px.",
+                held_out=self.held_out,
+            )
+        if self.held_out_more is None:
+            return sentence(
+                "intrinsics.five-only",
+                "5 coefficients, as the views do not tell 8 apart. Error in views left "
+                "out: {held_out:.4f} px.",
+                held_out=self.held_out,
+            )
+        if self.n_coefficients == MANY:
+            return sentence(
+                "intrinsics.eight",
+                "8 coefficients, as they lessen the error in views left out from "
+                "{held_out:.4f} to {held_out_more:.4f} px.",
+                held_out=self.held_out,
+                held_out_more=self.held_out_more,
+            )
+        return sentence(
+            "intrinsics.five",
+            "5 coefficients, as 8 do not lessen the error in views left out: "
+            "{held_out:.4f} px with 5, {held_out_more:.4f} px with 8.",
+            held_out=self.held_out,
+            held_out_more=self.held_out_more,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ViewHalves:
+    """What every second view says, and the views between them.
+
+    Attributes
+    ----------
+    difference : (4,) array
+        Of fx fy cx cy, px.
+    expanded_uncertainty : (4,) array
+        U (k = 2) of it.
+    in_image : float
+        Distance that the two put between the images of one point, px rms.
+    """
+
+    difference: FloatArray
+    expanded_uncertainty: FloatArray
+    in_image: float
+
+
+@dataclass(frozen=True, eq=False)
+class CameraCalibration:
+    """Intrinsics of a camera.
+
+    Attributes
+    ----------
+    camera : Camera
+        With its covariance.
+    views : Views
+        In which the board was found; points that were left out are NaN.
+    left_out : tuple of str
+        Views that fit no other.
+    n_points_left_out : int
+        In the views that take part.
+    held_out : (V,) array
+        Distance of the points of each view by the others, px rms.
+    correlation : float
+        By which the variances of independent noise were multiplied.
+    halves : ViewHalves or None
+        None where there are too few views.
+    remarks : tuple of Sentence
+        What is not as it should be.
+    """
+
+    camera: Camera
+    views: Views
+    adjustment: BoardFit
+    left_out: tuple[str, ...]
+    n_points_left_out: int
+    choice: Choice
+    held_out: FloatArray
+    correlation: float
+    halves: ViewHalves | None
+    remarks: tuple[Sentence, ...]
+
+    @property
+    def held_out_rms(self) -> float:
+        """Distance of points in views that were not fitted to, px rms."""
+        return _together(self.held_out, self.views)
+
+    @property
+    def worst_first(self) -> list[int]:
+        """Numbers of the views by their residuals, the largest first."""
+        order = np.argsort(-self.adjustment.view_rms[:, 0], kind="stable")
+        return [int(v) for v in order]
+
+
+def calibrate_camera(
+    views: Views,
+    tolerances: BoardTolerances,
+    calibrated_on: date | None = None,
+    report: Callable[[float], None] = lambda fraction: None,
+) -> CameraCalibration:
+    """Calibrate a camera by what it saw of a board.
+
+    Raises
+    ------
+    CalibrationError
+        The views do not determine the camera; the text says what is missing.
+    """
+    require_views(views)
+    first = _fit(views, tolerances, start_camera(views, FEW))
+    kept, left_out = _without_outliers(views, first)
+    fitted = _fit(kept, tolerances, first.state.cameras[0])
+    denied = _denied(fitted, tolerances)
+    remarks: tuple[Sentence, ...] = ()
+    if denied.any():  # then the views tell how it is, and not what was said of it
+        let_go = BoardTolerances(LET_GO_MM, LET_GO, tolerances.scale)
+        fitted = _fit(kept, let_go, fitted.state.cameras[0])
+        remarks = _remarks_on_board(fitted, denied, tolerances)
+        tolerances = let_go
+    report(0.2)
+    choice, fitted, held_out = _chosen(kept, tolerances, fitted, report)
+    _require_determined(fitted)
+    correlation = _significant(fitted)
+    at = fitted.of_intrinsics(0)
+    camera = replace(
+        fitted.state.cameras[0],
+        covariance=correlation * fitted.covariance[at, at],
+        calibrated_on=calibrated_on,
+    )
+    _require_no_fold(camera)
+    return CameraCalibration(
+        camera=camera,
+        views=kept,
+        adjustment=fitted,
+        left_out=left_out,
+        n_points_left_out=_n_points_left_out(views, kept),
+        choice=choice,
+        held_out=held_out,
+        correlation=correlation,
+        halves=_halves(kept, tolerances, camera, choice),
+        remarks=remarks,
+    )
+
+
+def require_views(views: Views) -> None:
+    """Refuse views of which there are too few.
+
+    Raises
+    ------
+    CalibrationError
+        There are.
+    """
+    if views.n_views < MIN_VIEWS:
+        raise CalibrationError(
+            sentence(
+                "intrinsics.few-views",
+                "The board is seen in {n_views} images; at least {least} are needed, "
+                "{enough} are better. Add views with the board tilted by 20 to 40 "
+                "degrees to each side, and in each corner of the image.",
+                n_views=views.n_views,
+                least=MIN_VIEWS,
+                enough=ENOUGH_VIEWS,
+            )
+        )
+
+
+def _fit(
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    *,
+    k3_held: bool = False,
+) -> BoardFit:
+    """Return the fit of all, from a camera on; k3 is held at 0, or is not."""
+    known = None
+    if k3_held:
+        distortion = np.where(np.arange(len(near.distortion)) == K3 - 4, 0.0, 1.0)
+        near = replace(near, distortion=distortion * near.distortion)
+        known = np.zeros((len(near.intrinsics),) * 2)
+        known[K3, K3] = HELD
+    state = BoardState(
+        (near,),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+        start_poses(near, views),
+        np.zeros(N_SHAPE),
+    )
+    return adjust(views, state, tolerances, (known,))
+
+
+def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str, ...]]:
+    """Return the views without points, and without views, that fit no others.
+
+    Raises
+    ------
+    CalibrationError
+        They are so many that it is the board which is another.
+    """
+    rms = fitted.view_rms[:, 0]
+    kept = rms <= OFF_VIEW * max(float(np.median(rms)), FINEST)
+    distances = np.linalg.norm(fitted.residuals, axis=-1)
+    usual = max(MAD * float(np.nanmedian(np.abs(fitted.residuals))), FINEST)
+    off = distances > OFF_POINT * usual
+    pixels = np.where(off[..., None], np.nan, views.pixels)
+    left = replace(views, pixels=pixels).chosen(kept)
+    longer = max(views.image_sizes[0])
+    if (
+        int(left.seen.sum()) < (1 - MOST_OFF) * int(views.seen.sum())
+        or usual > WORST_RMS * longer
+    ):
+        raise CalibrationError(
+            sentence(
+                "intrinsics.misfit",
+                "The points lie {rms:.2f} px from where a flat board {board} has them: "
+                "it has other squares than said, is bent, or the images are not of one "
+                "camera with one focus. Count and measure its squares again.",
+                rms=fitted.rms,
+                board=views.board.name,
+            )
+        )
+    names = tuple(
+        name for name, keep in zip(views.names, kept, strict=True) if not keep
+    )
+    require_views(left)
+    return left, names
+
+
+def _n_points_left_out(views: Views, kept: Views) -> int:
+    """Return how many points of the views that take part do not."""
+    taking_part = np.isin(views.names, kept.names)
+    return int(views.seen[taking_part].sum()) - int(kept.seen.sum())
+
+
+def _denied(fitted: BoardFit, tolerances: BoardTolerances) -> BoolArray:
+    """Tell which errors of the board are larger than was said of it, (5,)."""
+    sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
+    priors = np.repeat([tolerances.squareness, tolerances.flatness], [2, 3])
+    learned = np.sqrt(np.maximum(priors**2 - sigmas**2, 1e-30))
+    return np.asarray(np.abs(fitted.state.shape) > CONTRADICTED * learned)
+
+
+def _remarks_on_board(
+    fitted: BoardFit, denied: BoolArray, tolerances: BoardTolerances
+) -> tuple[Sentence, ...]:
+    """Return how the board is, that it is not as was said."""
+    values = fitted.state.shape
+    remarks = []
+    stretch, shear = values[:2].tolist()
+    if denied[:2].any() and max(abs(stretch), abs(shear)) > STRETCHED:
+        remarks.append(
+            sentence(
+                "intrinsics.board-stretched",
+                "The board is not what {board} says: its lengths along the rows are "
+                "{stretch:+.2%} longer than down the columns, and its right angles are "
+                "off by {shear:+.2f} degrees. It may be printed to fit the page, or "
+                "its squares are none. Print it at true scale, or measure it again.",
+                board=fitted.board.name,
+                stretch=stretch,
+                shear=float(np.degrees(shear)),
+            )
+        )
+    if denied[2:].any():
+        remarks.append(
+            sentence(
+                "intrinsics.board-bent",
+                "The board is bent by {bend:.2f} mm, {stated:.2f} mm was assumed. That "
+                "is taken into account, but mount it on a flat plate.",
+                bend=float(np.abs(values[2:]).max()),
+                stated=tolerances.flatness,
+            )
+        )
+    return tuple(remarks)
+
+
+def _chosen(
+    views: Views,
+    tolerances: BoardTolerances,
+    fitted: BoardFit,
+    report: Callable[[float], None],
+) -> tuple[Choice, BoardFit, FloatArray]:
+    """Return how many coefficients, the fit with them, and the held-out errors."""
+    held = _folds(fitted.state.cameras[0])
+    if held:
+        fitted = _fit(views, tolerances, fitted.state.cameras[0], k3_held=True)
+    camera = fitted.state.cameras[0]
+    errors = _held_out(views, tolerances, camera, k3_held=held)
+    report(0.5)
+    rms, rms_more = _together(errors, views), None
+    try:
+        richer = replace(camera, distortion=np.append(camera.distortion, np.zeros(3)))
+        more = _fit(views, tolerances, richer)
+        errors_more = _held_out(views, tolerances, more.state.cameras[0])
+        rms_more = _together(errors_more, views)
+        gains = errors**2 - errors_more**2
+        chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
+        is_better = rms_more < (1 - WORTH) * rms and gains.mean() > SIGMAS * chance
+        if is_better and not _folds(more.state.cameras[0]):
+            return Choice(MANY, rms, rms_more), more, errors_more
+    except CalibrationError:  # so many are not told apart
+        pass
+    report(0.8)
+    return Choice(FEW, rms, rms_more, k3_held=held), fitted, errors
+
+
+def _held_out(
+    views: Views, tolerances: BoardTolerances, near: Camera, *, k3_held: bool = False
+) -> FloatArray:
+    """Return the error of each view by a fit of the others, (V,), px rms."""
+    errors = np.full(views.n_views, np.nan)
+    fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
+    for fold in range(int(fold_of.max()) + 1):
+        others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
+        fitted = _fit(others, tolerances, near, k3_held=k3_held).state
+        poses = start_poses(fitted.cameras[0], own)
+        residuals = fit_poses(own, replace(fitted, poses=poses))
+        squares = np.square(residuals).sum(axis=-1)
+        errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
+    return errors
+
+
+def _together(errors: FloatArray, views: Views) -> float:
+    """Return the error of all points, px rms, from that of each view."""
+    counts = views.seen.sum(axis=(1, 2))
+    return float(np.sqrt(np.average(errors**2, weights=counts)))
+
+
+def _folds(camera: Camera) -> bool:
+    """Tell whether the distortion turns the image over before its corners."""
+    try:
+        error_fields(camera)
+    except CalibrationError:
+        return True
+    return False
+
+
+def _require_no_fold(camera: Camera) -> None:
+    if _folds(camera):
+        raise CalibrationError(
+            sentence(
+                "intrinsics.folds",
+                "The distortion that the views tell turns the image over in its "
+                "corners, where no view shows the board. Add views with the board in "
+                "each corner of the image.",
+            )
+        )
+
+
+def _require_determined(fitted: BoardFit) -> None:
+    """Refuse views that are too alike to tell the focal length."""
+    at = fitted.of_intrinsics(0).start
+    focal = fitted.state.cameras[0].fx
+    share = float(np.sqrt(fitted.covariance[at, at])) / focal
+    normals = fitted.state.poses.rotations[..., 2]
+    apart = np.arccos(np.clip(normals @ normals.T, -1, 1)).max()
+    if share > LARGEST_FOCAL_SIGMA or apart < LEAST_TILT:
+        raise CalibrationError(
+            sentence(
+                "intrinsics.alike",
+                "The views are too alike: the board is tilted by {apart:.0f} degrees "
+                "from view to view at most, and the focal length is known to "
+                "{share:.1%} only. Add views with the board tilted by 20 to 40 degrees "
+                "to each side, and reaching into each corner of the image.",
+                apart=float(np.degrees(apart)),
+                share=2 * share,
+            )
+        )
+
+
+def _significant(fitted: BoardFit) -> float:
+    """Return how much residuals hang together, 1 where chance explains it."""
+    n_unknowns = fitted.scores.shape[1] - N_SHAPE
+    chance = 1 + SIGMAS * float(np.sqrt(2 / n_unknowns))
+    found = fitted.correlation
+    return found if found > chance else 1.0
+
+
+def _halves(
+    views: Views, tolerances: BoardTolerances, near: Camera, choice: Choice
+) -> ViewHalves | None:
+    if views.n_views < 2 * MIN_VIEWS:
+        return None
+    is_even = np.arange(views.n_views) % 2 == 0
+    try:
+        one, other = (
+            _fit(views.chosen(which), tolerances, near, k3_held=choice.k3_held)
+            for which in (is_even, ~is_even)
+        )
+    except CalibrationError:  # half of the views are too alike
+        return None
+    at = one.of_intrinsics(0)
+    first, second = one.state.cameras[0], other.state.cameras[0]
+    change = first.intrinsics - second.intrinsics
+    moves = error_fields(second) @ change
+    variances = np.diag(one.covariance[at, at]) + np.diag(other.covariance[at, at])
+    return ViewHalves(
+        change[:4],
+        2 * np.sqrt(variances[:4]),
+        float(np.sqrt(np.mean(np.square(moves).sum(axis=-1)))),
+    )

@@ -1,0 +1,115 @@
+"""Views of a board kept by themselves: when it is held still, somewhere new."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, IntArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import N_SHAPE, BoardState, adjust
+from lightpen.intrinsics.boards import Board
+from lightpen.intrinsics.calibration import FEW, MIN_VIEWS
+from lightpen.intrinsics.coverage import cells_of
+from lightpen.intrinsics.next_view import choose_next_view, first_views
+from lightpen.intrinsics.start import start_camera, start_poses
+from lightpen.intrinsics.views import BoardTolerances, Views
+
+STILL = 0.0015  # of the image's longer side, from one look to the next, rms
+STILL_TIME = 0.4  # s
+NEW = 0.05  # of the image's longer side, from each view that was kept, rms
+MAX_VIEWS = 60
+
+
+class Sight(StrEnum):
+    """What the newest image says of the board."""
+
+    UNSEEN = "unseen"
+    MOVING = "moving"
+    STILL = "still"
+    KEPT = "kept"
+    ALIKE = "alike"
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """Views that were kept, and the board as it was seen last.
+
+    Attributes
+    ----------
+    kept : tuple of (N, 2) array
+        px.
+    points : (N, 2) array or None
+        In the newest image; None where it is not seen.
+    still_since : float
+        s, on the clock of the images.
+    """
+
+    board: Board
+    image_size: tuple[int, int]
+    kept: tuple[FloatArray, ...] = ()
+    points: FloatArray | None = None
+    still_since: float = 0.0
+    sight: Sight = Sight.UNSEEN
+
+    def after(self, points: FloatArray | None, time_s: float) -> "Capture":
+        """Return the capture after another image, kept if it is worth it."""
+        if points is None:
+            return replace(self, points=None, sight=Sight.UNSEEN)
+        longer = max(self.image_size)
+        if self.points is None or _apart(self.points, points) > STILL * longer:
+            moved = replace(self, points=points, still_since=time_s)
+            return replace(moved, sight=Sight.MOVING)
+        seen = replace(self, points=points)
+        if any(_apart(each, points) < NEW * longer for each in self.kept):
+            is_last = self.sight is Sight.KEPT
+            return replace(seen, sight=Sight.KEPT if is_last else Sight.ALIKE)
+        if time_s - self.still_since < STILL_TIME or len(self.kept) >= MAX_VIEWS:
+            return replace(seen, sight=Sight.STILL)
+        return replace(seen, kept=(*self.kept, points), sight=Sight.KEPT)
+
+    @property
+    def views(self) -> Views:
+        """The views that were kept."""
+        names = tuple(str(number) for number in range(1, len(self.kept) + 1))
+        pixels = np.full((len(self.kept), 1, self.board.n_points, 2), np.nan)
+        for v, points in enumerate(self.kept):
+            pixels[v, 0] = points
+        return Views(self.board, names, pixels, (self.image_size,))
+
+    @property
+    def cells(self) -> IntArray:
+        """Points seen in each part of the image, (6, 8)."""
+        return cells_of(self.views)
+
+
+def wanted_outline(capture: Capture) -> FloatArray:
+    """Return how the board is to be held next, (4, 2), px, from its first corner on.
+
+    Until the camera is known roughly, it is led to the middle, tilted to each side.
+    """
+    views = capture.views
+    guesses = first_views(capture.board, capture.image_size)
+    if views.n_views < MIN_VIEWS:
+        return guesses[views.n_views]
+    camera = start_camera(views, FEW)
+    state = BoardState(
+        (camera,),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+        start_poses(camera, views),
+        np.zeros(N_SHAPE),
+    )
+    try:
+        fitted = adjust(views, state, BoardTolerances())
+        return choose_next_view(fitted, capture.board).outline
+    except CalibrationError:  # they are alike
+        return guesses[views.n_views % MIN_VIEWS]
+
+
+def _apart(one: FloatArray, other: FloatArray) -> float:
+    """Return how far apart two sights of a board are, px rms."""
+    squares = np.square(one - other).sum(axis=-1)
+    if not np.isfinite(squares).any():
+        return np.inf
+    return float(np.sqrt(np.nanmean(squares)))

@@ -1,0 +1,204 @@
+"""From images to views of a board, and why it is not seen where it is not."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.errors import CalibrationError, FileError
+from lightpen.formats.decoding import keep_freed_memory
+from lightpen.formats.files import printable
+from lightpen.formats.images import ImageSource
+from lightpen.formats.pairing import NONE, Pairing
+from lightpen.intrinsics.boards import Board, BoardKind
+from lightpen.intrinsics.sightings import count_corners, find_points
+from lightpen.intrinsics.views import Views
+from lightpen.sentences import Sentence, sentence
+
+EXAMINED = 3  # images in which a board is looked for that is another
+OTHER_LAYOUT = {
+    BoardKind.CHARUCO: BoardKind.LEGACY_CHARUCO,
+    BoardKind.LEGACY_CHARUCO: BoardKind.CHARUCO,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedBoard:
+    """Views of a board.
+
+    Attributes
+    ----------
+    views : Views
+        In which a camera saw it.
+    unseen : tuple of str
+        Names of the images, or moments, in which none did.
+    """
+
+    views: Views
+    unseen: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What one image shows."""
+
+    name: str
+    size: tuple[int, int]
+    points: FloatArray | None
+
+
+def observe_board(
+    source: ImageSource, board: Board, report: Callable[[float], None]
+) -> ObservedBoard:
+    """Find a board in the images of one camera.
+
+    Raises
+    ------
+    FileError
+        An image cannot be read, or is of another size.
+    CalibrationError
+        None shows the board; the text says what they show instead, if that is known.
+    """
+    pairing = Pairing(np.arange(len(source.names))[:, None])
+    return observe_board_of_rig([source], pairing, board, report)
+
+
+def observe_board_of_rig(
+    sources: Sequence[ImageSource],
+    pairing: Pairing,
+    board: Board,
+    report: Callable[[float], None],
+) -> ObservedBoard:
+    """Find a board in the images of several cameras, those of a moment together.
+
+    Raises
+    ------
+    FileError, CalibrationError
+        As `observe_board`.
+    """
+    n_images = sum(len(source.names) for source in sources)
+    looks: list[list[_Look]] = []
+    n_done = 0
+    for source in sources:
+        own: list[_Look] = []
+        for look in _looks(source, board):
+            if own and look.size != own[0].size:
+                raise _other_size(own[0], look)
+            own.append(look)
+            n_done += 1
+            report(n_done / n_images)
+        if all(look.points is None for look in own):
+            raise CalibrationError(_why_unseen(source, board))
+        looks.append(own)
+    pixels = np.full((len(pairing.images), len(sources), board.n_points, 2), np.nan)
+    names = []
+    for moment, images in enumerate(pairing.images.tolist()):
+        seen_by = [(c, i) for c, i in enumerate(images) if i != NONE]
+        for c, i in seen_by:
+            points = looks[c][i].points
+            if points is not None:
+                pixels[moment, c] = points
+        c, i = seen_by[0]
+        names.append(looks[c][i].name)
+    sizes = tuple(own[0].size for own in looks)
+    views = Views(board, tuple(names), pixels, sizes)
+    is_seen = np.any(views.found, axis=1)
+    unseen = tuple(n for n, seen in zip(names, is_seen, strict=True) if not seen)
+    return ObservedBoard(views.chosen(is_seen), unseen)
+
+
+def _looks(source: ImageSource, board: Board) -> Iterator[_Look]:
+    """Look at the images in threads, a few ahead of who asks."""
+    keep_freed_memory()
+    n_threads = os.cpu_count() or 1
+
+    def look(load: Callable[[], Image], name: str) -> _Look:
+        image = load()
+        return _Look(name, (image.shape[1], image.shape[0]), find_points(image, board))
+
+    with ThreadPoolExecutor(n_threads) as executor:
+        waiting = iter(zip(source.open(), source.names, strict=True))
+        pending = [
+            executor.submit(look, *each) for each in islice(waiting, 2 * n_threads)
+        ]
+        while pending:
+            done = pending.pop(0).result()
+            pending += [executor.submit(look, *each) for each in islice(waiting, 1)]
+            yield done
+
+
+def _other_size(first: _Look, other: _Look) -> FileError:
+    return FileError(
+        sentence(
+            "intrinsics.other-size",
+            "{name} has {width} x {height} px, {first} has {first_width} x "
+            "{first_height} px. Give images of one camera, with one region and "
+            "binning.",
+            name=printable(other.name),
+            width=other.size[0],
+            height=other.size[1],
+            first=printable(first.name),
+            first_width=first.size[0],
+            first_height=first.size[1],
+        )
+    )
+
+
+def _why_unseen(source: ImageSource, board: Board) -> Sentence:
+    """Return what the images show in place of the board."""
+    images = [load() for load in islice(source.open(), EXAMINED)]
+    if _is_found([image[:, ::-1].copy() for image in images], board):
+        return sentence(
+            "intrinsics.mirrored",
+            "The images show the board {board} mirrored. Switch off the mirroring of "
+            "the camera, or print the board anew.",
+            board=board.name,
+        )
+    if board.kind in OTHER_LAYOUT:
+        other = replace(board, kind=OTHER_LAYOUT[board.kind])
+        if _is_found(images, other):
+            return sentence(
+                "intrinsics.other-layout",
+                "No image shows the board {board}, but they show {other}: OpenCV laid "
+                "it out otherwise until 4.6. Give that board.",
+                board=board.name,
+                other=other.name,
+            )
+    across = replace(board, columns=board.rows, rows=board.columns)
+    if across != board and _is_found(images, across):
+        return sentence(
+            "intrinsics.across",
+            "No image shows the board {board}, but they show {other}: columns and rows "
+            "are the other way round. Give that board.",
+            board=board.name,
+            other=across.name,
+        )
+    if board.kind is BoardKind.CHESSBOARD:
+        for image in images:
+            count = count_corners(image)
+            if count is not None:
+                return sentence(
+                    "intrinsics.other-count",
+                    "No image shows a chessboard of {columns} x {rows} inner corners, "
+                    "but one of {seen_columns} x {seen_rows}. Count its inner corners "
+                    "again.",
+                    columns=board.columns,
+                    rows=board.rows,
+                    seen_columns=count[0],
+                    seen_rows=count[1],
+                )
+    return sentence(
+        "intrinsics.unseen",
+        "None of the {n_images} images shows the board {board}. The whole board must "
+        "be in the image, sharp, with a bright rim round it; check its kind and count.",
+        n_images=len(source.names),
+        board=board.name,
+    )
+
+
+def _is_found(images: Sequence[Image], board: Board) -> bool:
+    return any(find_points(image, board) is not None for image in images)

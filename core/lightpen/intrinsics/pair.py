@@ -1,0 +1,376 @@
+"""Two cameras beside each other, from views in which both see one board.
+
+Everything is fitted together: both cameras, the place of the second, the board and its
+poses. A board that looks the same turned round is numbered as the places of the cameras
+have it, which is the same in all views.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import (
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust,
+    stated_information,
+)
+from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
+from lightpen.intrinsics.start import BoardPoses, start_poses
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+from lightpen.model.rig import Rig
+from lightpen.model.rigid import vector_from_rotation
+from lightpen.sentences import Sentence, sentence
+
+MIN_PAIRS = 3
+MAX_VOTED = 60  # views that are compared with all
+ALIKE_TURN = np.radians(5.0)  # of the place of the second camera from view to view
+ALIKE_SHIFT = 0.15  # of its distance
+PEN_SPEED = 100.0  # mm/s
+APART = 3.0  # times the noise of each camera alone
+SIGMAS = 4.0
+LEAST_LAG = 0.02  # of the time between two views
+SIGNIFICANT = 1.8  # times the variance of independent noise
+
+
+@dataclass(frozen=True)
+class PairLag:
+    """By how much the second camera is late, if the views are a sequence.
+
+    Attributes
+    ----------
+    views, sigma : float
+        Of the time between two views.
+    interval_ms : float or None
+        That time, if it is known.
+    px_per_ms : float
+        What a millisecond costs at the pen's speed of 100 mm/s.
+    """
+
+    views: float
+    sigma: float
+    interval_ms: float | None
+    px_per_ms: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether it is more than chance, and worth a word."""
+        return abs(self.views) > max(SIGMAS * self.sigma, LEAST_LAG)
+
+    @property
+    def lag_ms(self) -> float | None:
+        """The same in ms, where the time between two views is known."""
+        return None if self.interval_ms is None else self.views * self.interval_ms
+
+    def told(self, name: str) -> Sentence:
+        """Return it in words, of a camera of that name."""
+        if self.lag_ms is None:
+            return sentence(
+                "pair.late",
+                "The cameras are not synchronised: {camera} is out of step by "
+                "{lag:.2f} \u00b1 {u:.2f} of the time between two views. Each "
+                "millisecond costs {px:.2f} px at a pen's speed of 100 mm/s. Trigger "
+                "both cameras by one signal.",
+                camera=name,
+                lag=abs(self.views),
+                u=2 * self.sigma,
+                px=self.px_per_ms,
+            )
+        return sentence(
+            "pair.late-by",
+            "The cameras are not synchronised: {camera} is out of step by {lag:.1f} "
+            "\u00b1 {u:.1f} ms, which costs {px:.2f} px at a pen's speed of 100 mm/s. "
+            "Trigger both cameras by one signal.",
+            camera=name,
+            lag=abs(self.lag_ms),
+            u=2 * self.sigma * (self.interval_ms or 0.0),
+            px=abs(self.lag_ms) * self.px_per_ms,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PairCalibration:
+    """Two cameras and where the second one stands.
+
+    Attributes
+    ----------
+    rig : Rig
+        With the covariance of its places, the board's scale included.
+    alone : tuple of CameraCalibration
+        Each camera by its own views; empty where files state them.
+    n_pairs : int
+        Views in which both cameras saw the board.
+    left_out : tuple of str
+        Views that do not agree with the others.
+    view_rms : (V, 2) array
+        px.
+    lag : PairLag or None
+        None where the board did not move enough between views to tell.
+    """
+
+    rig: Rig
+    views: Views
+    adjustment: BoardFit
+    alone: tuple[CameraCalibration, ...]
+    n_pairs: int
+    left_out: tuple[str, ...]
+    correlation: float
+    lag: PairLag | None
+    remarks: tuple[Sentence, ...]
+
+    @property
+    def baseline(self) -> float:
+        """Distance of the cameras, mm."""
+        R, t = self.rig.rotations[1], self.rig.translations[1]
+        return float(np.linalg.norm(R.T @ t))
+
+    @property
+    def baseline_sigma(self) -> float:
+        """Standard uncertainty of it, mm."""
+        assert self.rig.covariance is not None
+        t = self.rig.translations[1]
+        along = t / np.linalg.norm(t)
+        return float(np.sqrt(along @ self.rig.covariance[3:, 3:] @ along))
+
+
+def calibrate_pair(
+    views: Views,
+    tolerances: BoardTolerances,
+    names: tuple[str, str],
+    cameras: tuple[Camera, ...] = (),
+    interval_ms: float | None = None,
+) -> PairCalibration:
+    """Find where the second of two cameras stands.
+
+    Parameters
+    ----------
+    cameras : tuple of Camera, optional
+        As their files have them; found from the views as well unless given.
+    interval_ms : float, optional
+        Time between two views, if they are a sequence.
+
+    Raises
+    ------
+    CalibrationError
+        Too few views are of both cameras, or they contradict each other.
+    """
+    alone: tuple[CameraCalibration, ...] = ()
+    if not cameras:
+        alone = tuple(
+            calibrate_camera(views.of_camera(c), tolerances) for c in range(2)
+        )
+        cameras = tuple(each.camera for each in alone)
+        stated: tuple[FloatArray | None, ...] = (None, None)
+    else:
+        stated = tuple(
+            None if camera.covariance is None else stated_information(camera.covariance)
+            for camera in cameras
+        )
+    both = np.all(views.found, axis=1)
+    if both.sum() < MIN_PAIRS:
+        raise CalibrationError(
+            sentence(
+                "pair.few",
+                "Both cameras see the board in {n_pairs} views; at least {least} are "
+                "needed. Hold the board where both cameras see it whole.",
+                n_pairs=int(both.sum()),
+                least=MIN_PAIRS,
+            )
+        )
+    names_of_all = views.names
+    views, place = _ordered(views, cameras, both)
+    poses = _poses(views, cameras, place)
+    state = BoardState(
+        cameras,
+        np.stack([np.eye(3), place.rotations[0]]),
+        np.stack([np.zeros(3), place.translations[0]]),
+        poses,
+        np.zeros(N_SHAPE),
+    )
+    fitted = adjust(views, state, tolerances, stated)
+    correlation = fitted.correlation
+    correlation = correlation if correlation > SIGNIFICANT else 1.0
+    rig = _rig(fitted, names, tolerances, correlation)
+    both = np.all(views.found, axis=1)
+    lag = _lag(views, fitted, both, interval_ms)
+    return PairCalibration(
+        rig=rig,
+        views=views,
+        adjustment=fitted,
+        alone=alone,
+        n_pairs=int(both.sum()),
+        left_out=tuple(name for name in names_of_all if name not in views.names),
+        correlation=correlation,
+        lag=lag,
+        remarks=_remarks(fitted, alone, both, lag, names[1]),
+    )
+
+
+def _rig(
+    fitted: BoardFit,
+    names: tuple[str, str],
+    tolerances: BoardTolerances,
+    correlation: float,
+) -> Rig:
+    state, at = fitted.state, fitted.of_places
+    covariance = correlation * fitted.covariance[at, at]
+    shift = state.translations[1]
+    covariance[3:, 3:] += tolerances.scale**2 * np.outer(shift, shift)
+    cameras = []
+    for c, camera in enumerate(state.cameras):
+        own = fitted.of_intrinsics(c)
+        cameras.append(
+            replace(camera, covariance=correlation * fitted.covariance[own, own])
+        )
+    return Rig(tuple(cameras), state.rotations, state.translations, covariance, names)
+
+
+def _between(poses: tuple[BoardPoses, BoardPoses]) -> BoardPoses:
+    """Return the place of the second camera by each view, (V, 3, 3) and (V, 3)."""
+    one, other = poses
+    rotations = other.rotations @ np.swapaxes(one.rotations, 1, 2)
+    shifts = np.einsum("vij,vj->vi", rotations, one.translations)
+    return BoardPoses(rotations, other.translations - shifts)
+
+
+def _ordered(
+    views: Views, cameras: tuple[Camera, ...], both: BoolArray
+) -> tuple[Views, BoardPoses]:
+    """Return the views with the points numbered alike, and where the camera stands.
+
+    Raises
+    ------
+    CalibrationError
+        The views do not agree on that.
+    """
+    first = start_poses(cameras[0], views)
+    turned = []
+    for order in views.board.orders:
+        pixels = views.pixels.copy()
+        pixels[:, 1] = pixels[:, 1][:, order]
+        turned.append(replace(views, pixels=pixels))
+    places = [_between((first, start_poses(cameras[1], each, 1))) for each in turned]
+    rotations = np.stack([each.rotations[both] for each in places])
+    translations = np.stack([each.translations[both] for each in places])
+    n_places = rotations.shape[1]
+    some = np.linspace(0, n_places - 1, min(n_places, MAX_VOTED)).astype(np.int64)
+    alike = _alike(rotations, translations, some)
+    votes = alike.any(axis=2).sum(axis=-1)
+    order, view = divmod(int(np.argmax(votes)), votes.shape[1])
+    if votes[order, view] <= both.sum() / 2:
+        raise CalibrationError(
+            sentence(
+                "pair.contradicting",
+                "The views do not agree on where the second camera stands: {n_agree} "
+                "of {n_pairs} do. Either a camera was moved meanwhile, or the images "
+                "that are taken for one moment are not. Check their names and order.",
+                n_agree=int(votes[order, view]),
+                n_pairs=int(both.sum()),
+            )
+        )
+    chosen = some[view]
+    found = BoardPoses(
+        rotations[order, chosen][None], translations[order, chosen][None]
+    )
+    choice = np.zeros(views.n_views, dtype=np.int64)
+    choice[both] = np.argmax(alike[order, view], axis=0)
+    pixels = np.stack([turned[k].pixels[v] for v, k in enumerate(choice.tolist())])
+    agree = ~both
+    agree[both] = alike[order, view].any(axis=0)
+    return replace(views, pixels=pixels).chosen(agree), found
+
+
+def _alike(
+    rotations: FloatArray, translations: FloatArray, some: IntArray
+) -> BoolArray:
+    """Tell which places (K, V) agree with some (S,) of them: (K, S, K, V)."""
+    between = np.einsum("kvij,lwmj->kvlwim", rotations[:, some], rotations)
+    turns = np.linalg.norm(vector_from_rotation(between), axis=-1)
+    ours = translations[:, some, None, None]
+    apart = np.linalg.norm(ours - translations, axis=-1)
+    far = np.linalg.norm(ours, axis=-1)
+    return np.asarray((turns < ALIKE_TURN) & (apart < ALIKE_SHIFT * far))
+
+
+def _poses(views: Views, cameras: tuple[Camera, ...], place: BoardPoses) -> BoardPoses:
+    """Return the poses in the rig, by the second camera where the first saw nothing."""
+    first = start_poses(cameras[0], views)
+    second = start_poses(cameras[1], views, 1)
+    R, t = place.rotations[0], place.translations[0]
+    missing = np.isnan(first.translations[:, 0])
+    return BoardPoses(
+        np.where(missing[:, None, None], R.T @ second.rotations, first.rotations),
+        np.where(missing[:, None], (second.translations - t) @ R, first.translations),
+    )
+
+
+def _lag(
+    views: Views, fitted: BoardFit, both: BoolArray, interval_ms: float | None
+) -> PairLag | None:
+    """Return by how much the second camera is late, from how the board moves.
+
+    What it sees elsewhere than the first has it goes with how the board moves there.
+    """
+    state = fitted.state
+    first = start_poses(state.cameras[0], views)
+    points = fitted.board_points
+    in_first = points @ np.swapaxes(first.rotations, 1, 2)
+    in_first += first.translations[:, None]
+    in_second = in_first @ state.rotations[1].T + state.translations[1]
+    pixels = np.full_like(views.pixels[:, 1], np.nan)
+    pixels[both] = state.cameras[1].project(in_second[both])
+    middle = both[1:-1] & both[2:] & both[:-2]
+    if not middle.any():
+        return None
+    seen = _means(views.pixels[:, 1])
+    off = _means(views.pixels[:, 1] - pixels)[1:-1][middle].ravel()
+    speed = (0.5 * (seen[2:] - seen[:-2]))[middle].ravel()
+    power = float(speed @ speed)
+    if power < (SIGMAS * fitted.sigma / LEAST_LAG) ** 2:
+        return None
+    lag = float(speed @ off) / power
+    left = off - lag * speed
+    sigma = float(np.sqrt(left @ left / max(len(left) - 1, 1) / power))
+    depth = float(np.median(state.poses.translations[:, 2]))
+    return PairLag(
+        lag, sigma, interval_ms, PEN_SPEED / 1000 * state.cameras[0].fx / depth
+    )
+
+
+def _means(pixels: FloatArray) -> FloatArray:
+    """Return the means of the points of each view, (V, 2); NaN without any."""
+    counts = np.isfinite(pixels).sum(axis=1)
+    return np.asarray(np.nansum(pixels, axis=1) / np.where(counts > 0, counts, np.nan))
+
+
+def _remarks(
+    fitted: BoardFit,
+    alone: tuple[CameraCalibration, ...],
+    both: BoolArray,
+    lag: PairLag | None,
+    name: str,
+) -> tuple[Sentence, ...]:
+    remarks = [remark for each in alone for remark in each.remarks]
+    if lag is not None and lag.is_significant:
+        return (*remarks, lag.told(name))
+    usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
+    rms = np.nanmax(fitted.view_rms[both], axis=1)
+    n_apart = int(np.sum(rms > APART * usual))
+    if n_apart > 0:
+        remarks.append(
+            sentence(
+                "pair.moved",
+                "In {n_views} of {n_pairs} views the two cameras do not see the board "
+                "at one place; they differ by up to {rms:.2f} px. It moved between the "
+                "two exposures, or a camera did. Hold it still, or trigger both "
+                "cameras by one signal.",
+                n_views=n_apart,
+                n_pairs=int(both.sum()),
+                rms=float(rms.max()),
+            )
+        )
+    return tuple(remarks)

@@ -1,0 +1,362 @@
+"""The calibration of one camera, or of two, as text and as a record."""
+
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.intrinsics.adjustment import BoardFit
+from lightpen.intrinsics.calibration import CameraCalibration
+from lightpen.intrinsics.coverage import BoardCoverage, cover
+from lightpen.intrinsics.next_view import choose_next_view
+from lightpen.intrinsics.observing import ObservedBoard
+from lightpen.intrinsics.pair import PairCalibration
+from lightpen.intrinsics.regions import measure_regions
+from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.views import BoardTolerances
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import vector_from_rotation
+
+NAMES = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+SHAPE_NAMES = (
+    *("stretch", "shear"),
+    *("bend_along_rows_mm", "bend_across_mm", "bend_along_columns_mm"),
+)
+COVERAGE_FACTOR = 2.0
+N_WORST = 5
+TITLE = 13  # characters
+
+
+def camera_coverage(calibration: CameraCalibration) -> BoardCoverage:
+    """Return what the views of a calibration cover."""
+    return cover(calibration.views, calibration.adjustment.state.poses)
+
+
+def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> str:
+    """Return the calibration of a camera as text for the screen."""
+    camera, fitted = calibration.camera, calibration.adjustment
+    assert camera.covariance is not None
+    u = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
+    uncertain = map_uncertainty(camera, camera.covariance)
+    coverage = camera_coverage(calibration)
+    lines = [f"{'Intrinsics':<{TITLE}}{'':>18}{'U (k = 2)':>14}"]
+    lines += [
+        f"  {name:<{TITLE - 2}}{value:>18.6g}{of:>14.2g}"
+        for name, value, of in zip(
+            NAMES, camera.intrinsics.tolist(), u.tolist(), strict=False
+        )
+    ]
+    lines += [
+        "",
+        f"{'Views':<{TITLE}}{calibration.views.n_views} used, the board found in "
+        f"{observed.views.n_views} of "
+        f"{observed.views.n_views + len(observed.unseen)} images",
+    ]
+    if calibration.left_out:
+        lines.append(
+            f"  left out   {', '.join(calibration.left_out)}: they fit no other"
+        )
+    if calibration.n_points_left_out:
+        lines.append(f"  points     {calibration.n_points_left_out} left out")
+    lines += [
+        f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms; in views left out "
+        f"{calibration.held_out_rms:.4f} px",
+        f"{'Distortion':<{TITLE}}{calibration.choice.sentence}",
+        f"{'Projection':<{TITLE}}standard uncertainty {uncertain.center:.4f} px in the "
+        f"middle, {uncertain.typical:.4f} px over the image, {uncertain.worst:.4f} px "
+        "at worst",
+        f"{'Coverage':<{TITLE}}{coverage.share:.0%} of the image, tilts "
+        f"{np.degrees(coverage.tilts.min()):.0f} to "
+        f"{np.degrees(coverage.tilts.max()):.0f} degrees",
+        *(f"  missing    {each}" for each in coverage.missing),
+        *_halves_lines(calibration),
+        *_board_lines(fitted),
+    ]
+    if calibration.correlation > 1:
+        lines.append(
+            f"{'Correlation':<{TITLE}}U is {calibration.correlation**0.5:.1f} times "
+            "that of independent noise"
+        )
+    lines += ["", _region_lines(fitted, camera), "", *_worst_lines(calibration)]
+    if calibration.remarks:
+        lines += ["", *map(str, calibration.remarks)]
+    return "\n".join(lines)
+
+
+def intrinsics_record(
+    calibration: CameraCalibration, observed: ObservedBoard, tolerances: BoardTolerances
+) -> dict[str, Any]:
+    """Return the calibration of a camera as a record."""
+    camera, fitted = calibration.camera, calibration.adjustment
+    return {
+        "kind": "intrinsics",
+        "board": calibration.views.board.name,
+        "board_assumed": _printing_record(tolerances),
+        **_camera_record(calibration.camera),
+        "rms_px": fitted.rms,
+        "noise_px": fitted.sigma,
+        "held_out_rms_px": calibration.held_out_rms,
+        "distortion_choice": {
+            "coefficients": calibration.choice.n_coefficients,
+            "held_out_rms_px_5": calibration.choice.held_out,
+            "held_out_rms_px_8": calibration.choice.held_out_more,
+            "reason": calibration.choice.sentence,
+        },
+        "correlation_factor": calibration.correlation,
+        "projection_uncertainty": _map_record(camera),
+        "residuals_by_region": _regions_record(fitted, camera),
+        "halves": _halves_record(calibration),
+        "board_found": _board_record(fitted),
+        "coverage": _coverage_record(calibration),
+        "next_view": _next_record(calibration),
+        "views": _views_record(calibration),
+        "views_left_out": calibration.left_out,
+        "points_left_out": calibration.n_points_left_out,
+        "images_without_board": observed.unseen,
+        "remarks": calibration.remarks,
+    }
+
+
+def pair_text(calibration: PairCalibration, observed: ObservedBoard) -> str:
+    """Return two cameras and where the second one stands as text for the screen."""
+    rig, fitted = calibration.rig, calibration.adjustment
+    assert rig.covariance is not None
+    u = COVERAGE_FACTOR * np.sqrt(np.diag(rig.covariance))
+    turn = np.degrees(vector_from_rotation(rig.rotations[1]))
+    one, other = rig.names
+    lines = [
+        f"{other} from {one}".ljust(30) + "".join(f"{axis:>13}" for axis in "xyz"),
+        _row("Turn, degrees", turn),
+        _row("  U (k = 2)", np.degrees(u[:3])),
+        _row("Translation, mm", rig.translations[1]),
+        _row("  U (k = 2)", u[3:]),
+        "",
+        f"{'Baseline':<{TITLE}}{calibration.baseline:.3f} mm, U = "
+        f"{COVERAGE_FACTOR * calibration.baseline_sigma:.3f} mm",
+        f"{'Views':<{TITLE}}{calibration.n_pairs} of both cameras, "
+        f"{calibration.views.n_views} used of {observed.views.n_views}",
+        f"{'Residuals':<{TITLE}}{fitted.rms:.4f} px rms",
+    ]
+    if calibration.left_out:
+        lines.append(
+            f"  left out   {', '.join(calibration.left_out)}: the cameras do not agree"
+        )
+    if calibration.correlation > 1:
+        lines.append(
+            f"{'Correlation':<{TITLE}}U is {calibration.correlation**0.5:.1f} times "
+            "that of independent noise"
+        )
+    for name, camera in zip(rig.names, rig.cameras, strict=True):
+        assert camera.covariance is not None
+        of = COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))
+        lines.append(
+            f"{name[: TITLE - 1]:<{TITLE}}fx {camera.fx:.2f} \u00b1 {of[0]:.2f}, fy "
+            f"{camera.fy:.2f} \u00b1 {of[1]:.2f}, cx {camera.cx:.2f} \u00b1 "
+            f"{of[2]:.2f}, cy {camera.cy:.2f} \u00b1 {of[3]:.2f} px"
+        )
+    lines += _board_lines(fitted)
+    if calibration.remarks:
+        lines += ["", *map(str, calibration.remarks)]
+    return "\n".join(lines)
+
+
+def pair_record(
+    calibration: PairCalibration, observed: ObservedBoard, tolerances: BoardTolerances
+) -> dict[str, Any]:
+    """Return two cameras and where the second one stands as a record."""
+    rig, fitted, lag = calibration.rig, calibration.adjustment, calibration.lag
+    return {
+        "kind": "extrinsics",
+        "board": calibration.views.board.name,
+        "board_assumed": _printing_record(tolerances),
+        "cameras": [
+            {"name": name, **_camera_record(camera)}
+            for name, camera in zip(rig.names, rig.cameras, strict=True)
+        ],
+        "cam_from_rig_rotation": rig.rotations[1],
+        "cam_from_rig_translation_mm": rig.translations[1],
+        "extrinsics_covariance": rig.covariance,
+        "baseline_mm": calibration.baseline,
+        "baseline_expanded_uncertainty_mm": (
+            COVERAGE_FACTOR * calibration.baseline_sigma
+        ),
+        "rms_px": fitted.rms,
+        "noise_px": fitted.sigma,
+        "correlation_factor": calibration.correlation,
+        "views_of_both": calibration.n_pairs,
+        "board_found": _board_record(fitted),
+        "lag": (
+            None
+            if lag is None
+            else {
+                "in_views": lag.views,
+                "standard_uncertainty": lag.sigma,
+                "ms": lag.lag_ms,
+                "px_per_ms_at_100_mm_per_s": lag.px_per_ms,
+                "significant": lag.is_significant,
+            }
+        ),
+        "views": [
+            {"name": name, "rms_px": rms}
+            for name, rms in zip(calibration.views.names, fitted.view_rms, strict=True)
+        ],
+        "views_left_out": calibration.left_out,
+        "images_without_board": observed.unseen,
+        "remarks": calibration.remarks,
+    }
+
+
+def _row(title: str, values: FloatArray) -> str:
+    return f"  {title:<28}" + "".join(f"{value:13.4f}" for value in values)
+
+
+def _halves_lines(calibration: CameraCalibration) -> list[str]:
+    halves = calibration.halves
+    if halves is None:
+        return []
+    differences = ", ".join(
+        f"{name} {value:+.2f} \u00b1 {u:.2f}"
+        for name, value, u in zip(
+            NAMES,
+            halves.difference.tolist(),
+            halves.expanded_uncertainty.tolist(),
+            strict=False,
+        )
+    )
+    return [
+        f"{'Halves':<{TITLE}}{differences} px; {halves.in_image:.3f} px in the image"
+    ]
+
+
+def _board_lines(fitted: BoardFit) -> list[str]:
+    stretch, shear, *bends = fitted.state.shape.tolist()
+    return [
+        f"{'Board':<{TITLE}}stretched by {1e6 * stretch:+.0f} ppm, sheared by "
+        f"{1e6 * shear:+.0f} ppm, bent by "
+        + " ".join(f"{bend:+.3f}" for bend in bends)
+        + " mm"
+    ]
+
+
+def _region_lines(fitted: BoardFit, camera: Camera) -> str:
+    regions = measure_regions(fitted, camera)
+    lines = ["Residuals by region of the image: px rms (mean u, mean v)"]
+    for rms, mean, n_points in zip(
+        regions.rms, regions.means, regions.n_points, strict=True
+    ):
+        lines.append(
+            "".join(
+                f"  {r:.3f} ({u:+.3f} {v:+.3f})" if n else f"  {'-':^22}"
+                for r, (u, v), n in zip(rms, mean, n_points, strict=True)
+            )
+        )
+    return "\n".join(lines)
+
+
+def _worst_lines(calibration: CameraCalibration) -> list[str]:
+    rms = calibration.adjustment.view_rms[:, 0]
+    return [
+        "Worst views, px rms (by the others)",
+        *(
+            f"  {calibration.views.names[v]:<28}{rms[v]:8.4f} "
+            f"({calibration.held_out[v]:.4f})"
+            for v in calibration.worst_first[:N_WORST]
+        ),
+    ]
+
+
+def _camera_record(camera: Camera) -> dict[str, Any]:
+    assert camera.covariance is not None
+    return {
+        "image_size": camera.image_size,
+        "intrinsics": dict(zip(NAMES, camera.intrinsics.tolist(), strict=False)),
+        "expanded_uncertainty": dict(
+            zip(
+                NAMES,
+                (COVERAGE_FACTOR * np.sqrt(np.diag(camera.covariance))).tolist(),
+                strict=False,
+            )
+        ),
+        "covariance": camera.covariance,
+    }
+
+
+def _printing_record(tolerances: BoardTolerances) -> dict[str, float]:
+    return {
+        "flatness_mm": tolerances.flatness,
+        "squareness": tolerances.squareness,
+        "scale": tolerances.scale,
+    }
+
+
+def _map_record(camera: Camera) -> dict[str, Any]:
+    assert camera.covariance is not None
+    uncertain = map_uncertainty(camera, camera.covariance)
+    return {
+        "middle_px": uncertain.center,
+        "rms_px": uncertain.typical,
+        "worst_px": uncertain.worst,
+        "pixels": uncertain.pixels,
+        "standard_uncertainty_px": uncertain.sigmas,
+    }
+
+
+def _regions_record(fitted: BoardFit, camera: Camera) -> dict[str, Any]:
+    regions = measure_regions(fitted, camera)
+    return {
+        "points": regions.n_points,
+        "rms_px": regions.rms,
+        "mean_px": regions.means,
+    }
+
+
+def _halves_record(calibration: CameraCalibration) -> dict[str, Any] | None:
+    halves = calibration.halves
+    if halves is None:
+        return None
+    return {
+        "difference_px": halves.difference,
+        "expanded_uncertainty_px": halves.expanded_uncertainty,
+        "in_image_px": halves.in_image,
+    }
+
+
+def _board_record(fitted: BoardFit) -> dict[str, dict[str, float]]:
+    sigmas = np.sqrt(np.diag(fitted.covariance)[fitted.of_shape])
+    return {
+        name: {"value": value, "standard_uncertainty": sigma}
+        for name, value, sigma in zip(
+            SHAPE_NAMES, fitted.state.shape.tolist(), sigmas.tolist(), strict=True
+        )
+    }
+
+
+def _coverage_record(calibration: CameraCalibration) -> dict[str, Any]:
+    coverage = camera_coverage(calibration)
+    return {
+        "points": coverage.cells,
+        "share": coverage.share,
+        "tilted_right_down_left_up": coverage.tilted,
+        "missing": coverage.missing,
+    }
+
+
+def _next_record(calibration: CameraCalibration) -> dict[str, Any]:
+    wanted = choose_next_view(calibration.adjustment, calibration.views.board)
+    return {"outline_px": wanted.outline, "gain": wanted.gain}
+
+
+def _views_record(calibration: CameraCalibration) -> list[dict[str, Any]]:
+    coverage, views = camera_coverage(calibration), calibration.views
+    return [
+        {
+            "name": name,
+            "rms_px": calibration.adjustment.view_rms[v, 0],
+            "held_out_rms_px": calibration.held_out[v],
+            "tilt_deg": float(np.degrees(coverage.tilts[v])),
+            "size_px": coverage.sizes[v],
+            "points": np.flatnonzero(views.seen[v, 0]),
+            "pixels": views.pixels[v, 0][views.seen[v, 0]],
+        }
+        for v, name in enumerate(views.names)
+    ]

@@ -1,0 +1,270 @@
+"""Where one image shows the points of a board.
+
+OpenCV finds the board [1]_, in a smaller image first where there is one; its corners
+are then placed by the gradients round them in the whole image and at its full depth
+[2]_, and circles by their rims, as LEDs are.
+
+References
+----------
+.. [1] A. Duda, U. Frese, "Accurate detection and localization of checkerboard corners
+   for calibration", BMVC 2018; S. Garrido-Jurado et al., "Automatic generation and
+   detection of highly reliable fiducial markers under occlusion", Pattern Recognition
+   47 (2014) 2280-2292.
+.. [2] W. Forstner, E. Gulch, "A fast operator for detection and precise location of
+   distinct points, corners and centres of circular features", ISPRS 1987.
+"""
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.detection.rim import fit_rim
+from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
+
+SEARCHED = 1280  # px, of the longer side of the image that is searched first
+SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
+REFINED = 0.4  # of the distance of neighbours: no other edge is that near
+MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
+REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
+FEWEST = 6  # points by which a pose is known, and that it is no other thing
+UNEVEN = 0.5  # of a step, by which the next may differ; tilt and lens make up to 0.2
+SPREAD = 0.3  # of a square: least standard deviation across
+SPOT_SPREAD = 0.25  # of the distance of neighbours, standard deviation of a circle
+OFF_SPOT = 0.35  # of the distance of neighbours: a rim farther off is another's
+QUICK = (
+    cv2.CALIB_CB_ADAPTIVE_THRESH
+    | cv2.CALIB_CB_NORMALIZE_IMAGE
+    | cv2.CALIB_CB_FAST_CHECK
+)
+THOROUGH = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
+
+
+def find_points(
+    image: Image, board: Board, *, quick: bool = False
+) -> FloatArray | None:
+    """Find the points of a board.
+
+    Parameters
+    ----------
+    image : (H, W) array
+    quick : bool
+        Leave out what takes long, where a next image comes at once.
+
+    Returns
+    -------
+    (N, 2) array or None
+        px, in the order of `Board.points`, NaN where one is not seen; of circles the
+        centres of their ellipses. None if the board is not found.
+    """
+    grey = _to_8_bit(image)
+    if board.kind.is_circles:
+        return _circles(image, grey, board, quick=quick)
+    if board.kind.has_markers:
+        points = _marked(grey, board)
+    else:
+        points = _chessboard(grey, (board.columns, board.rows), quick=quick)
+        points = None if points is None else _from_front(points, board)
+    if points is None or not _is_spread(points, board):
+        return None
+    refined = _refined(image, points, board)
+    return refined if _is_spread(refined, board) else None
+
+
+def _is_spread(points: FloatArray, board: Board) -> bool:
+    """Tell whether the points seen fix a pose: enough, and not in one row."""
+    seen = board.points[np.isfinite(points[:, 0]), :2]
+    if len(seen) < FEWEST:
+        return False
+    across = float(np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1])
+    return bool(across > SPREAD * board.pitch * float(np.sqrt(len(seen))))
+
+
+def _from_front(points: FloatArray, board: Board) -> FloatArray:
+    """Return points that were numbered in mirrored rows as they are seen from ahead."""
+    rows = np.arange(board.n_points).reshape(board.rows, board.columns)
+    corners = points[rows[[0, 0, -1, -1], [0, -1, -1, 0]]]
+    x, y = (corners - corners.mean(axis=0)).T
+    turns = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    if turns >= 0:
+        return points
+    is_set_off = board.kind is BoardKind.ASYMMETRIC_CIRCLES
+    return points[(rows[::-1] if is_set_off else rows[:, ::-1]).ravel()]
+
+
+def count_corners(image: Image) -> tuple[int, int] | None:
+    """Return how many inner corners a chessboard has; None if none is seen."""
+    small, _ = _smaller(_to_8_bit(image))
+    flags = THOROUGH | cv2.CALIB_CB_LARGER
+    found, _, meta = cv2.findChessboardCornersSBWithMeta(small, (3, 3), flags)
+    return (int(meta.shape[1]), int(meta.shape[0])) if found else None
+
+
+def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
+    if image.dtype == np.uint8:
+        return np.asarray(image, dtype=np.uint8)
+    brightest = max(float(image.max()), 1.0)
+    return np.asarray(image * (255 / brightest), dtype=np.uint8)
+
+
+def _smaller(grey: npt.NDArray[np.uint8]) -> tuple[Any, float]:
+    """Return an image to be searched, and its scale."""
+    scale = min(1.0, SEARCHED / max(grey.shape))
+    if scale == 1.0:
+        return grey, scale
+    return cv2.resize(
+        grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA
+    ), scale
+
+
+def _whole(points: Any, scale: float) -> FloatArray:
+    """Return points of a smaller image in the whole one."""
+    found = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    return (found + 0.5) / scale - 0.5
+
+
+def _chessboard(
+    grey: npt.NDArray[np.uint8], corners: tuple[int, int], *, quick: bool
+) -> FloatArray | None:
+    small, scale = _smaller(grey)
+    found, points = cv2.findChessboardCorners(small, corners, flags=QUICK)
+    if found and _is_even(points, corners):
+        return _whole(points, scale)
+    if quick:
+        return None
+    found, points = cv2.findChessboardCornersSB(small, corners, flags=THOROUGH)
+    if found:
+        return _whole(points, scale)
+    if scale == 1.0 or grey.size > SEARCHED_WHOLE:
+        flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
+        found, points = cv2.findChessboardCorners(small, corners, flags=flags)
+        is_found = found and _is_even(points, corners)
+        return _whole(points, scale) if is_found else None
+    found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
+    return _whole(points, 1.0) if found else None
+
+
+def _is_even(points: Any, corners: tuple[int, int]) -> bool:
+    """Tell whether rows and columns go on evenly; some corners may be another's."""
+    columns, rows = corners
+    grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
+    for along in (grid, np.swapaxes(grid, 0, 1)):
+        steps = np.diff(along, axis=1)
+        bends = np.linalg.norm(np.diff(steps, axis=1), axis=-1)
+        lengths = np.linalg.norm(steps, axis=-1)
+        if np.any(bends > UNEVEN * np.minimum(lengths[:, 1:], lengths[:, :-1])):
+            return False
+    return True
+
+
+def _marked(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
+    points = np.full((board.n_points, 2), np.nan)
+    size, dictionary = (board.columns, board.rows), marker_dictionary(board)
+    if board.kind is BoardKind.MARKERS:
+        own = cv2.aruco.GridBoard(size, board.pitch, board.detail, dictionary)
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+        detector = cv2.aruco.ArucoDetector(dictionary, parameters)
+        corners, numbers, rejected = detector.detectMarkers(grey)
+        corners, numbers, *_ = detector.refineDetectedMarkers(
+            grey, own, corners, numbers, rejected
+        )
+        if numbers is None:
+            return None
+        for corner, number in zip(corners, numbers.ravel().tolist(), strict=True):
+            if number < board.columns * board.rows:
+                at = CORNERS * number
+                points[at : at + CORNERS] = corner.reshape(CORNERS, 2)
+        return points
+    charuco = cv2.aruco.CharucoBoard(size, board.pitch, board.detail, dictionary)
+    charuco.setLegacyPattern(board.kind is BoardKind.LEGACY_CHARUCO)
+    found, numbers, *_ = cv2.aruco.CharucoDetector(charuco).detectBoard(grey)
+    if numbers is None or found is None:
+        return None
+    points[numbers.ravel()] = np.asarray(found).reshape(-1, 2)
+    return points
+
+
+def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
+    """Return corners placed by the gradients round them."""
+    reach = REFINED * _least_distance(points, board)
+    if board.kind.has_markers and board.kind is not BoardKind.MARKERS:
+        to_marker = 0.5 * (1 - board.detail / board.pitch)
+        reach = min(reach, reach * to_marker / REFINED)
+    half = int(np.clip(round(reach), MIN_REFINED, MAX_REFINED))
+    height, width = image.shape
+    inside = np.isfinite(points[:, 0])
+    inside[inside] = (points[inside] > half + 1).all(axis=1) & (
+        points[inside] < np.array([width, height]) - half - 2
+    ).all(axis=1)
+    refined = np.full_like(points, np.nan)
+    if not inside.any():
+        return refined
+    start = points[inside].astype(np.float32)[:, None]
+    moved = cv2.cornerSubPix(
+        image.astype(np.float32), start.copy(), (half, half), (-1, -1), REFINING
+    )
+    refined[inside] = moved[:, 0]
+    return refined
+
+
+def _least_distance(points: FloatArray, board: Board) -> float:
+    """Return the least distance of neighbours on the board, px."""
+    flat = board.points[:, :2]
+    seen = np.isfinite(points[:, 0])
+    apart = np.linalg.norm(flat[seen, None] - flat[None, seen], axis=-1)
+    nearest = np.where(apart > 0, apart, np.inf).min()
+    i, j = np.nonzero((apart > 0) & (apart < 1.01 * nearest))
+    seen_points = points[seen]
+    return float(np.linalg.norm(seen_points[i] - seen_points[j], axis=-1).min())
+
+
+def _circles(
+    image: Image, grey: npt.NDArray[np.uint8], board: Board, *, quick: bool
+) -> FloatArray | None:
+    """Return the centres of the ellipses of dark circles, or of bright ones."""
+    small, scale = _smaller(grey)
+    asymmetric = board.kind is BoardKind.ASYMMETRIC_CIRCLES
+    flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
+    ways = (flags,) if quick else (flags, flags | cv2.CALIB_CB_CLUSTERING)
+    for is_dark in (True, False):
+        seen = small if is_dark else cv2.bitwise_not(small)
+        for way in ways:
+            found, centers = cv2.findCirclesGrid(
+                seen, (board.columns, board.rows), None, way, _blobs(small.size)
+            )
+            if found:
+                rough = _from_front(_whole(centers, scale), board)
+                return _rim_centers(image, rough, board, is_dark=is_dark)
+    return None
+
+
+def _blobs(n_pixels: int) -> cv2.SimpleBlobDetector:
+    parameters = cv2.SimpleBlobDetector.Params()
+    parameters.minArea = 12.0
+    parameters.maxArea = n_pixels / 50
+    parameters.minDistBetweenBlobs = 3.0
+    return cv2.SimpleBlobDetector.create(parameters)
+
+
+def _rim_centers(
+    image: Image, rough: FloatArray, board: Board, *, is_dark: bool
+) -> FloatArray | None:
+    """Return the centres of rims, NaN where a rim is not whole."""
+    light = (image.max() - image) if is_dark else image
+    apart = _least_distance(rough, board)
+    start = (SPOT_SPREAD * board.detail / board.pitch * apart) ** 2 * np.eye(2)
+    centers = np.full_like(rough, np.nan)
+    for i, center in enumerate(rough):
+        rim = fit_rim(light, center, start)
+        if (
+            rim is not None
+            and rim.is_whole
+            and np.linalg.norm(rim.center - center) < OFF_SPOT * apart
+        ):
+            centers[i] = rim.center
+    n_seen = int(np.isfinite(centers[:, 0]).sum())
+    # Small or soft circles have no rim to fit: what OpenCV found is kept for all.
+    return centers if n_seen > len(rough) // 2 else rough

@@ -1,0 +1,82 @@
+"""How far off in the image the intrinsics put what the camera sees.
+
+An error of the intrinsics that a turn of the camera explains is none: where a camera
+looks is found again in each use. So the turn that explains most of it is taken out of
+the field of errors over the image [1]_.
+
+References
+----------
+.. [1] D. Kogan, mrcal, "Projection uncertainty": the implied rotation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import skew
+
+COLUMNS, ROWS = 9, 7
+
+
+@dataclass(frozen=True, eq=False)
+class UncertaintyMap:
+    """Standard uncertainty of projections over the image.
+
+    Attributes
+    ----------
+    pixels : (7, 9, 2) array
+        Where in the image, px.
+    sigmas : (7, 9) array
+        Along the worst direction there, px.
+    """
+
+    pixels: FloatArray
+    sigmas: FloatArray
+
+    @property
+    def center(self) -> float:
+        """In the middle of the image, px."""
+        return float(self.sigmas[ROWS // 2, COLUMNS // 2])
+
+    @property
+    def typical(self) -> float:
+        """Root mean square over the image, px."""
+        return float(np.sqrt(np.mean(self.sigmas**2)))
+
+    @property
+    def worst(self) -> float:
+        """The largest, px."""
+        return float(self.sigmas.max())
+
+
+def map_uncertainty(camera: Camera, covariance: FloatArray) -> UncertaintyMap:
+    """Return what a covariance of the intrinsics comes to over the image."""
+    fields = error_fields(camera)
+    by_place = fields @ covariance @ np.swapaxes(fields, -1, -2)
+    sigmas = np.sqrt(np.maximum(np.linalg.eigvalsh(by_place)[..., -1], 0.0))
+    return UncertaintyMap(_pixels(camera), sigmas.reshape(ROWS, COLUMNS))
+
+
+def error_fields(camera: Camera) -> FloatArray:
+    """Return how errors of the intrinsics move the image, (63, 2, 4 + n), px.
+
+    The turn that explains most of each is left out.
+    """
+    directions = camera.unproject(_pixels(camera).reshape(-1, 2))
+    points = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
+    by_point = camera.project_with_jacobian(points).jacobian
+    turns = (-by_point @ skew(points)).reshape(-1, 3)
+    fields = camera.intrinsics_jacobian(directions)
+    flat = fields.reshape(len(turns), -1)
+    explained = turns @ np.linalg.lstsq(turns, flat, rcond=None)[0]
+    return np.asarray((flat - explained).reshape(fields.shape))
+
+
+def _pixels(camera: Camera) -> FloatArray:
+    grid = np.meshgrid(
+        np.linspace(0, camera.width - 1, COLUMNS),
+        np.linspace(0, camera.height - 1, ROWS),
+    )
+    return np.stack(grid, axis=-1)

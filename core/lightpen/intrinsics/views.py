@@ -1,0 +1,78 @@
+"""What the cameras saw of the board, and what is assumed of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import BoolArray, FloatArray
+from lightpen.intrinsics.boards import Board
+
+
+@dataclass(frozen=True)
+class BoardTolerances:
+    """How true a board is, as standard uncertainties; what the views tell they correct.
+
+    Attributes
+    ----------
+    flatness : float
+        By how much its corners bend away from the plane, mm.
+    squareness : float
+        Of the ratio of its lengths along x and y, and of its right angle, relative:
+        a printer stretches the paper along its way.
+    scale : float
+        Of all its lengths together, relative. No view tells it.
+    """
+
+    flatness: float = 0.1
+    squareness: float = 5e-4
+    scale: float = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """The points of a board in V views of C cameras.
+
+    Attributes
+    ----------
+    names : tuple of str
+        One a view.
+    pixels : (V, C, N, 2) array
+        px; NaN where a point was not seen.
+    image_sizes : tuple of tuple of int
+        Width and height, one a camera, px.
+    """
+
+    board: Board
+    names: tuple[str, ...]
+    pixels: FloatArray
+    image_sizes: tuple[tuple[int, int], ...]
+
+    @property
+    def n_views(self) -> int:
+        """Number of views."""
+        return len(self.names)
+
+    @property
+    def seen(self) -> BoolArray:
+        """Which points were seen, (V, C, N)."""
+        return np.asarray(np.isfinite(self.pixels).all(axis=-1))
+
+    @property
+    def found(self) -> BoolArray:
+        """Which views each camera saw the board in, (V, C)."""
+        return np.asarray(self.seen.any(axis=-1))
+
+    def chosen(self, which: BoolArray) -> "Views":
+        """Return some of the views."""
+        names = tuple(
+            name for name, keep in zip(self.names, which, strict=True) if keep
+        )
+        return Views(self.board, names, self.pixels[which], self.image_sizes)
+
+    def of_camera(self, camera: int) -> "Views":
+        """Return what one camera saw, the views in which it saw the board."""
+        own = Views(
+            *(self.board, self.names, self.pixels[:, camera : camera + 1]),
+            (self.image_sizes[camera],),
+        )
+        return own.chosen(own.found[:, 0])

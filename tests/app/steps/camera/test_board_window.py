@@ -1,0 +1,145 @@
+"""Calibrating the camera by a board, as an engineer sees it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QListWidget, QPushButton
+from pytestqt.qtbot import QtBot
+
+from lightpen.arrays import Image
+from lightpen.cameras.protocol import Frame, sealed
+from lightpen.detection.spots import detect_spots
+from lightpen.formats.camera_files import read_camera
+from lightpen.intrinsics.boards import parse_board
+from lightpen.live.looking import LiveImage
+from lightpen.model.camera import Camera
+from lightpen.simulator.board_views import simulate_board_poses
+from lightpen.simulator.boards import expose_board, render_board
+from lightpen.simulator.sensor import Sensor
+from lightpen_app.look.pooling import pooled
+from lightpen_app.steps.camera.board_view import BoardView
+from lightpen_app.steps.camera.board_window import BoardWindow
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.work.live_view import Shown
+from lightpen_app.work.workbench import Workbench
+
+BOARD = "chessboard:7x5:20"
+CAMERA = Camera(200, 160, 300.0, 299.6, 101.0, 78.0)
+SECOND = 1_000_000_000  # ns
+
+
+@pytest.fixture(scope="module")
+def images() -> list[Image]:
+    board, rng = parse_board(BOARD), np.random.default_rng(2)
+    poses = simulate_board_poses(CAMERA, board, 7, rng)
+    return [
+        expose_board(render_board(CAMERA, board, R, t), Sensor(), rng)
+        for R, t in zip(poses.rotations, poses.translations, strict=True)
+    ]
+
+
+@pytest.fixture
+def window(qtbot: QtBot, workbench: Workbench) -> Iterator[BoardWindow]:
+    window = BoardWindow(workbench.live)
+    qtbot.addWidget(window)
+    window.findChildren(EnterEdit)[0].setText(BOARD)
+    window.show()
+    yield window
+    window.close()
+
+
+def press(window: BoardWindow, words: str) -> None:
+    (button,) = (
+        each for each in window.findChildren(QPushButton) if each.text() == words
+    )
+    assert button.isEnabled(), button.toolTip()
+    button.click()
+
+
+def remark(window: BoardWindow) -> str:
+    return window.findChildren(SignLabel)[0].value().text
+
+
+def views_listed(window: BoardWindow) -> int:
+    return window.findChildren(QListWidget)[0].count()
+
+
+def written(folder: Path, images: list[Image]) -> str:
+    for number, image in enumerate(images):
+        cv2.imwrite(str(folder / f"{number}.png"), image)
+    return str(folder)
+
+
+def test_a_folder_of_images_becomes_a_camera_file_in_use(
+    window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+    path = str(tmp_path / "camera.yaml")
+    with qtbot.waitSignal(window.saved) as saved:
+        window.save(path)
+
+    assert saved.args == [path]
+    assert read_camera(Path(path)).fx == pytest.approx(CAMERA.fx, abs=5)
+    overlay = window.findChildren(BoardView)[0].overlay()
+    assert overlay.arrows is not None
+    assert len(overlay.arrows) == 7 * 35
+
+
+def test_a_view_that_is_left_out_takes_no_part(
+    window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
+) -> None:
+    window.read_folder(written(tmp_path, images))
+    qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+    window.findChildren(QListWidget)[0].setCurrentRow(0)
+    press(window, "Leave out and calibrate again")
+
+    qtbot.waitUntil(lambda: views_listed(window) == 6, timeout=60_000)
+
+
+def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
+    window.findChildren(EnterEdit)[0].setText("chess")
+    press(window, "Start")
+
+    assert "chess is no board" in remark(window)
+
+
+def test_images_without_a_board_are_refused_with_the_reason(
+    window: BoardWindow, tmp_path: Path, qtbot: QtBot
+) -> None:
+    window.read_folder(written(tmp_path, [np.full((160, 200), 40, np.uint8)]))
+
+    qtbot.waitUntil(lambda: "None of the 1 images" in remark(window), timeout=60_000)
+
+
+def test_a_board_held_still_is_kept_by_itself(
+    window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
+) -> None:
+    press(window, "Start")
+    view = window.findChildren(BoardView)[0]
+    count = 0
+    for image in images[:2]:
+        for _ in range(3):
+            count += 1
+            shown = _shown(image, count)
+            workbench.live.image_shown.emit(shown)
+            qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+
+    overlay = view.overlay()
+    assert overlay.cells is not None
+    assert overlay.cells.sum() == 2 * 35
+    assert overlay.outline is not None
+    assert "Kept." in remark(window)
+    press(window, "Stop")
+
+
+def _shown(image: Image, seconds: int) -> Shown:
+    frame = Frame(sealed(image), seconds, seconds * SECOND)
+    height, width = image.shape
+    seen = LiveImage(frame, detect_spots(image), None)
+    return Shown(pooled(image, 8), QSize(width, height), seen)

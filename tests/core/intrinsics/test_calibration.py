@@ -1,0 +1,196 @@
+"""Tests of intrinsics by a board: what is chosen, refused and remarked."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import date
+
+import numpy as np
+import pytest
+
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.calibration import (
+    MIN_VIEWS,
+    CameraCalibration,
+    calibrate_camera,
+)
+from lightpen.intrinsics.coverage import cover
+from lightpen.intrinsics.next_view import choose_next_view
+from lightpen.intrinsics.regions import measure_regions
+from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+
+MakeViews = Callable[..., Views]
+
+
+@pytest.fixture(scope="module")
+def found(make_views: MakeViews) -> CameraCalibration:
+    return calibrate_camera(make_views(), BoardTolerances(), date(2026, 3, 1))
+
+
+@pytest.fixture(scope="module")
+def few(make_views: MakeViews) -> CameraCalibration:
+    return calibrate_camera(make_views(n_views=6), BoardTolerances())
+
+
+def test_the_truth_lies_within_the_intervals(
+    found: CameraCalibration, camera: Camera
+) -> None:
+    assert found.camera.covariance is not None
+    sigmas = np.sqrt(np.diag(found.camera.covariance))
+
+    assert np.all(np.abs(found.camera.intrinsics - camera.intrinsics) < 3 * sigmas)
+    assert found.camera.calibrated_on == date(2026, 3, 1)
+    assert not found.remarks
+
+
+def test_five_coefficients_are_kept_where_eight_gain_nothing(
+    found: CameraCalibration,
+) -> None:
+    assert found.choice.n_coefficients == 5
+    assert "5 coefficients" in str(found.choice.sentence)
+
+
+def test_eight_coefficients_are_taken_where_the_lens_needs_them(
+    make_views: MakeViews,
+) -> None:
+    lens = Camera(
+        *(640, 480, 420.0, 420.0, 320.0, 240.0),
+        distortion=np.array([1.2, 0.6, 0, 0, 0.05, 1.6, 1.1, 0.35]),
+    )
+    found = calibrate_camera(make_views(of=lens, n_views=24), BoardTolerances())
+
+    assert found.choice.n_coefficients == 8
+    assert "lessen the error in views left out" in str(found.choice.sentence)
+
+
+def test_halves_agree_within_what_their_difference_may_be(
+    found: CameraCalibration,
+) -> None:
+    assert found.halves is not None
+    ratio = found.halves.difference / found.halves.expanded_uncertainty
+    assert np.abs(ratio).max() < 2
+
+
+def test_views_left_out_are_met_nearly_as_well_as_those_fitted(
+    found: CameraCalibration,
+) -> None:
+    assert found.adjustment.rms < found.held_out_rms < 1.2 * found.adjustment.rms
+
+
+def test_views_left_out_are_met_by_the_board_as_it_is_bent(
+    make_views: MakeViews,
+) -> None:
+    bent = make_views(shape=np.array([0, 0, 0.3, -0.1, 0.15]))
+    found = calibrate_camera(bent, BoardTolerances())
+
+    assert found.held_out_rms < 1.2 * found.adjustment.rms
+
+
+def test_a_view_that_fits_no_other_is_left_out(make_views: MakeViews) -> None:
+    views = make_views()
+    pixels = views.pixels.copy()
+    pixels[3, 0] += np.random.default_rng(1).normal(0, 2, pixels[3, 0].shape)
+    found = calibrate_camera(replace(views, pixels=pixels), BoardTolerances())
+
+    assert found.left_out == ("view_04.png",)
+
+
+def test_a_misplaced_point_is_left_out(make_views: MakeViews) -> None:
+    views = make_views()
+    pixels = views.pixels.copy()
+    pixels[3, 0, 7] += 0.6
+    found = calibrate_camera(replace(views, pixels=pixels), BoardTolerances())
+
+    assert found.n_points_left_out == 1
+    assert not found.left_out
+
+
+def test_the_worst_view_comes_first(found: CameraCalibration) -> None:
+    rms = found.adjustment.view_rms[found.worst_first, 0]
+
+    assert np.all(np.diff(rms) <= 0)
+
+
+def test_too_few_views_are_refused(make_views: MakeViews) -> None:
+    with pytest.raises(CalibrationError, match=f"in {MIN_VIEWS - 1} images"):
+        calibrate_camera(make_views(n_views=MIN_VIEWS - 1), BoardTolerances())
+
+
+def test_views_that_are_alike_are_refused(make_views: MakeViews) -> None:
+    views = make_views(n_views=8)
+    rng = np.random.default_rng(2)
+    one = np.repeat(views.pixels[:1], 8, axis=0)
+    alike = replace(views, pixels=one + rng.normal(0, 0.03, one.shape))
+
+    with pytest.raises(CalibrationError, match="too alike"):
+        calibrate_camera(alike, BoardTolerances())
+
+
+def test_a_board_printed_to_fit_the_page_is_remarked(make_views: MakeViews) -> None:
+    stretched = np.array([0.03, 0, 0, 0, 0])
+    found = calibrate_camera(make_views(shape=stretched), BoardTolerances())
+
+    (remark,) = found.remarks
+    assert remark.code == "intrinsics.board-stretched"
+    assert remark.values["stretch"] == pytest.approx(0.03, abs=5e-4)
+
+
+def test_a_bent_board_is_remarked(make_views: MakeViews) -> None:
+    bent = np.array([0, 0, 1.5, 0, 0])
+    found = calibrate_camera(make_views(shape=bent), BoardTolerances())
+
+    assert [remark.code for remark in found.remarks] == ["intrinsics.board-bent"]
+
+
+def test_points_of_another_board_are_refused(make_views: MakeViews) -> None:
+    views = make_views()
+    shuffled = views.pixels[:, :, np.random.default_rng(1).permutation(54)]
+
+    with pytest.raises(CalibrationError, match="other squares"):
+        calibrate_camera(replace(views, pixels=shuffled), BoardTolerances())
+
+
+def test_what_the_views_do_not_reach_is_said(make_views: MakeViews) -> None:
+    views = make_views()
+    left = views.pixels[:, 0, :, 0].max(axis=1) < 520
+    some = views.chosen(left)
+    found = calibrate_camera(some, BoardTolerances())
+    missing = cover(some, found.adjustment.state.poses).missing
+
+    assert "top right" in str(missing[0])
+    assert "bottom right" in str(missing[0])
+
+
+def test_the_next_view_takes_more_of_the_uncertainty_where_little_is_known(
+    few: CameraCalibration, found: CameraCalibration
+) -> None:
+    wanted = [
+        choose_next_view(each.adjustment, each.views.board) for each in (few, found)
+    ]
+
+    assert wanted[0].gain > wanted[1].gain > 0
+    for each in wanted:
+        assert np.all((each.outline >= 0) & (each.outline <= [639, 479]))
+
+
+def test_more_views_lessen_the_uncertainty_over_the_image(
+    few: CameraCalibration, found: CameraCalibration
+) -> None:
+    assert few.camera.covariance is not None
+    assert found.camera.covariance is not None
+
+    before = map_uncertainty(few.camera, few.camera.covariance)
+    after = map_uncertainty(found.camera, found.camera.covariance)
+    assert after.typical < before.typical
+    assert before.center < before.typical < before.worst
+
+
+def test_residuals_are_told_by_region(found: CameraCalibration) -> None:
+    regions = measure_regions(found.adjustment, found.camera)
+
+    assert regions.n_points.sum() == found.views.seen.sum()
+    np.testing.assert_allclose(
+        np.nansum(regions.n_points * regions.rms**2) / regions.n_points.sum(),
+        found.adjustment.rms**2,
+    )

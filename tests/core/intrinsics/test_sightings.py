@@ -1,0 +1,168 @@
+"""Tests of finding boards in images."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray, Image
+from lightpen.errors import CalibrationError, FileError
+from lightpen.formats.images import ImageSource
+from lightpen.intrinsics.boards import Board, parse_board
+from lightpen.intrinsics.observing import observe_board
+from lightpen.intrinsics.sightings import find_points
+from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.boards import expose_board, render_board
+from lightpen.simulator.sensor import Sensor
+
+SMALL = Camera(
+    *(400, 320, 600.0, 599.0, 201.0, 158.0),
+    distortion=np.array([-0.1, 0.05, 3e-4, -2e-4, 0.0]),
+)
+TILT = rotation_from_vector(np.array([0.35, -0.3, 0.1]))
+# Rms error, px: of 8 bit with shot noise. A marker's corner is rounded by the blur.
+LIMITS = {
+    "chessboard:9x6:20": 0.03,
+    "charuco:7x5:20:14:DICT_4X4_50": 0.06,
+    "charuco-legacy:7x6:20:14:DICT_4X4_50": 0.06,
+    "markers:4x3:30:8:DICT_4X4_50": 0.3,
+    "circles:7x5:20:12": 0.03,
+    "asymmetric-circles:4x9:15:14": 0.03,
+}
+
+
+def place(board: Board, filled: float = 0.6) -> FloatArray:
+    longer = 2 * float(np.abs(board.points[:, :2]).max())
+    return np.array([3.0, -2.0, SMALL.fx * longer / (filled * SMALL.width)])
+
+
+def image_of(board: Board, bits: int = 8, seed: int = 1) -> Image:
+    light = render_board(SMALL, board, TILT, place(board))
+    sensor = Sensor(bits=12) if bits == 12 else Sensor()
+    return expose_board(light, sensor, np.random.default_rng(seed))
+
+
+def truth(board: Board) -> FloatArray:
+    points = board.points @ TILT.T + place(board)
+    if not board.kind.is_circles:
+        return SMALL.project(points)
+    normals = np.broadcast_to(TILT[:, 2], points.shape)
+    return ellipse_centers(SMALL, points, normals, 0.5 * board.detail)
+
+
+def source_of(*images: Image) -> ImageSource:
+    names = tuple(f"{i}.png" for i in range(len(images)))
+    return ImageSource(
+        names, (), lambda: iter([lambda image=each: image for each in images])
+    )
+
+
+def error_of(points: FloatArray | None, board: Board) -> float:
+    assert points is not None
+    there = truth(board)
+    errors = [np.nanmean((points[order] - there) ** 2) for order in board.orders]
+    return float(np.sqrt(min(errors)))
+
+
+@pytest.mark.parametrize("word", LIMITS)
+def test_the_points_of_a_board_are_found(word: str) -> None:
+    board = parse_board(word)
+    points = find_points(image_of(board), board)
+
+    assert error_of(points, board) < LIMITS[word]
+    assert points is not None
+    assert np.isfinite(points[:, 0]).mean() > 0.9  # a ChArUco board may lack some
+
+
+def test_twelve_bits_tell_no_less_than_eight() -> None:
+    board = parse_board("chessboard:9x6:20")
+    deep = find_points(image_of(board, bits=12), board)
+    flat = find_points(image_of(board), board)
+
+    assert error_of(deep, board) < 1.1 * error_of(flat, board)
+
+
+def test_a_charuco_board_that_is_partly_hidden_is_found() -> None:
+    board = parse_board("charuco:7x5:20:14:DICT_4X4_50")
+    image = image_of(board)
+    image[:, :150] = 30
+    points = find_points(image, board)
+
+    assert points is not None
+    seen = np.isfinite(points[:, 0])
+    assert 6 <= seen.sum() < board.n_points
+    assert error_of(points, board) < 0.06
+
+
+def test_rows_numbered_in_a_mirror_are_put_right() -> None:
+    board = parse_board("chessboard:9x6:20")
+    mirrored = image_of(board)[:, ::-1].copy()
+    points = find_points(mirrored, board)
+    assert points is not None
+    homography, _ = cv2.findHomography(board.points[:, :2], points)
+
+    assert np.linalg.det(homography) > 0  # seen from ahead
+
+
+def test_an_image_without_a_board_shows_none() -> None:
+    blank = np.full((320, 400), 40, dtype=np.uint8)
+
+    for word in LIMITS:
+        assert find_points(blank, parse_board(word)) is None
+
+
+@pytest.mark.parametrize(
+    ("shown", "said", "code"),
+    [
+        ("chessboard:9x6:20", "chessboard:8x5:20", "intrinsics.other-count"),
+        ("chessboard:9x6:20", "chessboard:6x9:20", None),
+        (
+            "charuco-legacy:7x6:20:14:DICT_4X4_50",
+            "charuco:7x6:20:14:DICT_4X4_50",
+            "intrinsics.other-layout",
+        ),
+        ("chessboard:9x6:20", "circles:7x5:20:12", "intrinsics.unseen"),
+    ],
+)
+def test_another_board_than_was_said_is_named(
+    shown: str, said: str, code: str | None
+) -> None:
+    image = image_of(parse_board(shown))
+    if code is None:  # a chessboard lies as it likes
+        assert find_points(image, parse_board(said)) is not None
+        return
+
+    with pytest.raises(CalibrationError) as caught:
+        observe_board(source_of(image), parse_board(said), lambda fraction: None)
+    assert caught.value.sentence.code == code
+
+
+def test_a_mirrored_board_is_said_to_be_so() -> None:
+    board = parse_board("charuco:7x5:20:14:DICT_4X4_50")
+    mirrored = image_of(board)[:, ::-1].copy()
+
+    with pytest.raises(CalibrationError, match="mirrored"):
+        observe_board(source_of(mirrored), board, lambda fraction: None)
+
+
+def test_images_of_two_sizes_are_refused() -> None:
+    board = parse_board("chessboard:9x6:20")
+    image = image_of(board)
+
+    with pytest.raises(FileError, match=r"400 x 310 px, 0\.png has 400 x 320"):
+        observe_board(
+            source_of(image, image[:310].copy()), board, lambda fraction: None
+        )
+
+
+def test_images_in_which_it_is_not_seen_are_named() -> None:
+    board = parse_board("chessboard:9x6:20")
+    blank = np.full((320, 400), 40, dtype=np.uint8)
+    observed = observe_board(
+        source_of(image_of(board), blank), board, lambda fraction: None
+    )
+
+    assert observed.views.names == ("0.png",)
+    assert observed.unseen == ("1.png",)
+    assert observed.views.image_sizes == ((400, 320),)

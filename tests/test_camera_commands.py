@@ -1,0 +1,158 @@
+"""Tests of the commands about cameras: intrinsics, extrinsics, board, check-camera."""
+
+import json
+from datetime import date
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from lightpen.cli import main
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.rig_files import read_rig
+from lightpen.intrinsics.boards import parse_board
+from lightpen.local_time import local_now
+from lightpen.model.camera import Camera
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.simulator.board_views import simulate_board_poses
+from lightpen.simulator.boards import expose_board, render_board
+from lightpen.simulator.sensor import Sensor
+
+BOARD = "chessboard:7x5:20"
+CAMERA = Camera(200, 160, 300.0, 299.6, 101.0, 78.0)
+TURN, SHIFT = rotation_from_vector(np.array([0.0, -0.05, 0.02])), [-25.0, 0.5, 1.0]
+N_VIEWS = 8
+
+
+@pytest.fixture(scope="module")
+def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write what two cameras see of a board, into the folders left and right."""
+    folder = tmp_path_factory.mktemp("pairs")
+    rng = np.random.default_rng(2)
+    board = parse_board(BOARD)
+    poses = simulate_board_poses(CAMERA, board, N_VIEWS, rng)
+    for name, R, t in (("left", np.eye(3), np.zeros(3)), ("right", TURN, SHIFT)):
+        (folder / name).mkdir()
+        for v in range(N_VIEWS):
+            light = render_board(
+                CAMERA, board, R @ poses.rotations[v], R @ poses.translations[v] + t
+            )
+            image = expose_board(light, Sensor(), rng)
+            cv2.imwrite(str(folder / name / f"{v}.png"), image)
+    return folder
+
+
+def run(*words: str | Path) -> int:
+    return main([str(word) for word in words])
+
+
+def test_a_camera_file_is_made_of_a_folder_of_images(
+    pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    camera_file, record_file = tmp_path / "camera.yaml", tmp_path / "record.json"
+    status = run(
+        *("intrinsics", pairs / "left", "--board", BOARD, "--out", camera_file),
+        *("--serial", "DEV-7", "--temperature", "21.5", "--json", record_file),
+    )
+
+    assert status == 0
+    camera, record = read_camera(camera_file), json.loads(record_file.read_text())
+    assert camera.covariance is not None
+    sigmas = np.sqrt(np.diag(camera.covariance))[:4]
+    assert np.all(np.abs(camera.intrinsics - CAMERA.intrinsics)[:4] < 4 * sigmas)
+    assert (camera.serial, camera.temperature_c) == ("DEV-7", 21.5)
+    assert camera.calibrated_on in (local_now().date(), date.today())
+    assert record["rms_px"] < 0.05
+    assert len(record["views"]) == N_VIEWS
+    assert "U (k = 2)" in capsys.readouterr().out
+
+
+def test_named_images_take_no_part(pairs: Path, tmp_path: Path) -> None:
+    record_file = tmp_path / "record.json"
+    run(
+        *("intrinsics", pairs / "left", "--board", BOARD, "--leave-out", "3.png"),
+        *("--out", tmp_path / "camera.yaml", "--json", record_file),
+    )
+
+    names = [view["name"] for view in json.loads(record_file.read_text())["views"]]
+    assert names == ["0.png", "1.png", "2.png", "4.png", "5.png", "6.png", "7.png"]
+
+
+def test_an_unknown_name_to_leave_out_is_refused(
+    pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = run(
+        *("intrinsics", pairs / "left", "--board", BOARD, "--leave-out", "9.png"),
+        *("--out", tmp_path / "camera.yaml"),
+    )
+
+    assert status == 2
+    assert "9.png is none of the images" in capsys.readouterr().err
+    assert not (tmp_path / "camera.yaml").exists()
+
+
+def test_the_rig_file_of_two_cameras_is_read_back(
+    pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig_file = tmp_path / "rig.json"
+    status = run(
+        *("extrinsics", pairs / "left", pairs / "right", "--board", BOARD),
+        *("--out", rig_file, "--json", tmp_path / "record.json"),
+    )
+    rig = read_rig(rig_file).rig
+
+    assert status == 0
+    assert rig.names == ("left", "right")
+    assert rig.covariance is not None
+    sigmas = np.sqrt(np.diag(rig.covariance))[3:]
+    assert np.all(np.abs(rig.translations[1] - SHIFT) < 4 * sigmas)
+    assert "Baseline" in capsys.readouterr().out
+
+
+def test_a_board_is_written_as_a_page(tmp_path: Path) -> None:
+    assert run("board", BOARD, tmp_path / "board.pdf") == 0
+    assert (tmp_path / "board.pdf").read_bytes().startswith(b"%PDF-")
+
+
+def test_a_page_of_another_kind_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("board", BOARD, tmp_path / "board.png") == 2
+    assert "does not end in .pdf" in capsys.readouterr().err
+
+
+def test_a_swing_says_whether_file_and_camera_agree(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    swing = shared_data / "swing-clean"
+    record_file = tmp_path / "record.json"
+    status = run(
+        *("check-camera", swing, "--camera", swing / "camera.yaml"),
+        *("--pen", swing / "leds.csv", "--json", record_file),
+    )
+
+    assert status == 0
+    assert "File and camera agree" in capsys.readouterr().out
+    assert json.loads(record_file.read_text())["agrees"] is True
+
+
+def test_a_file_of_another_focus_is_contradicted_by_a_swing(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    swing = shared_data / "swing-clean"
+    text = (swing / "camera.yaml").read_text().replace("4638.2", "4598.2")
+    text = text.replace("4638.1999999999998", "4598.2").replace(
+        "4637.1000000000004", "4597.1"
+    )
+    deviations = "0.5, 0.5, 0.6, 0.6, 4e-4, 4e-3, 4e-5, 4e-5, 0.0"
+    (tmp_path / "camera.yaml").write_text(
+        f"{text}\nstd_deviations_intrinsics: [{deviations}]\n"
+    )
+    status = run(
+        *("check-camera", swing, "--camera", tmp_path / "camera.yaml"),
+        *("--pen", swing / "leds.csv"),
+    )
+
+    assert status == 1
+    assert "contradict the camera file" in capsys.readouterr().err
