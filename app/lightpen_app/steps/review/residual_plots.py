@@ -16,6 +16,7 @@ MANY = 400  # arrows; more are told by their means
 N_CELLS = 20  # across, of which each shows the mean of its arrows
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.98  # of the width, where it has a grip
+LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
 
 
@@ -51,7 +52,7 @@ class MisfitPlot(Plot):
         self._chosen = pg.ScatterPlotItem(pxMode=True, size=15, symbol="o")
         self._above = pg.ScatterPlotItem(pxMode=True, size=9, symbol="x")
         self._limit = pg.InfiniteLine(
-            angle=0, movable=True, label="", labelOpts={"position": 0.5}
+            angle=0, movable=True, label="", labelOpts=LIMIT_LABEL
         )
         self._limit.label.setFont(font(TextSize.SMALL))
         self._limit.addMarker("<|>", LIMIT_GRIP, 2 * GRID)
@@ -84,7 +85,7 @@ class MisfitPlot(Plot):
             "used": used.astype(np.float64),
         }
         self._in_use = {n: self._places[n] for n in numbers[used].tolist()}
-        self._fit(x, np.append(heights, 1.1 * heights.max(initial=0.0)), y_zero=True)
+        self._fit(x, np.append(heights, 1.2 * heights.max(initial=0.0)), y_zero=True)
         self.set_number(self._number)
         self._rest_limit(heights[used])
 
