@@ -982,6 +982,7 @@ def test_every_control_is_named_and_reached_by_tab(
         "Intrinsics file",
         "Open...",
         "Calibrate this camera...",
+        "Draw the mask on the image",
         "Search",
         "Cover the LEDs",
         "Live image",
