@@ -20,6 +20,7 @@ from filelock import FileLock
 from hypothesis import settings
 
 if TYPE_CHECKING:
+    from jsonschema import Draft202012Validator
     from tests.gige_simulator import GigeSimulator
 
     from lightpen.cameras.source import SourcePlace
@@ -88,15 +89,38 @@ def require_library(key: str) -> None:
 
 
 @pytest.fixture
-def gige() -> Iterator["GigeSimulator"]:
-    """Return a simulated camera on the loopback; one test at a time has it."""
+def loopback() -> Iterator[str]:
+    """Return the address of the loopback; one test at a time has a camera there."""
     require_library("aravis")
-    from tests.gige_simulator import GigeSimulator
+    from tests.gige_simulator import ADDRESS
 
     with FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock"):
-        simulator = GigeSimulator()
-        yield simulator
-        simulator.unplug()
+        yield ADDRESS
+
+
+@pytest.fixture
+def second_loopback(loopback: str) -> Iterator[str]:
+    """Return another address of the loopback, for a second camera."""
+    from tests.gige_simulator import SECOND_ADDRESS
+
+    words = ("ip", "address", "{0}", f"{SECOND_ADDRESS}/8", "dev", "lo")
+    added = [word.format("add") for word in words]
+    if shutil.which("ip") is None or subprocess.run(added, check=False).returncode:
+        if os.environ.get("LIGHTPEN_CAMERAS") == "required":
+            pytest.fail("The loopback needs a second address.")
+        pytest.skip("the loopback has one address only")
+    yield SECOND_ADDRESS
+    subprocess.run([word.format("delete") for word in words], check=True)
+
+
+@pytest.fixture
+def gige(loopback: str) -> Iterator["GigeSimulator"]:
+    """Return a simulated camera on the loopback."""
+    from tests.gige_simulator import GigeSimulator
+
+    simulator = GigeSimulator(address=loopback)
+    yield simulator
+    simulator.unplug()
 
 
 @pytest.fixture
@@ -153,6 +177,17 @@ def lightpen() -> Callable[..., CompletedProcess[str]]:
         return CompletedProcess(words, status, out.getvalue(), err.getvalue())
 
     return run
+
+
+@pytest.fixture(scope="session")
+def validator() -> "Draft202012Validator":
+    """Return what tells whether the record of a calibration is as is published."""
+    from jsonschema import Draft202012Validator
+
+    file = Path(__file__).parents[1] / "docs" / "calibration.schema.json"
+    schema = json.loads(file.read_bytes())
+    Draft202012Validator.check_schema(schema)
+    return Draft202012Validator(schema)
 
 
 @pytest.fixture(scope="session")
@@ -277,16 +312,55 @@ def record(
 
 
 @pytest.fixture(scope="session")
+def stated() -> dict[str, Any]:
+    """Return the record of a good calibration, as its JSON has it; only read it.
+
+    Of its 60 images one has too few LEDs and one is of a tip that slipped.
+    """
+    import numpy as np
+
+    from lightpen.detection.observations import observe_centers
+    from lightpen.estimation.calibrate import calibrate
+    from lightpen.estimation.report import calibration_record
+    from lightpen.formats.hashes import InputFile, Inputs
+    from lightpen.formats.observation_files import Centers
+    from lightpen.model.limits import SwingLimits
+    from lightpen.model.origin import Origin
+    from lightpen.simulator import swings
+
+    camera, pen = swings.paper_camera(), swings.paper_pen()
+    rng = np.random.default_rng(1)
+    poses = swings.swing_poses(60, rng)
+    translations = poses.translations.copy()
+    translations[5] += [0.5, 0, 0]
+    pixels = swings.simulate_centers(
+        *(camera, pen, poses.rotations, translations), 0.02, rng
+    )
+    pixels[3, 2:] = np.nan
+    centers = Centers(np.arange(60) + 1, pixels, Path("centers.csv"))
+    calibration = calibrate(camera, pen, observe_centers(centers, camera, pen))
+    file = InputFile(Path("folder/file.csv"), 64 * "0")
+    inputs = Inputs(file, file, (file,), pen.nominal_tip, origin=Origin.RECORDED)
+    limits = SwingLimits(max_uncertainty=0.05, min_images=12)
+    return calibration_record(calibration, inputs, "joint", limits)
+
+
+@pytest.fixture(scope="session")
 def swung(once: MakeOnce) -> Callable[..., Path]:
     """Return a function that records a swing of small images and leaves it unfinished.
 
     Each record is made once; copy it before you change it.
     """
 
-    def recorded(n_images: int = 20, mask: Sequence[Sequence[float]] = ()) -> Path:
+    def recorded(
+        n_images: int = 20,
+        mask: Sequence[Sequence[float]] = (),
+        *,
+        by_two: bool = False,
+    ) -> Path:
         place = once(
-            f"swung {n_images} {mask}",
-            lambda place: _record_swing(place / "swing", n_images, mask),
+            f"swung {n_images} {mask} {by_two}",
+            lambda place: _record_swing(place / "swing", n_images, mask, by_two=by_two),
         )
         return place / "swing"
 
@@ -339,23 +413,30 @@ def truth() -> Callable[[Path], dict[str, Any]]:
     return read
 
 
-def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) -> None:
+def _record_swing(
+    folder: Path, n_images: int, mask: Sequence[Sequence[float]], *, by_two: bool
+) -> None:
     """Record a guided swing of the simulated pen, seen with a quarter of the pixels."""
+    from dataclasses import replace
+
     import numpy as np
 
     from lightpen.cameras.clock import SkippingClock
+    from lightpen.cameras.protocol import CameraSettings
     from lightpen.detection.sighting import look
     from lightpen.formats.opened_files import CameraFile, PenFile
+    from lightpen.formats.rig_files import read_rig
+    from lightpen.live.sources import Surroundings, cameras_of
     from lightpen.model.limits import SwingLimits
     from lightpen.record.names import Names
-    from lightpen.record.writing import RecordWriter
+    from lightpen.record.writing import OtherView, RecordWriter
     from lightpen.simulator.camera import SimulatedCamera
     from lightpen.simulator.follower import Follower
     from lightpen.simulator.scene_files import write_sample_files
     from lightpen.simulator.scenes import Scene
     from lightpen.simulator.swings import paper_camera
     from lightpen.swing.capture import capture_image
-    from lightpen.swing.preparation import Preparation
+    from lightpen.swing.preparation import Preparation, SecondCamera
     from lightpen.swing.state import (
         start_swing,
     )
@@ -370,23 +451,42 @@ def _record_swing(folder: Path, n_images: int, mask: Sequence[Sequence[float]]) 
         limits=SwingLimits(max_uncertainty=1e-6, min_images=n_images),
     )
     clock = SkippingClock()
-    live = SimulatedCamera(scene, clock)
-    live.open()
-    live.start()
-    live.operator.seat()
-    follower = Follower(live.operator)
+    sources = [preparation.source]
+    if by_two:
+        second = SecondCamera(rig_file=read_rig(files.rig))
+        preparation = replace(preparation, second=second)
+        sources.append(second.source)
+    live = cameras_of(sources, Surroundings(scene, clock))
+    for camera in live:
+        camera.open()
+        if by_two:  # looking at two images a moment takes long
+            camera.configure(CameraSettings(frame_rate=10.0))
+        camera.start()
+    assert isinstance(live[0], SimulatedCamera)
+    live[0].operator.seat()
+    follower = Follower(live[0].operator)
     setup = preparation.swing_setup()
     state = start_swing(setup)
     with RecordWriter.create(folder, preparation.header()) as writer:
         while state.n_kept < n_images:
-            frame = live.read(1.0)
-            sighting = look(frame.image, setup.camera, setup.pen, setup.mask)
+            frames = [camera.read(1.0) for camera in live]
+            sighting, *others = (
+                look(frame.image, aim.camera, aim.pen, aim.mask)
+                for frame, aim in zip(frames, setup.aims, strict=True)
+                if aim.camera is not None and aim.pen is not None
+            )
             state = capture_image(
-                *(setup, state, writer, frame.image, sighting),
-                *(clock.now_ns() * 1e-9, frame.device_ts_ns),
+                *(setup, state, writer, frames[0].image),
+                replace(sighting, others=tuple(others)),
+                *(clock.now_ns() * 1e-9, frames[0].device_ts_ns),
+                others=[
+                    OtherView(frame.image, seen.pixels, frame.device_ts_ns)
+                    for frame, seen in zip(frames[1:], others, strict=True)
+                ],
             ).state
             follower.follow(state)
-    live.close()
+    for camera in live:
+        camera.close()
 
 
 def _refuse_constant(name: str) -> None:

@@ -841,6 +841,7 @@ class WitnessingDesktop:
 
     def __init__(self, trouble: OSError | None = None) -> None:
         self.opened: list[Path | None] = []
+        self.papers: list[tuple[Path, Path | None, str]] = []
         self._trouble = trouble
 
     def show_window(self, swing: Path | None) -> int:
@@ -861,6 +862,13 @@ class WitnessingDesktop:
     def remove_entry(self) -> int:
         raise NotImplementedError
 
+    def data_folder(self) -> Path:
+        raise NotImplementedError
+
+    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+        self.papers.append((result, out, language))
+        return out or Path("named.pdf")
+
 
 def test_what_the_window_cannot_read_is_not_taken_for_output_that_fails() -> None:
     desktop = WitnessingDesktop(FileNotFoundError("a font"))
@@ -877,6 +885,29 @@ def test_a_file_alone_is_opened_in_the_window(tmp_path: Path, words: list[str]) 
 
     assert main([word.format(file) for word in words], desktop) == 0
     assert desktop.opened == [file]
+
+
+def test_a_record_on_paper_is_told_where_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    desktop, result = WitnessingDesktop(), Path("000001.json")
+
+    assert main(["report", "000001.json"], desktop) == 0
+    words = ["report", "000001.json", "--out", "a.pdf", "--language", "zh_CN"]
+    assert main(words, desktop) == 0
+
+    assert desktop.papers == [(result, None, "en"), (result, Path("a.pdf"), "zh_CN")]
+    assert "named.pdf" in capsys.readouterr().out
+
+
+def test_a_result_is_not_replaced_by_its_record_on_paper(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    desktop = WitnessingDesktop()
+
+    assert main(["report", "tip.json", "--out", "./tip.json"], desktop) == 2
+    assert desktop.papers == []
+    assert "would replace the result" in capsys.readouterr().err
 
 
 def test_a_word_that_is_neither_command_nor_file_is_refused(

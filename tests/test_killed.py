@@ -90,7 +90,7 @@ def swing(folder):
     run.happened.connect(say)
     clock = around.clock
     camera = SimulatedCamera(around.scene, clock, Operator(clock, seated=True))
-    workbench.live.open(camera, CameraSettings(), clock)
+    workbench.live.open([camera], CameraSettings(), clock)
     workbench.live.set_following(True)
     offered = find_unfinished(run.records_folder).interrupted
     if offered:

@@ -158,7 +158,7 @@ def test_the_mask_of_the_record_is_in_force(
 ) -> None:
     folder = swung(N_IMAGES, ((612.0, 512.0, 90.0),))
     found = source(open_record(folder))
-    masked = observe_images(found.images, found.camera, found.pen, mask=found.mask)
+    masked = observe_images(found.images, found.camera, found.pen, mask=found.masks[0])
     bare = observe_images(found.images, found.camera, found.pen)
     tip = calibrated(folder)[0]["tip_pen_mm"]
 
@@ -318,13 +318,13 @@ def test_what_a_record_lacks_is_told(lightpen: Run, folder: Path, name: str) -> 
 def test_a_record_of_a_later_version_is_refused(
     lightpen: Run, folder: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    rewrite_header(folder, format=3)
+    rewrite_header(folder, format=4)
     outcome = lightpen("calibrate", folder)
 
     assert outcome.returncode == 2
     assert outcome.stderr.endswith(
-        "header.json was written by a later version of the program (format 3; this "
-        "version reads up to 2). Open the record with that version.\n"
+        "header.json was written by a later version of the program (format 4; this "
+        "version reads up to 3). Open the record with that version.\n"
     )
 
 

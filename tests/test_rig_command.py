@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
 Run = Callable[..., CompletedProcess[str]]
 
@@ -55,6 +56,14 @@ def fields(
     assert outcome.returncode == 0, outcome.stderr
     found: dict[str, Any] = json.loads(file.read_text())
     return found | {"text": outcome.stdout}
+
+
+def test_the_record_of_two_cameras_is_as_the_schema_says(
+    validator: Draft202012Validator, fields: dict[str, Any]
+) -> None:
+    written = {name: entry for name, entry in fields.items() if name != "text"}
+
+    assert [error.message for error in validator.iter_errors(written)] == []
 
 
 def test_two_cameras_find_the_tip_that_was_simulated(

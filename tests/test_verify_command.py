@@ -112,34 +112,40 @@ def test_table_1_is_reproduced_from_led_centres_by_one_command(
     assert (tmp_path / "chart.svg").read_text().startswith("<svg")
 
 
-def test_a_result_that_was_changed_is_refused(
+@pytest.fixture
+def verify_with(
     shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
-) -> None:
-    tip = files[-1]
-    record = read(Path(tip))
-    record["tip_pen_mm"][0] += 0.1
-    changed = tmp_path / "changed.json"
-    changed.write_text(json.dumps(record), encoding="utf-8")
+) -> Callable[[dict[str, Any]], CompletedProcess[str]]:
+    """Return a function that verifies the fixed point with another record."""
 
-    outcome = lightpen(
-        *("verify", "fixed-point", shared_data / "fixed-point", *files[:-1], changed)
-    )
+    def verify(record: dict[str, Any]) -> CompletedProcess[str]:
+        other = tmp_path / "other.json"
+        other.write_text(json.dumps(record), encoding="utf-8")
+        images = shared_data / "fixed-point"
+        return lightpen("verify", "fixed-point", images, *files[:-1], other)
+
+    return verify
+
+
+def test_a_result_that_was_changed_is_refused(
+    verify_with: Callable[[dict[str, Any]], CompletedProcess[str]], tip: Path
+) -> None:
+    record = read(tip)
+    record["tip_pen_mm"][0] += 0.1
+
+    outcome = verify_with(record)
 
     assert outcome.returncode == 2
     assert "is not as it was written" in outcome.stderr
 
 
 def test_a_result_without_a_checksum_is_taken_with_a_word_on_it(
-    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+    verify_with: Callable[[dict[str, Any]], CompletedProcess[str]], tip: Path
 ) -> None:
-    record = read(Path(files[-1]))
+    record = read(tip)
     del record["checksum"]
-    older = tmp_path / "older.json"
-    older.write_text(json.dumps(record), encoding="utf-8")
 
-    outcome = lightpen(
-        *("verify", "fixed-point", shared_data / "fixed-point", *files[:-1], older)
-    )
+    outcome = verify_with(record)
 
     assert outcome.returncode == 0
     assert "kept no checksum" in outcome.stdout

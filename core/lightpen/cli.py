@@ -1,6 +1,7 @@
 """The command line: ``lightpen calibrate | simulate | pivot | pen | verify | ...``.
 
-Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or unreadable input.
+Exit status: 0 done, 1 the data cannot give a tip or the archive was changed, 2 wrong
+usage or unreadable input.
 """
 
 import argparse
@@ -10,26 +11,53 @@ from collections.abc import Collection, Sequence
 from importlib.metadata import version
 from io import TextIOWrapper
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import NoReturn
 
 import cv2
 
-from lightpen.commands.board import add_board
-from lightpen.commands.calibrate import add_calibrate
-from lightpen.commands.check_camera import add_check_camera
+from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
-from lightpen.commands.desktop import Desktop, add_desktop, add_open
-from lightpen.commands.intrinsics import add_extrinsics, add_intrinsics
-from lightpen.commands.pen import add_pen
-from lightpen.commands.pen_health import add_improve_pen
-from lightpen.commands.pivot import add_pivot
-from lightpen.commands.recalculate import add_recalculate
-from lightpen.commands.repeatability import add_repeatability
-from lightpen.commands.simulate import add_simulate
-from lightpen.commands.verify import add_verify
+from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
 from lightpen.errors import CalibrationError, LightpenError
 from lightpen.sentences import Sentence
 
+# Each with what adds its options, which is imported only for what was given.
+COMMANDS = (
+    ("calibrate", "find the tip from a swing", "calibrate:add_calibrate"),
+    ("simulate", "write a simulated swing", "simulate:add_simulate"),
+    ("pivot", "find the tip from given poses", "pivot:add_pivot"),
+    ("pen", "put measured LEDs into the pen frame", "pen:add_pen"),
+    ("verify", "prove a tip by touching", "verify:add_verify"),
+    (
+        "repeatability",
+        "compare calibrations of one tip",
+        "repeatability:add_repeatability",
+    ),
+    (
+        "recalculate",
+        "solve calibrations again, and check U by Monte Carlo",
+        "recalculate:add_recalculate",
+    ),
+    (
+        "improve-pen",
+        "a better LED file by several swings",
+        "pen_health:add_improve_pen",
+    ),
+    ("intrinsics", "calibrate a camera by a board", "intrinsics:add_intrinsics"),
+    (
+        "extrinsics",
+        "find how two cameras stand, by a board",
+        "intrinsics:add_extrinsics",
+    ),
+    ("board", "make a board to be printed", "board:add_board"),
+    (
+        "check-camera",
+        "whether camera and file agree, by a swing",
+        "check_camera:add_check_camera",
+    ),
+    ("export", "write a tip as other programs read it", "export:add_export"),
+)
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # What to type about what the core says, by its codes.
 ADVICE = {
@@ -54,7 +82,7 @@ def main(arguments: Sequence[str] | None = None, desktop: Desktop | None = None)
         Without it a command must be given.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    parser, commands = _parser(desktop)
+    parser, commands = _parser(given, desktop)
     if desktop is not None and _is_file_to_open(given, commands):
         given = ["open", *given]
     # argparse takes "-90." and "-9e1" for options, but not with a blank before them.
@@ -92,49 +120,33 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _parser(
-    desktop: Desktop | None,
+    given: Sequence[str], desktop: Desktop | None
 ) -> tuple[argparse.ArgumentParser, Collection[str]]:
-    """Return the parser, and the names of its commands."""
+    """Return the parser of what was given, and the names of the commands."""
     has_window = desktop is not None
     parser = _Parser(
         prog="lightpen",
         description="Calibrate the probe tip of a light pen."
         + (" Without a command, a window opens and leads through it." * has_window),
-        epilog="Exit status: 0 done, 1 the data cannot give a tip, 2 wrong usage or "
-        "unreadable input.",
+        epilog="Exit status: 0 done, 1 the data cannot give a tip or the archive was "
+        "changed, 2 wrong usage or unreadable input.",
     )
     parser.add_argument("--version", action="version", version=version("lightpen"))
     commands = parser.add_subparsers(required=not has_window, metavar="COMMAND")
     if desktop is not None:
         add_desktop(parser, desktop)
         add_open(commands.add_parser("open", help="show a recorded swing"), desktop)
-    add_calibrate(commands.add_parser("calibrate", help="find the tip from a swing"))
-    add_simulate(commands.add_parser("simulate", help="write a simulated swing"))
-    add_pivot(commands.add_parser("pivot", help="find the tip from given poses"))
-    add_pen(commands.add_parser("pen", help="put measured LEDs into the pen frame"))
-    add_verify(commands.add_parser("verify", help="prove a tip by touching"))
-    add_repeatability(
-        commands.add_parser("repeatability", help="compare calibrations of one tip")
-    )
-    add_recalculate(
-        commands.add_parser(
-            "recalculate", help="solve calibrations again, and check U by Monte Carlo"
+        add_report(
+            commands.add_parser("report", help="write the record on paper, as PDF"),
+            desktop,
         )
-    )
-    add_improve_pen(
-        commands.add_parser("improve-pen", help="a better LED file by several swings")
-    )
-    add_intrinsics(
-        commands.add_parser("intrinsics", help="calibrate a camera by a board")
-    )
-    add_extrinsics(
-        commands.add_parser("extrinsics", help="find how two cameras stand, by a board")
-    )
-    add_board(commands.add_parser("board", help="make a board to be printed"))
-    add_check_camera(
-        commands.add_parser(
-            "check-camera", help="whether camera and file agree, by a swing"
-        )
+    for name, told, function in COMMANDS:
+        command = commands.add_parser(name, help=told)
+        if name in given:
+            resolve_name(f"lightpen.commands.{function}")(command)
+    add_archive(
+        commands.add_parser("archive", help="check, list, send and take up entries"),
+        usual_data_folder if desktop is None else desktop.data_folder,
     )
     return parser, commands.choices
 

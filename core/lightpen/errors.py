@@ -25,6 +25,10 @@ class NameTakenError(FileError):
     """A file that was to be new exists."""
 
 
+class ArchiveError(LightpenError):
+    """The archive cannot be read or written, or is not one of this program."""
+
+
 class UsageError(LightpenError):
     """The request contradicts itself or lacks something."""
 

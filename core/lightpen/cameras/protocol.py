@@ -76,6 +76,8 @@ class Frame:
         Name in the GenICam Pixel Format Naming Convention.
     bits : int
         Full scale is ``2**bits - 1``.
+    others : tuple of Frame
+        Those that the other cameras of a rig took at this moment.
     """
 
     image: Image
@@ -86,6 +88,7 @@ class Frame:
     gain_db: float | None = None
     pixel_format: str = "Mono8"
     bits: int = 8
+    others: tuple["Frame", ...] = ()
 
     @property
     def full_scale(self) -> int:
@@ -119,6 +122,8 @@ class Stats:
         Thrown away by this program because it was too slow.
     timeouts : int
         Waits for an image that ended without one.
+    unpaired : int
+        Thrown away because another camera of the rig took none at that moment.
     """
 
     delivered: int = 0
@@ -126,6 +131,7 @@ class Stats:
     missed: int = 0
     skipped: int = 0
     timeouts: int = 0
+    unpaired: int = 0
 
     def since(self, earlier: "Stats") -> "Stats":
         """Return what has come to pass since an earlier count."""

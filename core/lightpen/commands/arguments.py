@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-from lightpen.formats.pen_files import UNITS
+from lightpen.formats.pen_content import UNITS
 
 
 def whole_number(text: str) -> int:

@@ -24,12 +24,12 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.detection.moments import observe_rig_centers, observe_rig_images
 from lightpen.detection.observations import (
     Observations,
     observe_centers,
     observe_images,
 )
+from lightpen.detection.rig_observations import observe_rig_centers, observe_rig_images
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import Calibration, calibrate, calibrate_rig
 from lightpen.estimation.report import calibration_record
@@ -37,7 +37,7 @@ from lightpen.estimation.second_cone import SecondSwing
 from lightpen.estimation.summary import calibration_text
 from lightpen.estimation.verdict import judge
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
 from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pairing import pair_images
@@ -59,6 +59,7 @@ from lightpen.record.reading import (
     recorded_limits,
     unacknowledged_images,
 )
+from lightpen.record.recomputing import recompute
 from lightpen.record.solving import record_inputs, solve_record
 from lightpen.sentences import Sentence, sentence
 
@@ -83,20 +84,24 @@ class _Calibrated:
     limits: SwingLimits
     origin: Origin | None
     inputs: Callable[[], Inputs]
+    method: str
 
 
 @printing
 def _calibrate(options: argparse.Namespace) -> None:
-    if bool(options.images) == (options.centers is not None):
+    given = (bool(options.images), options.centers, options.from_record)
+    if sum(map(bool, given)) != 1:
         raise UsageError(
             sentence(
                 "cli.images-or-centers",
-                "Give either IMAGES or --centers FILE.csv.",
+                "Give either IMAGES, --centers FILE.csv or --from-record FILE.",
             )
         )
     inputs = (options.camera, options.rig, options.pen, *(options.centers or ()))
-    require_other_file(options.json, *inputs)
-    if len(options.images) == 1 and is_record(Path(options.images[0])):
+    require_other_file(options.json, options.from_record, *inputs)
+    if options.from_record is not None:
+        calibrated = _from_json(options)
+    elif len(options.images) == 1 and is_record(Path(options.images[0])):
         calibrated = _from_record(options)
     elif options.rig is not None:
         calibrated = _from_rig(options)
@@ -105,19 +110,32 @@ def _calibrate(options: argparse.Namespace) -> None:
     calibration = calibrated.calibration
     verdict = judge(calibration, calibrated.limits)
     text = calibration_text(
-        *(calibration, options.method, calibrated.nominal_tip, verdict),
+        *(calibration, calibrated.method, calibrated.nominal_tip, verdict),
         calibrated.origin,
     )
     print(shown(text))
     if options.json is not None:
         record = calibration_record(
-            calibration, calibrated.inputs(), options.method, calibrated.limits
+            calibration, calibrated.inputs(), calibrated.method, calibrated.limits
         )
         write_record(options.json, record)
 
 
-def _from_record(options: argparse.Namespace) -> _Calibrated:
-    folder = Path(options.images[0])
+def _from_json(options: argparse.Namespace) -> _Calibrated:
+    _require_none_given(options, options.from_record)
+    found = recompute(options.from_record)
+    return _Calibrated(
+        found.calibration,
+        found.inputs.nominal_tip,
+        found.limits,
+        found.inputs.origin,
+        lambda: found.inputs,
+        found.method,
+    )
+
+
+def _require_none_given(options: argparse.Namespace, record: Path) -> None:
+    """Refuse what a record brings itself."""
     own = {
         "--camera": options.camera,
         "--rig": options.rig,
@@ -142,10 +160,15 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
                 "cli.record-brings-its-own",
                 "{folder} is the record of a swing, which brings its own. Leave out "
                 "{options}.",
-                folder=str(folder),
+                folder=str(record),
                 options=", ".join(given),
             )
         )
+
+
+def _from_record(options: argparse.Namespace) -> _Calibrated:
+    folder = Path(options.images[0])
+    _require_none_given(options, folder)
     record = open_record(folder)
     require_other_file(options.json, *record_files(record))
     _note_unacknowledged(unacknowledged_images(record))
@@ -157,6 +180,7 @@ def _from_record(options: argparse.Namespace) -> _Calibrated:
         recorded_limits(record),
         solution.source.origin,
         lambda: record_inputs(solution.source),
+        options.method,
     )
 
 
@@ -247,12 +271,15 @@ def _from_observations(options: argparse.Namespace) -> _Calibrated:
         SwingLimits(),
         origin,
         lambda: Inputs(
-            camera=hashed(options.camera),
-            pen=hashed(options.pen),
+            camera=kept(options.camera),
+            pen=kept(options.pen),
             observations=all_hashed(files),
             nominal_tip=pen.nominal_tip,
             origin=origin,
+            units=options.units,
+            led_diameter=options.led_diameter,
         ),
+        options.method,
     )
 
 
@@ -333,6 +360,7 @@ def _from_rig(options: argparse.Namespace) -> _Calibrated:
             rig=RigInputs(hashed(options.rig), all_hashed(rig_file.camera_files)),
             origin=origin,
         ),
+        options.method,
     )
 
 

@@ -36,6 +36,13 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.csv",
         help="LED centres (frame,led,x_px,y_px) in place of IMAGES",
     )
+    parser.add_argument(
+        "--from-record",
+        type=Path,
+        metavar="FILE.json",
+        help="what --json wrote, or an accepted result, in place of IMAGES: the same "
+        "tip from it alone",
+    )
     parser.add_argument("--camera", type=Path, metavar="FILE")
     parser.add_argument(
         "--rig",

@@ -1,13 +1,19 @@
-"""What the command line starts beside its commands: the window and all with it."""
+"""What the command line starts beside its own commands: all that needs Qt."""
 
 import argparse
 from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+from lightpen.commands.console import are_same, printing, shown
+from lightpen.errors import UsageError
+from lightpen.sentences import sentence
+
+LANGUAGES = ("en", "zh_CN")  # of the record on paper
+
 
 class Desktop(Protocol):
-    """Starts what has a window or a place on a desktop; returns an exit status."""
+    """Starts what has a window or a place on a desktop, which gives an exit status."""
 
     def show_window(self, swing: Path | None) -> int:
         """Open the window; with what leads to a recorded swing, show that."""
@@ -23,6 +29,12 @@ class Desktop(Protocol):
 
     def remove_entry(self) -> int:
         """Take it out of the menu again."""
+
+    def data_folder(self) -> Path:
+        """Return where records, results and the archive are, as chosen."""
+
+    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+        """Write the record on paper of a calibration as PDF; return where it is."""
 
 
 def add_desktop(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
@@ -59,6 +71,38 @@ def add_open(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
         metavar="SWING",
         help="the record of a swing, the file swing.lightpen in it, or a result",
     )
+
+
+def add_report(parser: argparse.ArgumentParser, desktop: Desktop) -> None:
+    """Add ``lightpen report``."""
+    parser.set_defaults(run=printing(partial(_report, desktop)))
+    parser.add_argument(
+        "result",
+        type=Path,
+        metavar="RESULT.json",
+        help="an accepted result, or what calibrate --json wrote",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.pdf",
+        help="here, named by pen, tip and date, unless given",
+    )
+    parser.add_argument("--language", choices=LANGUAGES, default=LANGUAGES[0])
+
+
+def _report(desktop: Desktop, options: argparse.Namespace) -> None:
+    if options.out is not None and are_same(options.result, options.out):
+        raise UsageError(
+            sentence(
+                "cli.report-over-result",
+                "{out} would replace the result that it is made from. Give the PDF "
+                "another name.",
+                out=str(options.out),
+            )
+        )
+    path = desktop.write_paper(options.result, options.out, options.language)
+    print(shown(f"The record is in {path}."))
 
 
 def _start(desktop: Desktop, options: argparse.Namespace) -> int:

@@ -28,10 +28,10 @@ from lightpen.formats.files import printable
 from lightpen.formats.hashes import all_hashed
 from lightpen.formats.observation_files import read_centers
 from lightpen.formats.pen_files import read_pen
+from lightpen.model.limits import VerificationLimits
 from lightpen.record.calibrations import read_calibration
 from lightpen.sentences import sentence
 from lightpen.verification.charts import write_chart
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.pen_health import require_one_pen
 from lightpen.verification.records import repeatability_entries, verification_record
 from lightpen.verification.repeatability import TipEstimate, measure_repeatability

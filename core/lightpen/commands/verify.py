@@ -28,12 +28,11 @@ from lightpen.commands.pen_health import add_verify_pen
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import all_hashed, hashed
-from lightpen.formats.images import ImageSource, find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.model.camera import Camera
+from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
-from lightpen.record.reading import is_record, open_record, source
 from lightpen.verification.articulation import (
     N_POSTURES,
     N_TOUCHES,
@@ -44,7 +43,7 @@ from lightpen.verification.circle import measure_circle
 from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
 from lightpen.verification.length import measure_length
-from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.places import TouchPlace, touch_place
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
@@ -98,10 +97,7 @@ def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
 def _add_circle(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_circle)
     _add_runs(parser, "once round the ring")
-    parser.add_argument(
-        "--radius", type=above_zero, required=True, metavar="MM", help="certified"
-    )
-    _add_certified_uncertainty(parser)
+    _add_certified(parser, "--radius")
     parser.add_argument(
         "--ball-diameter",
         type=above_zero,
@@ -115,10 +111,7 @@ def _add_circle(parser: argparse.ArgumentParser) -> None:
 def _add_length(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_length)
     _add_runs(parser, "both ends of the length at one place")
-    parser.add_argument(
-        "--length", type=above_zero, required=True, metavar="MM", help="certified"
-    )
-    _add_certified_uncertainty(parser)
+    _add_certified(parser, "--length")
     _add_common(parser, "length")
 
 
@@ -145,7 +138,10 @@ def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def _add_certified_uncertainty(parser: argparse.ArgumentParser) -> None:
+def _add_certified(parser: argparse.ArgumentParser, option: str) -> None:
+    parser.add_argument(
+        option, type=above_zero, required=True, metavar="MM", help="certified"
+    )
     parser.add_argument(
         "--certified-uncertainty",
         type=not_negative,
@@ -209,19 +205,6 @@ class _Measured:
     @property
     def touches(self) -> list[tuple[str, Sequence[Touch]]]:
         return [(run.name, run.touches) for run in self.runs]
-
-
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """Images, and the files that they bring if they are the record of a swing."""
-
-    name: str
-    images: ImageSource
-    camera: Camera | None = None
-    camera_file: Path | None = None
-    pen: Pen | None = None
-    pen_file: Path | None = None
-    mask: FloatArray | None = None
 
 
 @printing
@@ -303,7 +286,7 @@ def _measure(
 ) -> _Measured:
     require_other_file(options.json, options.camera, options.pen, options.tip)
     calibration = read_calibration(options.tip)
-    found = [_place(each) for each in places]
+    found = [touch_place(each) for each in places]
     camera, camera_file = _camera(options, found[0])
     pen, pen_file = _pen(options, found[0])
     for place in found:
@@ -333,23 +316,7 @@ def _measure(
     )
 
 
-def _place(where: tuple[str, ...]) -> _Place:
-    folder = Path(where[0])
-    if len(where) == 1 and is_record(folder):
-        own = source(open_record(folder))
-        return _Place(
-            name=where[0],
-            images=own.images,
-            camera=own.camera,
-            camera_file=own.camera_file,
-            pen=own.pen,
-            pen_file=own.pen_file,
-            mask=own.mask,
-        )
-    return _Place(where[0], find_images(*where))
-
-
-def _camera(options: argparse.Namespace, place: _Place) -> tuple[Camera, Path]:
+def _camera(options: argparse.Namespace, place: TouchPlace) -> tuple[Camera, Path]:
     if options.camera is not None:
         return read_camera(options.camera), options.camera
     if place.camera is None or place.camera_file is None:
@@ -357,7 +324,7 @@ def _camera(options: argparse.Namespace, place: _Place) -> tuple[Camera, Path]:
     return place.camera, place.camera_file
 
 
-def _pen(options: argparse.Namespace, place: _Place) -> tuple[Pen, Path]:
+def _pen(options: argparse.Namespace, place: TouchPlace) -> tuple[Pen, Path]:
     if options.pen is not None:
         pen = read_pen(options.pen, options.units, options.led_diameter, None)
         return pen, options.pen

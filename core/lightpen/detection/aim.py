@@ -17,8 +17,16 @@ class Aim:
         Intrinsics, if they are known.
     mask : (M, 3) array or None
         Circles of stray light to leave out: centre x, y and radius, px.
+    others : tuple of Aim
+        In the images of the other cameras of a rig.
     """
 
     camera: Camera | None = None
     pen: Pen | None = None
     mask: FloatArray | None = None
+    others: tuple["Aim", ...] = ()
+
+    @property
+    def aims(self) -> tuple["Aim", ...]:
+        """What is looked for in the images of each camera."""
+        return (self, *self.others)

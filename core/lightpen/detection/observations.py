@@ -1,9 +1,7 @@
 """From images to observations: the LED centres of every image, and what was dropped."""
 
 import os
-from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Self
@@ -24,15 +22,13 @@ from lightpen.detection.sighting import (
 )
 from lightpen.detection.spots import Spots, detect_spots
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.decoding import keep_freed_memory
-from lightpen.formats.images import ImageSource
+from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.observation_files import Centers
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
-IN_FLIGHT = 4  # images per thread that may wait in memory
 SEARCH_MEMORY = 250_000_000  # bytes that all threads take
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
@@ -125,12 +121,11 @@ def observe_images(
     CalibrationError
         The images are of the mirror image of the pen.
     """
-    keep_freed_memory()
     searched: list[_Searched] = []
     labelled: list[tuple[_Searched, Sighting]] = []
     n_images = len(source.names)
     search = partial(_search, camera=camera, mask=mask)
-    for image in _in_threads(source, search, n_threads or _most_threads(camera)):
+    for image in look_at_all(source, search, n_threads or _most_threads(camera)):
         searched.append(image)
         n_done = len(labelled) + len(searched)
         if len(searched) == LABELLED_AT_ONCE or n_done == n_images:
@@ -191,22 +186,6 @@ def leave_out(
 def _most_threads(camera: Camera) -> int:
     of_an_image = SEARCH_MEMORY_A_PIXEL * camera.width * camera.height
     return max(min(os.cpu_count() or 1, SEARCH_MEMORY // of_an_image), 1)
-
-
-def _in_threads(
-    source: ImageSource,
-    search: Callable[[Callable[[], Image]], _Searched],
-    n_threads: int,
-) -> Iterator[_Searched]:
-    """Search all images, in order, with a bounded number in memory."""
-    with ThreadPoolExecutor(n_threads) as executor:
-        waiting: deque[Future[_Searched]] = deque()
-        for load in source.open():
-            waiting.append(executor.submit(search, load))
-            if len(waiting) >= IN_FLIGHT * n_threads:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
 
 
 def _search(

@@ -31,6 +31,7 @@ from lightpen.model.rigid import nearest_rotation, rotation_from_vector
 MIN_POSE_LEDS = 4  # three leave up to four poses
 MAX_STEPS = 30
 STEP_TOLERANCE = 1e-8  # of an angle in rad and of a translation over its length
+ROBUST_TOLERANCE = 1e-7  # likewise, of Newton's steps, which leave next to nothing
 ROUGHLY = 1e-4  # likewise; enough to begin to weight LEDs
 MAX_STEP = 0.2  # likewise; keeps an image of wrong LEDs from flying away
 CAUCHY_WIDTH = 4.0  # standard deviations at which a residual counts half
@@ -95,6 +96,8 @@ def fit_poses(
     pixels: FloatArray,
     rotations: FloatArray,
     translations: FloatArray,
+    *,
+    is_near: bool = False,
 ) -> Poses:
     """Fit poses by maximum likelihood on ellipse centres.
 
@@ -108,13 +111,15 @@ def fit_poses(
         needs four LEDs.
     rotations, translations : (N, 3, 3) and (N, 3) array
         Start, cam_from_pen, mm.
+    is_near : bool
+        Whether that is by least squares on most of these LEDs already.
     """
     _require_seen(pixels)
     problem = _Reprojection(camera, pen.leds, pen.normals, pen.diameter / 2, pixels)
-    R, t = _descend(
-        problem, rotations, translations, robust=False, max_steps=3, tolerance=ROUGHLY
-    )
-    R, t = _descend(problem, R, t, robust=True)
+    R, t = rotations, translations
+    if not is_near:
+        R, t = _descend(problem, R, t, robust=False, max_steps=3, tolerance=ROUGHLY)
+    R, t = _descend(problem, R, t, robust=True, tolerance=ROBUST_TOLERANCE)
     return _poses_at(problem, R, t, robust=True)
 
 

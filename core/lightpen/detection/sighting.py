@@ -8,10 +8,14 @@ once.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import ceil, floor
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
+from lightpen.detection.disc_moments import Box
+from lightpen.detection.labelling.constellation import certain_leds
+from lightpen.detection.labelling.hypotheses import MAX_SHIFT
 from lightpen.detection.labelling.labels import (
     Labels,
     LabelStatus,
@@ -24,6 +28,8 @@ from lightpen.detection.spots import Flaw, Spots, detect_spots
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import centers_from_centroids
 from lightpen.model.pen import Pen
+
+ROOM = 3.0  # radii of a disc from its centre to the border of what is read
 
 _REASONS = {  # of sharp spots without a pose
     LabelStatus.LABELLED: Reason.TOO_FEW_LEDS,  # that are whole
@@ -58,6 +64,8 @@ class Sighting:
         All that was found in the image.
     labels : Labels or None
         Which spot is which LED.
+    others : tuple of Sighting
+        In the images that the other cameras of a rig took at this moment.
     """
 
     pixels: FloatArray
@@ -69,6 +77,12 @@ class Sighting:
     sigma: float = float("nan")
     spots: Spots | None = None
     labels: Labels | None = None
+    others: tuple["Sighting", ...] = ()
+
+    @property
+    def rig_pixels(self) -> FloatArray:
+        """Centres by all cameras of a rig, (C, L, 2), px; NaN where it is not seen."""
+        return np.stack([self.pixels, *(other.pixels for other in self.others)])
 
     @property
     def has_pose(self) -> bool:
@@ -117,6 +131,8 @@ def look(
     mask: FloatArray | None = None,
     before: Sighting | None = None,
     full_scale: int | None = None,
+    *,
+    is_followed: bool = False,
 ) -> Sighting:
     """Find the pen in an image, and its pose by maximum likelihood.
 
@@ -132,13 +148,26 @@ def look(
         are not, the image is looked at on its own.
     full_scale : int, optional
         Brightest value a pixel can have; see `lightpen.detection.spots.detect_spots`.
+    is_followed : bool
+        Whether the pen is all that is asked for: where its LEDs are about where they
+        were ``before``, the rest of the image is not read.
     """
     if not camera.fits(image):
         return unseen(pen, Reason.WRONG_SIZE)
     try:
+        if is_followed and before is not None and before.has_pose:
+            window = _window(camera, pen, before)
+            spots = detect_spots(image, mask, full_scale=full_scale, window=window)
+            labels = track_spots(
+                spots, camera, pen, before.rotation, before.translation
+            )
+            if np.count_nonzero(labels.whole) >= certain_leds(pen):
+                sighting = sightings_of([spots], [labels], camera)[0]
+                return _fitted(sighting, camera, pen, is_near=True)
         spots = detect_spots(image, mask, full_scale=full_scale)
         labels = _label(spots, camera, pen, before)
-        return _fitted(sightings_of([spots], [labels], camera)[0], camera, pen)
+        sighting = sightings_of([spots], [labels], camera)[0]
+        return _fitted(sighting, camera, pen, is_near=True)
     except MISHAPS:
         return unseen(pen, Reason.UNHANDLED)
 
@@ -212,13 +241,25 @@ def sight_centers(
     translation: FloatArray,
 ) -> Sighting:
     """Return the sighting of labelled centres (L, 2), px, from a rough pose, mm."""
-    return _fitted(sighting_of_centers(pixels, rotation, translation), camera, pen)
+    sighting = sighting_of_centers(pixels, rotation, translation)
+    return _fitted(sighting, camera, pen, is_near=False)
 
 
 def unseen(pen: Pen, reason: Reason) -> Sighting:
     """Return the sighting of an image that is not looked at, and why."""
     nothing = np.full((pen.n_leds, 2), np.nan)
     return Sighting(nothing, nothing, reason)
+
+
+def _window(camera: Camera, pen: Pen, before: Sighting) -> Box:
+    """Return where in the image the LEDs are that hardly moved, with room round."""
+    leds = pen.leds @ before.rotation.T + before.translation
+    radius = camera.fx * pen.diameter / 2 / float(leds[:, 2].min())
+    room = ceil(MAX_SHIFT + ROOM * radius)
+    pixels = camera.project(leds)
+    (left, top), (right, bottom) = pixels.min(axis=0), pixels.max(axis=0)
+    around = Box(floor(left), floor(top), ceil(right), ceil(bottom))
+    return around.grown(room, (camera.height, camera.width))
 
 
 def _label(spots: Spots, camera: Camera, pen: Pen, before: Sighting | None) -> Labels:
@@ -243,7 +284,7 @@ def _n_seen(pixels: FloatArray) -> int:
     return int(np.isfinite(pixels[:, 0]).sum())
 
 
-def _fitted(sighting: Sighting, camera: Camera, pen: Pen) -> Sighting:
+def _fitted(sighting: Sighting, camera: Camera, pen: Pen, *, is_near: bool) -> Sighting:
     """Return a sighting with its pose, if it has one, fitted to the LEDs."""
     if not sighting.has_pose:
         return sighting
@@ -253,6 +294,7 @@ def _fitted(sighting: Sighting, camera: Camera, pen: Pen) -> Sighting:
         sighting.pixels[None],
         sighting.rotation[None],
         sighting.translation[None],
+        is_near=is_near,
     )
     return replace(
         sighting,

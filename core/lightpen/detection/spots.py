@@ -147,7 +147,11 @@ def have_moved(before: Spots, now: Spots) -> bool:
 
 
 def detect_spots(
-    image: Image, mask: FloatArray | None = None, *, full_scale: int | None = None
+    image: Image,
+    mask: FloatArray | None = None,
+    *,
+    full_scale: int | None = None,
+    window: Box | None = None,
 ) -> Spots:
     """Find the bright discs of an image.
 
@@ -165,6 +169,8 @@ def detect_spots(
     full_scale : int, optional
         Brightest value a pixel can have. Taken as 255, 4095 or 65535 if not given, by
         the type of the image and its brightest pixel.
+    window : Box, optional
+        All of the image that is read; what reaches out of it is cut.
 
     Returns
     -------
@@ -184,6 +190,19 @@ def detect_spots(
     if min(image.shape) < MIN_SIZE:
         return _as_spots([], 1.0, MIN_NOISE)
     stride = 4 if min(image.shape) >= 1024 else 2 if min(image.shape) >= 512 else 1
+    if window is not None:
+        corner = np.array([window.left, window.top])
+        seen = image[window.top : window.bottom, window.left : window.right]
+        if mask is not None:
+            mask = np.asarray(mask) - np.append(corner, 0)
+        spots = _spots_of(seen, mask, stride, full_scale)
+        return replace(spots, centers=spots.centers + corner)
+    return _spots_of(image, mask, stride, full_scale)
+
+
+def _spots_of(
+    image: Image, mask: FloatArray | None, stride: int, full_scale: int | None
+) -> Spots:
     budget = iter(range(MAX_REGIONS))
     scene = _survey(image, mask, stride)
     discs = _find_discs(scene, budget)
@@ -231,7 +250,8 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
     background = int(values[int(BACKGROUND_QUANTILE * values.size)])
 
     beside: MatLike = np.ascontiguousarray(image[:: step * stride, 1 :: step * stride])
-    differences = np.sort(cv2.absdiff(few[:, : beside.shape[1]], beside), axis=None)
+    n = min(few.shape[1], beside.shape[1])
+    differences = np.sort(cv2.absdiff(few[:, :n], beside[:, :n]), axis=None)
     difference = int(differences[int(NOISE_QUANTILE * differences.size)])
     noise = max(difference / NOISE_OF_DIFFERENCE, MIN_NOISE)
 

@@ -19,7 +19,7 @@ from lightpen.model.rig import Rig
 from lightpen.sentences import Sentence, sentence
 
 LIMIT = 3.0  # standard deviations
-VAGUE = 0.2  # of the diameter, U (k = 2): centres alone may want it to be negative
+VAGUE = 0.2  # of a value, U (k = 2): centres alone may want a negative diameter
 RELEASED = 10.0  # times the deviation: what a contradicted prior still says
 
 FOCAL_LENGTH = sentence("file.focal-length", "focal length")
@@ -189,17 +189,19 @@ def find_pen_contradictions(
         Without what was contradicted.
     """
     at, one = bundle.columns, np.ones(1)
-    discs, diameter = _denied(
-        [_Entry(DIAMETER, "mm", pen.diameter, one, one)],
-        *(bundle, at.diameter, priors.diameter),
+
+    def denied(
+        entry: _Entry, place: slice, stated: Prior
+    ) -> tuple[list[Contradiction], Prior]:
+        found, freed = _denied([entry], bundle, place, stated)
+        if any(each.wanted_uncertainty > VAGUE * each.stated for each in found):
+            return [], stated
+        return found, freed
+
+    discs, diameter = denied(
+        _Entry(DIAMETER, "mm", pen.diameter, one, one), at.diameter, priors.diameter
     )
-    if any(each.wanted_uncertainty > VAGUE * pen.diameter for each in discs):
-        discs, diameter = [], priors.diameter
-    size, scale = _denied(
-        [_Entry(SCALE, "", 1.0, one, one)], bundle, at.scale, priors.scale
-    )
-    if any(each.wanted_uncertainty > VAGUE for each in size):
-        size, scale = [], priors.scale
+    size, scale = denied(_Entry(SCALE, "", 1.0, one, one), at.scale, priors.scale)
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)
 

@@ -34,6 +34,13 @@ class DiameterReading:
     sigma: float
 
 
+def modelled_areas(state: BundleState, c: int) -> FloatArray:
+    """Return the areas of the discs' images in a camera of the rig, (N, L), px^2."""
+    _, leds, normals = state.leds_in(c)
+    images = disc_images(state.rig.cameras[c], leds, normals, state.pen.diameter / 2)
+    return np.asarray(4 * np.pi * np.sqrt(np.linalg.det(images.shapes)))
+
+
 def read_diameter(
     state: BundleState, areas: FloatArray, edge_widths: FloatArray
 ) -> DiameterReading | None:
@@ -54,11 +61,7 @@ def read_diameter(
         None where too few areas are known.
     """
     rig, pen = state.rig, state.pen
-    modelled = np.empty_like(areas)
-    for c, camera in enumerate(rig.cameras):
-        _, leds, normals = state.leds_in(c)
-        images = disc_images(camera, leds, normals, pen.diameter / 2)
-        modelled[:, c] = 4 * np.pi * np.sqrt(np.linalg.det(images.shapes))
+    modelled = np.stack([modelled_areas(state, c) for c in range(rig.n_cameras)], 1)
     known = np.isfinite(areas) & np.isfinite(edge_widths)[..., None]
     if known.sum() < MIN_READINGS:
         return None

@@ -156,13 +156,15 @@ def fit_contact(
     """Fit tip and cone to what the cameras of a rig see; see `fit_joint`."""
     state = model.at(rotations, tip_pen, cone_rig)
     if not is_near:
-        state = _descend(model, state, None, SETTLED)
+        state, _ = _descend(model, state, None, SETTLED)
     for _ in range(MAX_GATINGS):
         used = gate(state.residuals)
-        state = _descend(model, state, used, CONVERGED)
+        state, reduced = _descend(model, state, used, CONVERGED)
         if np.array_equal(gate(state.residuals), used):
             break
-    return _fit_from(state, used)
+    if is_near:  # the last step was too small for what it leaves to matter
+        return _fit_from(state, used, reduced)
+    return joint_at(model, state.rotations, state.tip_pen, state.cone_cam, used)
 
 
 def joint_at(
@@ -181,7 +183,8 @@ def joint_at(
     used : (N, C L) array of bool
         LEDs that count.
     """
-    return _fit_from(model.at(rotations, tip_pen, cone_rig), used)
+    state = model.at(rotations, tip_pen, cone_rig)
+    return _fit_from(state, used, reduce(state, used.astype(float)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +197,9 @@ class Linearised:
         The state.
     residuals : (N, C L, 2) array
         Observed minus modelled, px.
-    jacobian : (N, C L, 2, 9) array
-        d pixel by the image's rotation vector (left), tip and cone; rad, mm.
+    jacobian : (N, C L, 2, 6) array
+        d pixel by the image's rotation vector (left) and the cone; rad, mm. The tip
+        moves the images as the cone does, turned: `by_tip_and_cone`.
     """
 
     rotations: FloatArray
@@ -203,6 +207,14 @@ class Linearised:
     cone_cam: FloatArray
     residuals: FloatArray
     jacobian: FloatArray
+
+    @property
+    def by_tip_and_cone(self) -> FloatArray:
+        """How far a step of (tip, cone) moves the tip in each image, (N, 3, 6)."""
+        moves = np.empty((len(self.rotations), 3, 6))
+        moves[..., :3] = -self.rotations
+        moves[..., 3:] = np.eye(3)
+        return moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,13 +240,13 @@ class ContactModel:
         self, R: FloatArray, tip_pen: FloatArray, cone_rig: FloatArray
     ) -> Linearised:
         """Return the model around rotations (N, 3, 3), tip (3,) and cone (3,)."""
-        views = [self._view(c, R, tip_pen, cone_rig) for c in range(self.rig.n_cameras)]
-        residuals, J = (
-            np.concatenate(parts, axis=1) for parts in zip(*views, strict=True)
-        )
-        by_tip = -J[..., 3:] @ R[:, None]
-        jacobian = np.concatenate([J[..., :3], by_tip, J[..., 3:]], axis=3)
-        return Linearised(R, tip_pen, cone_rig, residuals, jacobian)
+        residuals, J = self._view(0, R, tip_pen, cone_rig)
+        if self.rig.n_cameras > 1:
+            others = range(1, self.rig.n_cameras)
+            views = [self._view(c, R, tip_pen, cone_rig) for c in others]
+            residuals = np.concatenate([residuals, *(r for r, _ in views)], axis=1)
+            J = np.concatenate([J, *(by for _, by in views)], axis=1)
+        return Linearised(R, tip_pen, cone_rig, residuals, J)
 
     def _view(
         self, c: int, R: FloatArray, tip_pen: FloatArray, cone_rig: FloatArray
@@ -280,13 +292,15 @@ def reduce(state: Linearised, weights: FloatArray) -> _Reduced:
     solved = np.linalg.solve(
         H_turn, np.concatenate([H[:, :3, 3:], g[:, :3, None]], axis=2)
     )
-    coupling, turn = solved[..., :6], solved[..., 6]
+    coupling, turn = solved[..., :3], solved[..., 3:]
     back = H[:, 3:, :3]
+    moves = state.by_tip_and_cone
+    transposed = np.swapaxes(moves, 1, 2)
     return _Reduced(
-        S=H[:, 3:, 3:] - back @ coupling,
-        b=g[:, 3:] - np.einsum("nij,nj->ni", back, turn),
-        turn=turn,
-        turn_by_step=-coupling,
+        S=transposed @ (H[:, 3:, 3:] - back @ coupling) @ moves,
+        b=(transposed @ (g[:, 3:, None] - back @ turn))[..., 0],
+        turn=turn[..., 0],
+        turn_by_step=-coupling @ moves,
     )
 
 
@@ -298,8 +312,12 @@ def symmetric_inverse(matrix: FloatArray) -> FloatArray:
 
 def _descend(
     model: ContactModel, state: Linearised, used: BoolArray | None, tolerance: float
-) -> Linearised:
-    """Iterate until tip and cone move less than ``tolerance``; Cauchy without used."""
+) -> tuple[Linearised, _Reduced]:
+    """Iterate until tip and cone move by less than ``tolerance``, mm.
+
+    Weighed by the Cauchy loss without ``used``. The last step is so small that model
+    and equations are taken along it as they are.
+    """
     for _ in range(MAX_STEPS):
         weights = (
             cauchy_weights(state.residuals, robust_sigma(state.residuals, 3))
@@ -309,13 +327,14 @@ def _descend(
         reduced = reduce(state, weights)
         step = reduced.step()
         turns = reduced.turn + reduced.turn_by_step @ step
-        state = model.at(
-            rotation_from_vector(turns) @ state.rotations,
-            state.tip_pen + step[:3],
-            state.cone_cam + step[3:],
-        )
+        rotations = rotation_from_vector(turns) @ state.rotations
+        tip_pen, cone_cam = state.tip_pen + step[:3], state.cone_cam + step[3:]
         if np.abs(step).max() < tolerance:
-            return state
+            J, moves = state.jacobian, state.by_tip_and_cone @ step
+            change = J @ np.concatenate([turns, moves], axis=1)[:, None, :, None]
+            residuals = state.residuals - change[..., 0]
+            return Linearised(rotations, tip_pen, cone_cam, residuals, J), reduced
+        state = model.at(rotations, tip_pen, cone_cam)
     raise CalibrationError(
         sentence(
             "joint.not-settled",
@@ -337,11 +356,10 @@ def gate(residuals: FloatArray) -> BoolArray:
     return np.asarray(within & enough)
 
 
-def _fit_from(state: Linearised, used: BoolArray) -> JointFit:
+def _fit_from(state: Linearised, used: BoolArray, reduced: _Reduced) -> JointFit:
     squares = np.einsum("nli,nli->nl", state.residuals, state.residuals)
     n_free = 2 * int(used.sum()) - 3 * int(used.any(axis=1).sum()) - 6
     sigma = max(float(np.sqrt(squares[used].sum() / max(n_free, 1))), NOISE_FLOOR)
-    reduced = reduce(state, used.astype(float))
     return JointFit(
         tip_pen=state.tip_pen,
         cone_cam=state.cone_cam,

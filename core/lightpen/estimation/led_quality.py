@@ -89,7 +89,7 @@ def _displacements(
     seen = np.isfinite(pixels[..., 0]).reshape(-1, pen.n_leds)
     used = joint.used.reshape(seen.shape)
     residuals = state.residuals.reshape(*seen.shape, 2)
-    by_led = state.jacobian[..., 6:9] @ joint.rotations[:, None]
+    by_led = state.jacobian[..., 3:] @ joint.rotations[:, None]
     by_led = by_led.reshape(*seen.shape, 2, 3)
     displacement = np.full((pen.n_leds, 3), np.nan)
     sigma = np.full(pen.n_leds, np.nan)

@@ -1,10 +1,11 @@
 """The uncertainty of a tip by Monte Carlo [1]_, to check what is linear in the budget.
 
 The estimate is taken for the truth. Each trial draws files of camera and pen about it,
-by what the files state of themselves or what is assumed in its place, and noise in the
-images; then it calibrates anew, as a user would who has no more than these files. The
-scatter of the tips is their uncertainty, whatever is not linear in between. What no
-file states, as the form of ball and cone, is not drawn, nor compared.
+by what the files state of themselves or what is assumed in its place, a seat and a
+drift as U counts them, centres that are off in each posture, the areas of the discs,
+and noise in the images; then it calibrates anew, as a user would who has no more than
+these files. The scatter of the tips is their uncertainty, whatever is not linear in
+between.
 
 References
 ----------
@@ -22,22 +23,27 @@ from lightpen.detection.observations import Observations
 from lightpen.detection.reasons import Reason
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.joint import ContactModel
+from lightpen.estimation.disc_diameter import modelled_areas
+from lightpen.estimation.linearised import N_CONE, BundleState
 from lightpen.estimation.priors import Priors
-from lightpen.estimation.uncertainty import ShareName
-from lightpen.estimation.unknowns import led_basis
+from lightpen.estimation.uncertainty import (
+    POSTURES,
+    ShareName,
+    counted_drift,
+    counted_seat,
+)
+from lightpen.estimation.unknowns import FORMS, NONE
 from lightpen.estimation.workers import Map
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
+from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.pen import Pen
+from lightpen.model.rig import rig_of
 from lightpen.sentences import sentence
 
 MIN_TRIALS = 20  # fewer tell a standard deviation to worse than a sixth
 COVERED = 0.95
-DRAWN = {
-    *(ShareName.NOISE, ShareName.LEDS, ShareName.SCALE, ShareName.TEMPERATURE),
-    *(ShareName.DIAMETER, ShareName.CAMERA),
-}
+OF_OTHERS = {ShareName.DISTANCE, ShareName.EXTRINSICS}  # cones, or cameras; not drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +60,16 @@ class Trials:
         LEDs that the images show.
     sigma : float
         Noise of one image coordinate, px.
-    led_sigma : float
-        Of one LED coordinate of a file, mm.
+    led_covariance : (3 L, 3 L) array
+        Of all LED coordinates of a file, mm^2.
+    forms : (N, m) array
+        In which the seat may follow the lean, and the cone drift.
+    form_covariances : (m, 3, 3) array
+        Of the move of the cone in each, mm^2.
+    jitter : (3, 3) array
+        Covariance of the seat from image to image, mm^2.
+    edge_widths : (N,) array
+        Of the rims, px; NaN where no areas are known.
     seed : int
     """
 
@@ -66,7 +80,11 @@ class Trials:
     rotations: FloatArray
     seen: BoolArray
     sigma: float
-    led_sigma: float
+    led_covariance: FloatArray
+    forms: FloatArray
+    form_covariances: FloatArray
+    jitter: FloatArray
+    edge_widths: FloatArray
     priors: Priors
     assumptions: Assumptions
     seed: int
@@ -81,7 +99,7 @@ class MonteCarlo:
     errors : (M, 3) array
         Of the tip in each trial that could be solved, mm.
     linear : (3,) array
-        Standard uncertainty by the shares of the budget that are drawn, mm.
+        Standard uncertainty by the budget, mm.
     n_failed : int
         Trials that gave no tip.
     """
@@ -115,15 +133,37 @@ class MonteCarlo:
 def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
     """Return what the trials of a calibration draw from."""
     instrument, joint = calibration.instrument, calibration.joint
+    bundle, pen = calibration.bundle, calibration.instrument.pen
+    n_images = len(joint.rotations)
+    basis, jitter = bundle.unknowns.basis, bundle.components.jitter
+    leds = bundle.components.leds
+    led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
+    if pen.led_covariance is not None and leds is NONE:
+        led_covariance = pen.led_covariance
+    moves = [
+        np.broadcast_to(seat.variance * seat.axes, (n_forms, N_CONE, N_CONE))
+        for n_forms, seat in zip(FORMS, counted_seat(bundle), strict=True)
+    ]
+    n_drifts = (bundle.columns.drift.stop - bundle.columns.drift.start) // N_CONE
+    moves.append(np.tile(counted_drift(bundle) * np.eye(N_CONE), (n_drifts, 1, 1)))
+    form_covariances = np.concatenate(moves)
     return Trials(
         camera=instrument.camera,
-        pen=instrument.pen,
+        pen=pen,
         tip_pen=joint.tip_pen,
         cone_cam=joint.cone_cam,
         rotations=joint.rotations,
         seen=joint.used,
         sigma=joint.sigma * float(np.sqrt(calibration.budget.correlation_factor)),
-        led_sigma=max(calibration.led_sigma, instrument.pen.led_sigma or 0.0),
+        led_covariance=led_covariance,
+        forms=bundle.unknowns.forms[:n_images, : len(form_covariances)],
+        form_covariances=form_covariances,
+        jitter=(
+            jitter.expected**2 * np.eye(N_CONE)
+            if jitter.covariance is None
+            else jitter.covariance
+        ),
+        edge_widths=_edge_widths(calibration, n_images),
         priors=calibration.priors,
         assumptions=calibration.assumptions,
         seed=seed,
@@ -171,7 +211,7 @@ def run_monte_carlo(
             sum(
                 share.standard_uncertainty**2
                 for share in calibration.budget.shares
-                if share.name in DRAWN
+                if share.name not in OF_OTHERS
             )
         ),
         n_failed=n_trials - len(errors),
@@ -181,22 +221,66 @@ def run_monte_carlo(
 def run_trial(trials: Trials, number: int) -> FloatArray | None:
     """Return the error of the tip in one trial, (3,), mm; None where it has none."""
     rng = np.random.default_rng([trials.seed, number])
-    model = ContactModel.of(
-        trials.camera, trials.pen, np.zeros((*trials.seen.shape, 2))
+    levers = (trials.pen.leds - trials.tip_pen) @ np.swapaxes(trials.rotations, 1, 2)
+    exact = ellipse_centers(
+        trials.camera,
+        levers + (trials.cone_cam + _drawn_moves(trials, rng))[:, None],
+        trials.pen.normals @ np.swapaxes(trials.rotations, 1, 2),
+        trials.pen.diameter / 2,
     )
-    # Residuals of images at 0 are the centres with the sign turned.
-    exact = -model.at(trials.rotations, trials.tip_pen, trials.cone_cam).residuals
-    noise = trials.sigma * rng.standard_normal(exact.shape)
-    pixels = np.where(trials.seen[..., None], exact + noise, np.nan)
-    camera, pen = _drawn_camera(trials, rng), _drawn_pen(trials, rng)
+    errors = trials.sigma * rng.standard_normal(exact.shape) + _biases(trials, rng)
+    pixels = np.where(trials.seen[..., None], exact + errors, np.nan)
+    areas = _drawn_areas(trials, rng)
+    off = _drawn(trials.priors.cameras[0].covariance, rng)
+    camera = trials.camera.with_intrinsics(trials.camera.intrinsics + off)
+    pen = _drawn_pen(trials, rng)
     try:
-        found = calibrate(camera, pen, _observed(trials, pixels), trials.assumptions)
+        seen = _observed(trials, pixels, areas)
+        found = calibrate(camera, pen, seen, trials.assumptions)
     except CalibrationError:
         return None
     return found.joint.tip_pen - trials.tip_pen
 
 
-def _observed(trials: Trials, pixels: FloatArray) -> Observations:
+def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
+    """Return the widths of the rims of the images that the joint fit holds, px."""
+    if calibration.priors.reading is None:
+        return np.full(n_images, np.nan)
+    return np.full(n_images, np.nanmedian(calibration.observations.edge_widths))
+
+
+def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
+    """Return where the tip sits in the cone in each image, (N, 3), mm."""
+    by_form = np.array([_drawn(each, rng) for each in trials.form_covariances])
+    values, vectors = np.linalg.eigh(trials.jitter)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    shaken = rng.standard_normal((len(trials.forms), N_CONE)) @ root.T
+    return np.asarray(trials.forms @ by_form + shaken)
+
+
+def _biases(trials: Trials, rng: np.random.Generator) -> FloatArray:
+    """Return what centres are off by, the same in images of like posture, px."""
+    some = np.linspace(0, len(trials.rotations) - 1, POSTURES).round().astype(int)
+    alike = np.einsum("nij,mij->nm", trials.rotations, trials.rotations[some])
+    n_leds = trials.pen.n_leds
+    of_posture = rng.standard_normal((POSTURES, n_leds, 2))
+    return np.asarray(trials.priors.center_bias * of_posture[alike.argmax(axis=1)])
+
+
+def _drawn_areas(trials: Trials, rng: np.random.Generator) -> FloatArray:
+    """Return the areas of the discs, all off alike, (N, L), px^2; NaN if not known."""
+    reading = trials.priors.reading
+    if reading is None:
+        return np.full(trials.seen.shape, np.nan)
+    state = BundleState(
+        *(rig_of(trials.camera), trials.pen, trials.tip_pen, trials.cone_cam),
+        trials.rotations,
+    )
+    wider = 1 + reading.sigma / trials.pen.diameter * rng.standard_normal()
+    return np.where(trials.seen, wider**2 * modelled_areas(state, 0), np.nan)
+
+
+def _observed(trials: Trials, pixels: FloatArray, areas: FloatArray) -> Observations:
     n_images = len(pixels)
     shifts = trials.rotations @ trials.tip_pen
     return Observations(
@@ -205,28 +289,17 @@ def _observed(trials: Trials, pixels: FloatArray) -> Observations:
         seen_pixels=pixels,
         rotations=trials.rotations,
         translations=trials.cone_cam - shifts,
-        areas=np.full(pixels.shape[:2], np.nan),
-        edge_widths=np.full(n_images, np.nan),
+        areas=areas,
+        edge_widths=trials.edge_widths,
         lamps=np.zeros((n_images, 0, 2)),
         reasons=(Reason.NONE,) * n_images,
         details=(None,) * n_images,
     )
 
 
-def _drawn_camera(trials: Trials, rng: np.random.Generator) -> Camera:
-    camera = trials.camera
-    errors = _drawn(trials.priors.cameras[0].covariance, rng)
-    fx, fy, cx, cy, *distortion = (camera.intrinsics + errors).tolist()
-    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=np.array(distortion))
-
-
 def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
     pen, priors = trials.pen, trials.priors
-    if pen.led_covariance is None:
-        basis = led_basis(pen.leds)
-        moves = basis @ (trials.led_sigma * rng.standard_normal(basis.shape[1]))
-    else:
-        moves = _drawn(pen.led_covariance, rng)
+    moves = _drawn(trials.led_covariance, rng)
     middle = pen.leds.mean(axis=0)
     scale = 1 + float(_drawn(priors.size_covariance, rng)[0])
     leds = middle + scale * (pen.leds - middle) + moves.reshape(-1, 3)

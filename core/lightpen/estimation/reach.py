@@ -11,8 +11,10 @@ left to the verdict.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
+from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.adjustment import held_to_files
@@ -43,9 +45,10 @@ from lightpen.estimation.unknowns import (
     lean_forms,
 )
 from lightpen.model.assumptions import Assumptions
-from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rig import Rig
+
+T = TypeVar("T", bound=np.generic)
 
 GROWTH = 1.25  # of the number of images, after which all are counted anew
 ENDLESS = 100.0  # times the images, more than anyone takes
@@ -123,7 +126,7 @@ class Reach:
 
 
 def reach_of(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     pixels: FloatArray,
     joint: JointFit,
@@ -133,17 +136,15 @@ def reach_of(
 
     Parameters
     ----------
-    pixels : (N, L, 2) array
-        px; NaN where an LED was not seen.
+    pixels : (N, C, L, 2) array
+        Of each camera, px; NaN where an LED was not seen.
     joint : JointFit
         The fit to them.
     before : Reach or None
         Of the first of these images.
     """
     n_images = len(pixels)
-    state = BundleState(
-        rig_of(camera), pen, joint.tip_pen, joint.cone_cam, joint.rotations
-    )
+    state = BundleState(rig, pen, joint.tip_pen, joint.cone_cam, joint.rotations)
     if before is None or n_images > GROWTH * before.n_whole:
         return Reach(state, _counted(state, pixels, joint, 0), n_images)
     n_before = len(before.state.rotations)
@@ -159,8 +160,14 @@ def _counted(
     state: BundleState, pixels: FloatArray, joint: JointFit, first: int
 ) -> NormalEquations:
     state = replace(state, rotations=state.rotations[first:])
-    views = views_at(state, pixels[first:, None])
-    return eliminate(views, joint.used[first:, None], 1.0)
+    n_cameras = state.rig.n_cameras
+    views = views_at(state, pixels[first:])
+    return eliminate(views, _by_camera(joint.used[first:], n_cameras), 1.0)
+
+
+def _by_camera(values: npt.NDArray[T], n_cameras: int) -> npt.NDArray[T]:
+    """Return what is of C cameras' LEDs one after the other, (N, C L, ...), apart."""
+    return values.reshape(len(values), n_cameras, -1, *values.shape[2:])
 
 
 def _moved(
@@ -207,19 +214,21 @@ def _linear_bundle(
     components = unknowns.found(information, right, NO_COMPONENTS)
     prior = unknowns.prior_information(components)
     covariance = inverse(information + prior)
-    jitter = jitter_of(unknowns, equations, seen, covariance @ right, covariance)
+    spread = unknowns.sensitivity(equations.cone_rows)
+    change = covariance @ right
+    jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)
     components = components._replace(jitter=jitter)
+    n_cameras = unknowns.start.rig.n_cameras
     of_jitter = np.zeros_like(information)
     doubted = np.zeros_like(information)
     if jitter.covariance is None:
-        rows = unknowns.sensitivity(equations.cone_rows)
-        rows = jitter.expected * rows.reshape(-1, rows.shape[-1])
+        rows = jitter.expected * spread.reshape(-1, spread.shape[-1])
         doubted = rows.T @ rows
     else:
         known = np.linalg.inv(jitter.covariance)
         own = equations.cone_rows[..., :N_CONE]
         gain = np.linalg.inv(own + known)
-        seat = gain @ unknowns.sensitivity(equations.cone_rows)
+        seat = gain @ spread
         of_jitter = np.einsum("nip,ij,njq->pq", seat, known, seat, optimize=True)
         equations = _with_jitter(equations, gain)
         information, right = unknowns.system(equations)
@@ -231,8 +240,8 @@ def _linear_bundle(
         state=unknowns.start,
         values=covariance @ right,
         components=components,
-        residuals=joint.residuals[:, None],
-        used=joint.used[:, None],
+        residuals=_by_camera(joint.residuals, n_cameras),
+        used=_by_camera(joint.used, n_cameras),
         sigma=sigma,
         information=information,
         prior_information=prior,

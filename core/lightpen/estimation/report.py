@@ -1,6 +1,7 @@
 """A calibration as a JSON record."""
 
 import json
+from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -137,6 +138,8 @@ def calibration_record(
             "camera": _input(inputs.camera),
             "pen": _input(inputs.pen),
             "observations": [_input(file) for file in inputs.observations],
+            "units": inputs.units,
+            "led_diameter_mm": inputs.led_diameter,
             **_rig_inputs(inputs),
         },
         "frames": _frames(calibration),
@@ -310,7 +313,10 @@ def _program() -> dict[str, str]:
 
 
 def _input(file: InputFile) -> dict[str, str]:
-    return {"file": file.path.name, "sha256": file.sha256}
+    named = {"file": file.path.name, "sha256": file.sha256}
+    if file.content is not None:
+        named["base64"] = b64encode(file.content).decode()
+    return named
 
 
 def _rig_inputs(inputs: Inputs) -> dict[str, Any]:
@@ -487,6 +493,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
     for c, images in enumerate(calibration.cameras):
         observations = images.observations
         seen = np.isfinite(observations.seen_pixels[..., 0]).tolist()
+        fit = np.isfinite(observations.pixels[..., 0]).tolist()
         pixels = observations.seen_pixels.tolist()
         leds_used = images.leds_used.tolist()
         rms = images.rms.tolist()
@@ -507,6 +514,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                         "x_px": x,
                         "y_px": y,
                         "area_px2": observations.areas[i, j],
+                        "fit": fit[i][j],
                         "used": leds_used[i][j],
                     }
                     for j, (x, y) in enumerate(pixels[i])

@@ -99,7 +99,8 @@ class Budget:
         From the scatter between blocks of consecutive images, all but tip and cone
         held, mm^2; None with too few images.
     block_ratio : float
-        Variance between blocks over that of independent noise, 1 on average.
+        Variance between blocks over that of independent noise, and of a jitter of the
+        seat where there is one; 1 on average.
     autocorrelation : float
         Of the errors of one coordinate from one image to the next; 0 where not
         significant.
@@ -168,7 +169,7 @@ class Halves:
 def combine(adjustment: Adjustment, joint: JointFit) -> Budget:
     """Combine the parts of the tip's uncertainty; ``joint`` at the estimate."""
     bundle, correlation = adjustment.allowed, adjustment.correlation
-    blocks, ratio, blocks_count = _block_scatter(joint, joint.covariance)
+    blocks, ratio, blocks_count = _block_scatter(joint, adjustment.bundle)
     raised = max(ratio / correlation.factor, 1.0) if blocks_count else 1.0
     n_images = int(bundle.used.any(axis=(1, 2)).sum())
     return Budget(
@@ -213,7 +214,7 @@ def shares_of(
     jitter = bundle.carried(bundle.jitter_information + bundle.doubted_jitter)
     moved, by_form = _of_seat(bundle, priors.form_error)
     drift = bundle.part(at.drift)
-    drift *= _doubt(bundle, at.drift, bundle.components.drift.expected)
+    drift *= counted_drift(bundle) / _variance(bundle, at.drift)
     # Centres that are off in each posture its own way.
     biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
     biased *= (priors.center_bias / bundle.sigma) ** 2
@@ -245,37 +246,71 @@ def shares_of(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class CountedSeat:
+    """How much a seat is counted to follow the lean in the forms of one kind.
+
+    Attributes
+    ----------
+    variance : float
+        Along each axis in each form, mm^2.
+    axes : (3, 3) array
+        Times that, by direction in the rig.
+    """
+
+    variance: float
+    axes: FloatArray
+
+
+def counted_seat(bundle: Bundle) -> tuple[CountedSeat, ...]:
+    """Return what U holds of the seat by each kind of form."""
+    seat = bundle.components.seat
+    likely = [form.expected for form in seat]
+    alike = np.eye(N_CONE)
+    # Where images are many enough to see it, they tell themselves how large it is.
+    axes = alike if seat[0].sigma > 0 else once_round(bundle.state.rotations)
+    kinds = zip(
+        bundle.columns.seat,
+        [max(likely), *likely[1:]],
+        [axes, *[alike] * (len(seat) - 1)],
+        strict=True,
+    )
+    return tuple(
+        CountedSeat(max(_variance(bundle, at), expected**2), directions)
+        for at, expected, directions in kinds
+    )
+
+
+def counted_drift(bundle: Bundle) -> float:
+    """Return the variance of a drift over the whole of each way that U holds, mm^2."""
+    return max(
+        _variance(bundle, bundle.columns.drift), bundle.components.drift.expected**2
+    )
+
+
 def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
     """Return what the lean of the pen does, beyond the form error and by it."""
     moved, by_form = np.zeros((6, 6)), np.zeros((6, 6))
-    likely = [form.expected for form in bundle.components.seat]
-    kinds = bundle.columns.seat
-    for at, expected in zip(kinds, [max(likely), *likely[1:]], strict=True):
-        fitted = _variance(bundle, at)
-        counted = max(fitted, expected**2)
-        axes = _once_round(bundle) if at is kinds[0] else np.eye(N_CONE)
+    for at, seat in zip(bundle.columns.seat, counted_seat(bundle), strict=True):
         n_forms = (at.stop - at.start) // N_CONE
-        gain = bundle.covariance[:6, at] / fitted
-        part = gain @ np.kron(np.eye(n_forms), counted * axes) @ gain.T
-        share = min(form_error**2 / counted, 1.0)
+        gain = bundle.covariance[:6, at] / _variance(bundle, at)
+        moves = gain.reshape(6, n_forms, N_CONE) @ seat.axes
+        part = seat.variance * moves.reshape(6, -1) @ gain.T
+        share = min(form_error**2 / seat.variance, 1.0)
         by_form += share * part
         moved += (1 - share) * part
     return moved, by_form
 
 
-def _once_round(bundle: Bundle) -> FloatArray:
-    """Return how much a seat goes along each axis of the rig, (3, 3)."""
-    along = bundle.state.rotations[:, :, 1].mean(axis=0)
+def once_round(rotations: FloatArray) -> FloatArray:
+    """Return how a seat that goes once round with the pen is counted, (3, 3).
+
+    Times the variance that the other forms have, by direction in the rig; rotations
+    (N, 3, 3) are of rig_from_pen.
+    """
+    along = rotations[:, :, 1].mean(axis=0)
     along /= np.linalg.norm(along)
     return SIDEWAYS**2 * np.eye(3) + (ALONG**2 - SIDEWAYS**2) * np.outer(along, along)
-
-
-def _doubt(bundle: Bundle, at: slice, expected: float) -> float:
-    """Return how many times the variance of errors is that which they were fitted with.
-
-    What is not likely enough to be fitted may be there all the same.
-    """
-    return max(expected**2 / _variance(bundle, at), 1.0)
 
 
 def _variance(bundle: Bundle, at: slice) -> float:
@@ -297,13 +332,17 @@ def compare_halves(joint: JointFit) -> Halves:
 
 
 def _block_scatter(
-    joint: JointFit, noise: FloatArray
+    joint: JointFit, bundle: Bundle
 ) -> tuple[FloatArray | None, float, bool]:
-    """Return the covariance from blocks, its ratio to the noise's, and significance."""
+    """Return the covariance from blocks, its ratio to the noise's, and significance.
+
+    A jitter of the seat is a share of its own: the scatter is expected to hold it.
+    """
     n_images = len(joint.information)
     n_blocks = min(MAX_BLOCKS, n_images // MIN_BLOCK_SIZE)
     if n_blocks < 3:
         return None, 1.0, False
+    noise = joint.covariance
     scores = np.array(
         [part.sum(axis=0) for part in np.array_split(joint.gradients, n_blocks)]
     )
@@ -311,6 +350,11 @@ def _block_scatter(
     scatter = scores.T @ scores * n_blocks / (n_blocks - 1)
     blocks = noise @ scatter @ noise
     ratio = float(np.trace(noise @ scatter)) / 6
+    jitter = bundle.components.jitter.covariance
+    if jitter is not None:
+        by_cone = joint.information[..., N_CONE:]
+        shaken = np.einsum("nik,kl,njl->ij", by_cone, jitter, by_cone, optimize=True)
+        ratio /= 1 + float(np.trace(noise @ shaken)) / 6
     n_free = 6 * (n_blocks - 1)
     return blocks, ratio, ratio > _chi_square_quantile_99(n_free) / n_free
 

@@ -7,6 +7,7 @@ each image by a weight of its own.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,6 @@ from lightpen.estimation.variance_components import (
     Jitter,
     find_component,
 )
-from lightpen.model.camera import Camera
 from lightpen.model.rigid import rotation_from_vector, skew
 
 ROUNDS = 3  # of finding each component beside the others
@@ -215,9 +215,10 @@ class Unknowns:
         rows = np.tensordot(forms, each.cone_rows, axes=(0, 0))  # (m, 3, K)
         information[p0:, :p0] = rows.reshape(p - p0, -1) @ mixing
         information[:p0, p0:] = information[p0:, :p0].T
-        own = np.einsum(
-            "nl,nm,nij->limj", forms, forms, each.cone_rows[..., :N_CONE], optimize=True
-        )
+        m = forms.shape[1]
+        products = (forms[:, :, None] * forms[:, None]).reshape(-1, m * m)
+        own = products.T @ each.cone_rows[..., :N_CONE].reshape(-1, N_CONE**2)
+        own = np.swapaxes(own.reshape(m, m, N_CONE, N_CONE), 1, 2)
         information[p0:, p0:] = own.reshape(p - p0, p - p0)
         gradient = np.concatenate(
             [mixing.T @ each.b, (forms.T @ each.cone_right).ravel()]
@@ -232,13 +233,30 @@ class Unknowns:
 
     def sensitivity(self, rows: FloatArray) -> FloatArray:
         """Return rows (N, 3, K) of the cone by the unknowns, (N, 3, p)."""
-        own = np.einsum("nm,nij->nimj", self.forms, rows[..., :N_CONE])
-        return np.concatenate(
-            [rows @ self.mixing, own.reshape(*own.shape[:2], -1)], axis=2
-        )
+        n_images, p0 = len(rows), self.mixing.shape[1]
+        sensitivity = np.empty((n_images, N_CONE, self.number))
+        flat = rows.reshape(-1, rows.shape[-1])
+        sensitivity[..., :p0] = (flat @ self.mixing).reshape(n_images, N_CONE, p0)
+        own = self.forms[:, None, :, None] * rows[:, :, None, :N_CONE]
+        sensitivity[..., p0:] = own.reshape(n_images, N_CONE, -1)
+        return sensitivity
 
     def prior_information(self, components: Components) -> FloatArray:
         """Return what is known of them before the images, (p, p)."""
+        at, priors = self.columns, self.priors
+        prior = self._of_files.copy()
+        for place, sigma in self._sigmas(components):
+            n = place.stop - place.start
+            prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        of_leds = priors.led_covariance
+        if of_leds is not None and components.leds is NONE:  # the images do not deny it
+            known = self.basis.T @ of_leds @ self.basis
+            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
+        return prior
+
+    @cached_property
+    def _of_files(self) -> FloatArray:
+        """What files state, or what is assumed in their place, but for LEDs; (p, p)."""
         at, priors = self.columns, self.priors
         prior = np.zeros((self.number, self.number))
         for place, each in zip(at.cameras, priors.cameras, strict=True):
@@ -249,13 +267,6 @@ class Unknowns:
             )
         prior[at.diameter, at.diameter] = _information(priors.diameter.covariance)
         prior[at.scale, at.scale] = _information(priors.size_covariance)
-        for place, sigma in self._sigmas(components):
-            n = place.stop - place.start
-            prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
-        of_leds = priors.led_covariance
-        if of_leds is not None and components.leds is NONE:  # the images do not deny it
-            known = self.basis.T @ of_leds @ self.basis
-            prior[at.leds, at.leds] = inverse(known + EXACT**2 * np.eye(len(known)))
         return prior
 
     def measured(
@@ -358,7 +369,7 @@ class Unknowns:
         """Return the state by new values and the turn of each image, (N, 3)."""
         at, start, rig = self.columns, self.start, self.start.rig
         cameras = tuple(
-            _with_intrinsics(camera, camera.intrinsics + values[place])
+            camera.with_intrinsics(camera.intrinsics + values[place])
             for camera, place in zip(rig.cameras, at.cameras, strict=True)
         )
         places = np.concatenate([np.zeros(6), values[at.extrinsics]]).reshape(-1, 6)
@@ -392,11 +403,6 @@ def led_basis(leds: FloatArray) -> FloatArray:
     turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
     whole = np.concatenate([shifts, turns], axis=1)
     return np.asarray(np.linalg.qr(whole, mode="complete")[0][:, 6:])
-
-
-def _with_intrinsics(camera: Camera, intrinsics: FloatArray) -> Camera:
-    fx, fy, cx, cy = intrinsics[:4].tolist()
-    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=intrinsics[4:])
 
 
 def _information(covariance: FloatArray) -> FloatArray:

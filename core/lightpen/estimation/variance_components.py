@@ -26,7 +26,8 @@ FITTED = 6.63  # the same at 0.01: enough to be fitted
 NONE_SHARE = 0.7  # of swings in which errors of a kind are as good as none
 SCALES = np.geomspace(1e-5, 1.0, 200)  # mm, standard deviations tried
 SEEN = 1e-9  # of the largest eigenvalue; what is less is not seen at all
-MAX_PASSES = 60
+MAX_PASSES = 12
+NO_JITTER = 1e-5  # mm, along an axis; a covariance is to be inverted
 COARSE = 4  # one in so many scales, where all images are asked for each
 SETTLED = 1e-2  # relative, of a standard deviation
 MATRIX_SIGNIFICANT = 22.46  # chi-square, 6 degrees of freedom, at 0.001
@@ -121,14 +122,16 @@ def find_jitter(
 
     Notes
     -----
-    Expectation-maximisation, if one standard deviation along all axes is likely.
+    Fisher scoring, if one standard deviation along all axes is likely: with the total
+    covariance V_i of each image, the sum of ``V_i^-1 (excess_i - V_i) V_i^-1`` is
+    brought to 0. What would be negative is taken as none.
     """
     noise = np.linalg.inv(information)
     alone = np.einsum("nij,nj->ni", noise, right)
     excess = np.einsum("ni,nj->nij", alone, alone) + leverage
 
     values, vectors = np.linalg.eigh(noise)
-    projected = np.einsum("nji,njk,nki->ni", vectors, excess, vectors)
+    projected = np.sum(vectors * (excess @ vectors), axis=1)
     sigmas = np.array([0.0, *SCALES[::COARSE]])
     totals = values + sigmas[:, None, None] ** 2
     costs = np.sum(np.log(totals) + projected / totals, axis=(1, 2))
@@ -141,15 +144,27 @@ def find_jitter(
         misfit = np.einsum("nij,nji->", np.linalg.inv(total), excess)
         return float(np.linalg.slogdet(total)[1].sum() + misfit)
 
-    jitter = np.diag(np.maximum(np.mean(alone**2, axis=0) / 4, 1e-10))
+    jitter = sigmas[int(np.argmin(costs))] ** 2 * np.eye(3)
     for _ in range(MAX_PASSES):
-        share = jitter @ np.linalg.inv(noise + jitter)
-        left = jitter - share @ jitter
-        moved = share @ excess @ np.swapaxes(share, 1, 2)
-        before, jitter = jitter, np.mean(moved + left, axis=0)
-        jitter = 0.5 * (jitter + jitter.T)
+        weights = np.linalg.inv(noise + jitter)
+        flat = weights.reshape(-1, 9)
+        # Of every pair of entries: the sum of products of entries (a, c) and (d, b).
+        products = (flat.T @ flat).reshape(3, 3, 3, 3).transpose(0, 3, 1, 2)
+        right_side = np.sum(weights @ (excess - noise) @ weights, axis=0)
+        before = jitter
+        jitter = np.linalg.solve(products.reshape(9, 9), right_side.ravel())
+        jitter = _not_negative(jitter.reshape(3, 3))
         change = np.abs(np.diag(jitter) / np.diag(before) - 1)
         if change.max() < SETTLED:
             break
     is_significant = cost(np.zeros((3, 3))) - cost(jitter) >= MATRIX_SIGNIFICANT
+    # The mean of what it may be, an inverse Wishart distribution.
+    n_images = len(alone)
+    jitter = jitter * n_images / max(n_images - 4, 1)
     return Jitter(np.asarray(jitter) if is_significant else None, expected)
+
+
+def _not_negative(covariance: FloatArray) -> FloatArray:
+    """Return a covariance without what is negative in it."""
+    values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
+    return np.asarray((vectors * np.maximum(values, NO_JITTER**2)) @ vectors.T)

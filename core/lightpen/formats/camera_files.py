@@ -25,7 +25,6 @@ serial number of the camera, ``camera_serial``; and how warm it was,
 ``calibration_temperature``, in degrees Celsius.
 """
 
-import json
 import re
 from collections.abc import Sequence
 from datetime import date
@@ -35,7 +34,15 @@ from typing import Literal
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.errors import CalibrationError, FileError, UsageError
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.camera_checks import (
+    check_fold,
+    check_pinhole,
+    check_skew,
+    checked_distortion,
+    checked_size,
+)
+from lightpen.formats.camera_text import opencv_lines, ros_lines
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, counted_numbers, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
@@ -44,11 +51,6 @@ from lightpen.sentences import Sentence, sentence
 
 CAMERA_FILE = sentence("file.camera", "camera file")
 CAMERA_FILE_LIMIT = 4 * MEGABYTE  # some keep the points they were calibrated from
-LARGEST_IMAGE = 100_000  # px, along a side
-SMALLEST_FOCAL_LENGTH = 0.02  # of the image's longer side: 175 degrees are seen
-LARGEST_ASPECT = 1.5  # of a pixel
-FOLD_SAMPLES = 17  # along a side; a lens folds from the corners inwards
-SKEW_TOLERANCE = 1e-6  # px; rounding, where the file has a skew of zero
 LONGEST_SERIAL = 60  # characters
 COLDEST, WARMEST = -50.0, 100.0  # degrees Celsius
 FOCAL_CORRELATION = 0.99  # of fx and fy: 0.991 by 24 views of a board, 5 MP
@@ -140,7 +142,7 @@ def write_camera(
                 name=printable(path.name),
             )
         )
-    lines = _opencv_lines(camera) if layout == "opencv" else _ros_lines(camera)
+    lines = opencv_lines(camera) if layout == "opencv" else ros_lines(camera)
     write_whole(path, "".join(f"{line}\n" for line in lines).encode())
 
 
@@ -193,7 +195,7 @@ def _from_matlab(entries: Entries) -> Camera:
             [entries.counted(2, "FocalLength"), entries.counted(2, "PrincipalPoint")]
         )
         if entries.has("Skew"):
-            _check_skew(entries.counted(1, "Skew")[0], entries)
+            check_skew(entries.counted(1, "Skew")[0], entries)
     else:
         key = "K" if entries.has("K") else "IntrinsicMatrix"
         matrix = entries.counted(9, key).reshape(3, 3)
@@ -273,21 +275,8 @@ def _pinhole(matrix: FloatArray, entries: Entries) -> FloatArray:
                 name=entries.name,
             )
         )
-    _check_skew(matrix[0, 1], entries)
+    check_skew(matrix[0, 1], entries)
     return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
-
-
-def _check_skew(skew: float, entries: Entries) -> None:
-    if abs(skew) > SKEW_TOLERANCE:
-        raise FileError(
-            sentence(
-                "camera-file.skew",
-                "{name} has a skew of {skew:g} px; cameras without skew are needed. "
-                "Calibrate the camera again without estimating a skew.",
-                name=entries.name,
-                skew=skew,
-            )
-        )
 
 
 def _camera(
@@ -296,9 +285,9 @@ def _camera(
     pinhole: FloatArray,
     coefficients: FloatArray,
 ) -> Camera:
-    width, height = _checked_size(size, entries.name)
-    _check_pinhole(pinhole, width, height, entries.name)
-    distortion = _checked_distortion(coefficients, entries)
+    width, height = checked_size(size, entries.name)
+    check_pinhole(pinhole, width, height, entries.name)
+    distortion = checked_distortion(coefficients, entries)
     fx, fy, cx, cy = map(float, pinhole)
     camera = Camera(
         width=width,
@@ -313,143 +302,8 @@ def _camera(
         serial=_serial(entries),
         temperature_c=_temperature(entries),
     )
-    _check_fold(camera, entries)
+    check_fold(camera, entries)
     return camera
-
-
-def _checked_size(size: tuple[float, float], name: str | Sentence) -> tuple[int, int]:
-    for side in size:
-        if side != round(side) or not 0 < side <= LARGEST_IMAGE:
-            raise FileError(
-                sentence(
-                    "camera-file.image-size",
-                    "{name} gives an image size of {width:g} x {height:g} px. Two "
-                    "whole numbers from 1 to {most} are needed.",
-                    name=name,
-                    width=size[0],
-                    height=size[1],
-                    most=LARGEST_IMAGE,
-                )
-            )
-    return int(size[0]), int(size[1])
-
-
-def _check_pinhole(
-    pinhole: FloatArray, width: int, height: int, name: str | Sentence
-) -> None:
-    fx, fy, cx, cy = pinhole
-    if fx <= 0 or fy <= 0:
-        raise FileError(
-            sentence(
-                "camera-file.focal-length-sign",
-                "{name} has the focal lengths {fx:g} and {fy:g} px; both must be "
-                "positive. Export the file again, or calibrate the camera again.",
-                name=name,
-                fx=fx,
-                fy=fy,
-            )
-        )
-    if min(fx, fy) < SMALLEST_FOCAL_LENGTH * max(width, height):
-        raise FileError(
-            sentence(
-                "camera-file.focal-length-short",
-                "{name} has the focal lengths {fx:g} and {fy:g} px, too short for "
-                "images of {width} x {height} px; they may be in millimetres. Give "
-                "them in pixels.",
-                name=name,
-                fx=fx,
-                fy=fy,
-                width=width,
-                height=height,
-            )
-        )
-    if max(fx, fy) > LARGEST_ASPECT * min(fx, fy):
-        raise FileError(
-            sentence(
-                "camera-file.focal-lengths-differ",
-                "{name} has the focal lengths {fx:g} and {fy:g} px along u and v; "
-                "with the pixels of a camera these are nearly alike. Export the "
-                "file again, or calibrate the camera again.",
-                name=name,
-                fx=fx,
-                fy=fy,
-            )
-        )
-    if abs(cx - width / 2) > width or abs(cy - height / 2) > height:
-        raise FileError(
-            sentence(
-                "camera-file.principal-point",
-                "{name} has its principal point at ({cx:g}, {cy:g}) px, far outside "
-                "the image of {width} x {height} px. Check that both belong to the "
-                "same camera and image size.",
-                name=name,
-                cx=cx,
-                cy=cy,
-                width=width,
-                height=height,
-            )
-        )
-
-
-def _checked_distortion(coefficients: FloatArray, entries: Entries) -> FloatArray:
-    """Return 5 or 8 coefficients."""
-    count = len(coefficients)
-    if count == 0 and entries.word("distortion_model").casefold() == "none":
-        return np.zeros(5)
-    if count not in (4, 5, 8, 12, 14):
-        counted = (
-            sentence("count.one-distortion-coefficient", "1 distortion coefficient")
-            if count == 1
-            else sentence(
-                "count.distortion-coefficients",
-                "{count} distortion coefficients",
-                count=count,
-            )
-        )
-        raise FileError(
-            sentence(
-                "camera-file.distortion-count",
-                "{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 "
-                "k6). Export the file again.",
-                name=entries.name,
-                counted=counted,
-            )
-        )
-    if np.any(coefficients[8:]):
-        raise FileError(
-            sentence(
-                "camera-file.distortion-terms",
-                "{name} has {count} distortion coefficients with a thin prism or a "
-                "tilted sensor; 4, 5 or 8 are supported. Calibrate the camera again "
-                "without these terms.",
-                name=entries.name,
-                count=count,
-            )
-        )
-    return np.append(coefficients, 0.0) if count == 4 else coefficients[:8]
-
-
-def _check_fold(camera: Camera, entries: Entries) -> None:
-    """Refuse a distortion that turns the image over before its corners."""
-    grid = np.meshgrid(
-        np.linspace(0, camera.width - 1, FOLD_SAMPLES),
-        np.linspace(0, camera.height - 1, FOLD_SAMPLES),
-    )
-    try:
-        camera.unproject(np.stack(grid, axis=-1))
-    except CalibrationError as error:
-        raise FileError(
-            sentence(
-                "camera-file.fold",
-                "The distortion coefficients of {name} fold the image of {width} x "
-                "{height} px: some pixels have no direction of view, or two. Check "
-                "them, or calibrate the camera again with views that reach into the "
-                "corners.",
-                name=entries.name,
-                width=camera.width,
-                height=camera.height,
-            )
-        ) from error
 
 
 def _covariance(entries: Entries, given: int, kept: int) -> FloatArray | None:
@@ -538,65 +392,3 @@ def _temperature(entries: Entries) -> float | None:
             )
         )
     return celsius
-
-
-def _opencv_lines(camera: Camera) -> list[str]:
-    lines = [
-        "%YAML:1.0",
-        "---",
-        f"image_width: {camera.width}",
-        f"image_height: {camera.height}",
-        *_matrix_lines("camera_matrix", camera.matrix, "!!opencv-matrix"),
-        *_matrix_lines(
-            "distortion_coefficients", camera.distortion[None], "!!opencv-matrix"
-        ),
-    ]
-    return lines + _quality_lines(camera, "!!opencv-matrix")
-
-
-def _ros_lines(camera: Camera) -> list[str]:
-    model = "plumb_bob" if len(camera.distortion) == 5 else "rational_polynomial"
-    projection = np.column_stack([camera.matrix, np.zeros(3)])
-    return [
-        f"image_width: {camera.width}",
-        f"image_height: {camera.height}",
-        "camera_name: camera",
-        *_matrix_lines("camera_matrix", camera.matrix),
-        f"distortion_model: {model}",
-        *_matrix_lines("distortion_coefficients", camera.distortion[None]),
-        *_matrix_lines("rectification_matrix", np.eye(3)),
-        *_matrix_lines("projection_matrix", projection),
-        *_quality_lines(camera),
-    ]
-
-
-def _quality_lines(camera: Camera, tag: str = "") -> list[str]:
-    lines = []
-    if camera.covariance is not None:
-        lines += _matrix_lines("intrinsics_covariance", camera.covariance, tag)
-    if camera.calibrated_on is not None:
-        lines.append(f'calibration_date: "{camera.calibrated_on.isoformat()}"')
-    if camera.serial:
-        lines.append(f"camera_serial: {json.dumps(camera.serial, ensure_ascii=False)}")
-    if camera.temperature_c is not None:
-        lines.append(f"calibration_temperature: {_decimal(camera.temperature_c)}")
-    return lines
-
-
-def _matrix_lines(name: str, matrix: FloatArray, tag: str = "") -> list[str]:
-    rows = ",\n      ".join(", ".join(map(_decimal, row)) for row in matrix)
-    return [
-        f"{name}: {tag}".rstrip(),
-        f"   rows: {len(matrix)}",
-        f"   cols: {matrix.shape[1]}",
-        *(["   dt: d"] if tag else []),
-        f"   data: [ {rows} ]",
-    ]
-
-
-def _decimal(value: float) -> str:
-    """Return the shortest text that reads back the same, as YAML 1.1 wants a float."""
-    text = repr(float(value))
-    if "e" in text and "." not in text:
-        return text.replace("e", ".0e")
-    return text

@@ -16,6 +16,7 @@ from lightpen.formats.part_files import part_of, renamed, sweep_parts
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
+A_FILE = sentence("file.file", "file")  # of no kind that a user knows
 FOLDER = sentence("file.folder", "folder")
 PATIENCE = 2.0  # s for another program to give a file its name
 EXCERPT_LENGTH = 40  # characters of a file's content quoted in a sentence

@@ -3,19 +3,29 @@
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from hashlib import sha256 as sha256_of
 from pathlib import Path
 
 from lightpen.arrays import FloatArray
-from lightpen.formats.files import sha256
+from lightpen.formats.files import A_FILE, MEGABYTE, read_bytes, sha256
 from lightpen.model.origin import Origin
+
+LIMIT = 16 * MEGABYTE  # of a file that is kept in the record
 
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that went into a calibration."""
+    """A file that went into a calibration.
+
+    Attributes
+    ----------
+    content : bytes or None
+        Of a file that the record is to hold, so that it is enough to calibrate again.
+    """
 
     path: Path
     sha256: str
+    content: bytes | None = None
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,10 @@ class Inputs:
         Where the design puts the tip, pen frame, mm.
     origin : Origin or None
         What the images are of; None where a record of an earlier version does not say.
+    units : str or None
+        Of the pen file, where it does not say.
+    led_diameter : float or None
+        Of the LED discs, where the pen file does not say, mm.
     """
 
     camera: InputFile
@@ -48,11 +62,25 @@ class Inputs:
     nominal_tip: FloatArray | None
     rig: RigInputs | None = None
     origin: Origin | None = None
+    units: str | None = None
+    led_diameter: float | None = None
 
 
 def hashed(path: Path) -> InputFile:
     """Return a file with its hash."""
     return InputFile(path, sha256(path))
+
+
+def kept(path: Path) -> InputFile:
+    """Return a file with its hash and its content.
+
+    Raises
+    ------
+    FileError
+        It cannot be read.
+    """
+    content = read_bytes(path, A_FILE, LIMIT)
+    return InputFile(path, sha256_of(content).hexdigest(), content)
 
 
 def all_hashed(paths: Sequence[Path]) -> tuple[InputFile, ...]:

@@ -2,14 +2,17 @@
 
 import glob
 import re
+from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from lightpen.arrays import Image
 from lightpen.errors import FileError
-from lightpen.formats.decoding import read_image
+from lightpen.formats.decoding import keep_freed_memory, read_image
 from lightpen.formats.files import printable, unreadable
 from lightpen.formats.videos import count_frames, frame_loaders
 from lightpen.sentences import sentence
@@ -17,6 +20,9 @@ from lightpen.sentences import sentence
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
 IMAGE_FOLDER = "images"
+IN_FLIGHT = 4  # images per thread that may wait in memory
+
+Seen = TypeVar("Seen")
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,29 @@ class ImageSource:
     names: tuple[str, ...]
     files: tuple[Path, ...]
     open: Callable[[], Iterator[Callable[[], Image]]]
+
+
+def look_at_all(
+    source: ImageSource, look: Callable[[Callable[[], Image]], Seen], n_threads: int
+) -> Iterator[Seen]:
+    """Look at all images in threads, and yield what each shows in their order.
+
+    Images leave memory at once; those looked at are a few ahead of who asks.
+
+    Parameters
+    ----------
+    look : callable
+        Takes the loader of an image; what it raises ends the looking.
+    """
+    keep_freed_memory()
+    with ThreadPoolExecutor(n_threads) as executor:
+        waiting: deque[Future[Seen]] = deque()
+        for load in source.open():
+            waiting.append(executor.submit(look, load))
+            if len(waiting) >= IN_FLIGHT * n_threads:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
 
 
 def find_images(*places: str) -> ImageSource:

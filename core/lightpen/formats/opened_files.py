@@ -7,6 +7,7 @@ from typing import Self
 from lightpen.errors import LightpenError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.pen_files import read_pen
+from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -82,22 +83,26 @@ class OpenedFiles:
 
     camera_file: CameraFile | None = None
     pen_file: PenFile | None = None
+    rig_file: RigFile | None = None
     troubles: tuple[Sentence, ...] = ()
 
 
 def open_files(
-    camera_path: Path | None, pen_path: Path | None, units: str | None = None
+    camera_path: Path | None,
+    pen_path: Path | None,
+    units: str | None = None,
+    rig_path: Path | None = None,
 ) -> OpenedFiles:
-    """Read the files that were in use before, each whether or not the other can be.
+    """Read the files that were in use before, each whether or not the others can be.
 
     Parameters
     ----------
-    camera_path, pen_path : Path or None
+    camera_path, pen_path, rig_path : Path or None
         None where there was no such file.
     units : str, optional
         Of a pen file that does not say.
     """
-    camera_file, pen_file, troubles = None, None, []
+    camera_file, pen_file, rig_file, troubles = None, None, None, []
     try:
         camera_file = None if camera_path is None else CameraFile.read(camera_path)
     except LightpenError as error:
@@ -106,4 +111,8 @@ def open_files(
         pen_file = None if pen_path is None else PenFile.read(pen_path, units)
     except LightpenError as error:
         troubles.append(error.sentence)
-    return OpenedFiles(camera_file, pen_file, tuple(troubles))
+    try:
+        rig_file = None if rig_path is None else read_rig(rig_path)
+    except LightpenError as error:
+        troubles.append(error.sentence)
+    return OpenedFiles(camera_file, pen_file, rig_file, tuple(troubles))

@@ -11,6 +11,7 @@ import math
 import os
 from datetime import datetime
 from hashlib import sha256
+from threading import Lock
 from typing import Annotated, Any, NoReturn, TypeAlias, TypeVar
 
 from msgspec import Meta, convert
@@ -24,6 +25,10 @@ Vector: TypeAlias = tuple[Length, Length, Length]
 Digest: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{64}$")]
 
 T = TypeVar("T")
+
+# msgspec 0.22 crashes where two threads make it learn of one dataclass for the first
+# time at once.
+_ONE_READER = Lock()
 
 
 class DamagedError(ValueError):
@@ -64,7 +69,8 @@ def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
         Whether a text is no number, even one that reads as one.
     """
     try:
-        return convert(tree, shape, strict=strict)
+        with _ONE_READER:
+            return convert(tree, shape, strict=strict)
     except (ValueError, RecursionError) as error:
         raise DamagedError(str(error)) from error
 

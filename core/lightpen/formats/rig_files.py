@@ -37,6 +37,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.documents import parse_document
 from lightpen.formats.entries import Entries, is_covariance
 from lightpen.formats.files import MEGABYTE, printable, quoted, read_text, write_whole
+from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig
 from lightpen.model.rigid import nearest_rotation, rotation_from_quaternion
@@ -70,15 +71,23 @@ class RigFile:
     ----------
     camera_files : tuple of Path
         One a camera.
+    is_simulated : bool
+        Whether it is of simulated cameras.
     """
 
     path: Path
     camera_files: tuple[Path, ...]
     rig: Rig
+    is_simulated: bool = False
 
 
-def read_rig(path: Path) -> RigFile:
+def read_rig(path: Path, camera_files: Sequence[Path] = ()) -> RigFile:
     """Read a rig file and the camera files it names; see the module for the layout.
+
+    Parameters
+    ----------
+    camera_files : sequence of Path, optional
+        One a camera, in place of those that it names, as for a copy.
 
     Raises
     ------
@@ -92,7 +101,9 @@ def read_rig(path: Path) -> RigFile:
     entries.refuse_others("cameras", "comment")
     listed = _listed_cameras(entries, name)
     names = _names(listed, name)
-    files = _camera_files(listed, names, path)
+    files = tuple(camera_files) or _camera_files(listed, names, path)
+    if len(files) != len(listed):
+        raise _other_number(name, len(listed), len(files))
     cameras = tuple(_read_of(name, names[c], file) for c, file in enumerate(files))
     _require_reference(listed[0], names[0], name)
     places = [_place(each) for each in listed[1:]]
@@ -106,6 +117,7 @@ def read_rig(path: Path) -> RigFile:
             covariance=_covariance(listed[1:], names[1:], name),
             names=names,
         ),
+        is_simulated(path),
     )
 
 
@@ -194,6 +206,19 @@ def _text(entries: Entries, key: str) -> str:
             )
         )
     return text
+
+
+def _other_number(name: str, n_cameras: int, n_files: int) -> FileError:
+    return FileError(
+        sentence(
+            "rig-file.other-number",
+            "{name} is of {n_cameras} cameras, and {n_files} files of cameras are "
+            "beside it. Restore it from a copy.",
+            name=name,
+            n_cameras=n_cameras,
+            n_files=n_files,
+        )
+    )
 
 
 def _camera_files(

@@ -16,7 +16,7 @@ References
    298-372, section 6.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -366,7 +366,7 @@ def _away(state: BoardState, origin: BoardState) -> FloatArray:
 def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> BoardState:
     places = _places_at(state.cameras)
     cameras = tuple(
-        moved_camera(camera, step[at])
+        camera.with_intrinsics(camera.intrinsics + step[at])
         for camera, at in zip(state.cameras, _intrinsics_at(state.cameras), strict=True)
     )
     extrinsics = np.zeros((len(cameras), N_POSE))
@@ -381,12 +381,6 @@ def _moved(state: BoardState, step: FloatArray, poses_step: FloatArray) -> Board
         ),
         state.shape + step[places.stop :],
     )
-
-
-def moved_camera(camera: Camera, step: FloatArray) -> Camera:
-    """Return a camera whose intrinsics are changed by a step."""
-    fx, fy, cx, cy, *distortion = (camera.intrinsics + step).tolist()
-    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=np.array(distortion))
 
 
 def _points_cam(board: Board, state: BoardState) -> tuple[FloatArray, FloatArray]:

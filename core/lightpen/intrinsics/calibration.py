@@ -461,12 +461,12 @@ def _halves(
             _fit(views.chosen(which), tolerances, near, k3_held=choice.k3_held)
             for which in (is_even, ~is_even)
         )
-    except CalibrationError:  # half of the views are too alike
+        first, second = one.state.cameras[0], other.state.cameras[0]
+        change = first.intrinsics - second.intrinsics
+        moves = error_fields(second) @ change
+    except CalibrationError:  # half of the views are too alike, or fold the image
         return None
     at = one.of_intrinsics(0)
-    first, second = one.state.cameras[0], other.state.cameras[0]
-    change = first.intrinsics - second.intrinsics
-    moves = error_fields(second) @ change
     variances = np.diag(one.covariance[at, at]) + np.diag(other.covariance[at, at])
     return ViewHalves(
         change[:4],

@@ -1,18 +1,17 @@
 """From images to views of a board, and why it is not seen where it is not."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import CalibrationError, FileError
-from lightpen.formats.decoding import keep_freed_memory
 from lightpen.formats.files import printable
-from lightpen.formats.images import ImageSource
+from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.pairing import NONE, Pairing
 from lightpen.intrinsics.boards import Board, BoardKind
 from lightpen.intrinsics.sightings import count_corners, find_points
@@ -46,7 +45,6 @@ class ObservedBoard:
 class _Look:
     """What one image shows."""
 
-    name: str
     size: tuple[int, int]
     points: FloatArray | None
 
@@ -81,14 +79,15 @@ def observe_board_of_rig(
         As `observe_board`.
     """
     n_images = sum(len(source.names) for source in sources)
+    n_threads = os.cpu_count() or 1
     looks: list[list[_Look]] = []
     n_done = 0
     for source in sources:
         own: list[_Look] = []
-        for look in _looks(source, board):
-            if own and look.size != own[0].size:
-                raise _other_size(own[0], look)
-            own.append(look)
+        for seen in look_at_all(source, partial(_look, board=board), n_threads):
+            if own and seen.size != own[0].size:
+                raise _other_size(source.names[0], own[0], source.names[len(own)], seen)
+            own.append(seen)
             n_done += 1
             report(n_done / n_images)
         if all(look.points is None for look in own):
@@ -103,7 +102,7 @@ def observe_board_of_rig(
             if points is not None:
                 pixels[moment, c] = points
         c, i = seen_by[0]
-        names.append(looks[c][i].name)
+        names.append(sources[c].names[i])
     sizes = tuple(own[0].size for own in looks)
     views = Views(board, tuple(names), pixels, sizes)
     is_seen = np.any(views.found, axis=1)
@@ -111,37 +110,22 @@ def observe_board_of_rig(
     return ObservedBoard(views.chosen(is_seen), unseen)
 
 
-def _looks(source: ImageSource, board: Board) -> Iterator[_Look]:
-    """Look at the images in threads, a few ahead of who asks."""
-    keep_freed_memory()
-    n_threads = os.cpu_count() or 1
-
-    def look(load: Callable[[], Image], name: str) -> _Look:
-        image = load()
-        return _Look(name, (image.shape[1], image.shape[0]), find_points(image, board))
-
-    with ThreadPoolExecutor(n_threads) as executor:
-        waiting = iter(zip(source.open(), source.names, strict=True))
-        pending = [
-            executor.submit(look, *each) for each in islice(waiting, 2 * n_threads)
-        ]
-        while pending:
-            done = pending.pop(0).result()
-            pending += [executor.submit(look, *each) for each in islice(waiting, 1)]
-            yield done
+def _look(load: Callable[[], Image], board: Board) -> _Look:
+    image = load()
+    return _Look((image.shape[1], image.shape[0]), find_points(image, board))
 
 
-def _other_size(first: _Look, other: _Look) -> FileError:
+def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
     return FileError(
         sentence(
             "intrinsics.other-size",
             "{name} has {width} x {height} px, {first} has {first_width} x "
             "{first_height} px. Give images of one camera, with one region and "
             "binning.",
-            name=printable(other.name),
+            name=printable(name),
             width=other.size[0],
             height=other.size[1],
-            first=printable(first.name),
+            first=printable(first_name),
             first_width=first.size[0],
             first_height=first.size[1],
         )

@@ -1,20 +1,22 @@
-"""Every image of a camera looked at as it comes, and handed to the swing.
+"""Every image of a camera looked at as it comes, and handed to whom it is for.
 
-One thread looks at the images. While no swing is captured it takes the newest and
-passes over those that came meanwhile; during a swing it takes them all, in order. Where
-nothing moves it looks twice a second, and where nobody looks on, not at all.
+One thread looks at the images. While nothing is captured it takes the newest and passes
+over those that came meanwhile; during a swing or a verification it takes them all, in
+order, of two cameras those of one moment together. Where nothing moves it looks twice a
+second, and where nobody looks on, not at all.
 """
 
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from functools import partial, reduce
 from threading import Event, Thread
 from typing import Protocol
 
 from lightpen.cameras.clock import Clock
+from lightpen.cameras.pairing import FramePairs
 from lightpen.cameras.protocol import (
     CameraSettings,
-    Caps,
     DeviceLost,
     EndOfImages,
     Frame,
@@ -37,6 +39,7 @@ from lightpen.errors import LightpenError
 from lightpen.sentences import sentence
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import Phase, SwingSetup
+from lightpen.verification.runner import VerificationRunner
 
 LONGEST_WAIT = 0.1  # s, after which a swing that began is noticed at the latest
 UNHURRIED = 0.5  # s from image to image while nothing moves
@@ -54,11 +57,14 @@ class LiveImage:
     sighting : Sighting or None
         The pen; None until the intrinsics and the pen are known and the image has the
         size that the intrinsics are for.
+    camera : int
+        Which of the cameras took it, from 0.
     """
 
     frame: Frame
     spots: Spots
     sighting: Sighting | None
+    camera: int = 0
 
 
 class LiveListener(Protocol):
@@ -67,44 +73,55 @@ class LiveListener(Protocol):
     def on_image(self, image: LiveImage) -> None:
         """Take an image that was looked at."""
 
-    def on_camera(self, event: WorkerEvent) -> None:
-        """Take what happens to the camera, but for images."""
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
+        """Take what happens to a camera, by its number from 0, but for images."""
 
 
 class Live:
-    """Looks at the images of a camera until it is stopped.
+    """Looks at the images of one camera, or of two beside each other, until stopped.
 
     Parameters
     ----------
-    camera : ImageCamera
-        Not open yet. Nobody else may call it any more.
+    cameras : sequence of ImageCamera
+        Not open yet. Nobody else may call them any more.
     settings : CameraSettings
-        To be applied when it is opened.
+        To be applied when they are opened.
     runner : SwingRunner
-        Takes every image.
+        Takes every image, but for those of a verification.
     clock : Clock, optional
-        The one that the camera goes by.
+        The one that the cameras go by.
     known : mapping of str to CameraSettings
         By serial numbers; a camera that is among them gets these instead.
+    verifier : VerificationRunner, optional
+        Takes every image while somebody verifies a tip.
     """
 
     def __init__(
         self,
-        camera: ImageCamera,
+        cameras: Sequence[ImageCamera],
         settings: CameraSettings,
         listener: LiveListener,
         runner: SwingRunner,
         clock: Clock | None = None,
         known: Mapping[str, CameraSettings] | None = None,
+        verifier: VerificationRunner | None = None,
     ) -> None:
-        self._worker = CameraWorker(
-            camera, settings, self._on_event, clock=clock, known=known
+        self._workers = tuple(
+            CameraWorker(
+                *(camera, settings, partial(self._on_event, c)),
+                clock=clock,
+                known=known,
+            )
+            for c, camera in enumerate(cameras)
         )
+        self._pairs = FramePairs()
+        self._has_refused = False
         self._listener = listener
         self._runner = runner
+        self._verifier = verifier
         self._aim = Aim()
         self._wanted: Aim | SwingSetup = self._aim
-        self._last: Sighting | None = None  # of what is wanted
+        self._last: dict[int, Sighting] = {}  # of what is wanted, by camera
         self._is_watched = True
         self._scene = Spots.none()
         self._moved_ns: int | None = None
@@ -114,28 +131,29 @@ class Live:
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="looking", daemon=True)
 
-    @property
-    def serial(self) -> str:
-        """Serial number of the camera, or what it is looked for by until it is open."""
-        return self._worker.serial
-
-    @property
-    def caps(self) -> Caps | None:
-        """What the camera can do; None until it was open."""
-        return self._worker.caps
+    def worker(self, camera: int = 0) -> CameraWorker:
+        """Return who runs a camera."""
+        return self._workers[camera]
 
     @property
     def stats(self) -> Stats:
-        """What became of the images."""
-        return self._worker.stats
+        """What became of the images of all cameras."""
+        stats = reduce(Stats.and_then, (worker.stats for worker in self._workers))
+        return replace(stats, unpaired=self._pairs.n_unpaired)
+
+    @property
+    def lag_ms(self) -> float | None:
+        """By how much the second camera is later; None while that is not known."""
+        return self._pairs.lag_ms
 
     def start(self) -> None:
-        """Open the camera and look at its images; once only."""
-        self._worker.start()
+        """Open the cameras and look at their images; once only."""
+        for worker in self._workers:
+            worker.start()
         self._thread.start()
 
     def stop(self) -> None:
-        """Close the camera and end both threads.
+        """Close the cameras and end all threads.
 
         Raises
         ------
@@ -146,7 +164,9 @@ class Live:
         self._ready.set()
         if self._thread.ident is not None:
             self._thread.join(LONGEST_STOP)
-        self._worker.stop()
+        with ExitStack() as stack:  # one that does not stop keeps none from it
+            for worker in self._workers:
+                stack.callback(worker.stop)
 
     def set_aim(self, aim: Aim) -> None:
         """Look for something else from the next image on; a swing keeps its own."""
@@ -161,26 +181,17 @@ class Live:
         if self._moved_ns is not None:
             self._moved_ns = self._seen_ns
 
-    def set_exposure(self, exposure_us: float) -> None:
-        """Ask the camera for another exposure."""
-        self._worker.set_exposure(exposure_us)
-
-    def set_gain(self, gain_db: float) -> None:
-        """Ask the camera for another gain."""
-        self._worker.set_gain(gain_db)
-
-    def configure(self, settings: CameraSettings) -> None:
-        """Ask the camera for other settings, for which it stops for a moment."""
-        self._worker.configure(settings)
-
     def _run(self) -> None:
         try:
             while not self._stopping.is_set():
-                setup = self._captured()
-                self._worker.set_rest(self._rest())
-                frame = self._next_frame()
-                if frame is not None:
-                    self._take(frame, setup)
+                captured = self._captured()
+                rest = self._rest()
+                for worker in self._workers:
+                    worker.set_rest(rest)
+                if self._measures:
+                    self._take_next(captured)
+                else:
+                    self._take_newest()
         finally:
             if not self._stopping.is_set():
                 self._give_up()
@@ -196,22 +207,35 @@ class Live:
                         "images. Open the camera again.",
                     )
                 )
-            )
+            ),
+            0,
         )
-        with suppress(DeviceLost):  # `stop` tells it
-            self._worker.stop()
+        for worker in self._workers:
+            with suppress(DeviceLost):  # `stop` tells it
+                worker.stop()
 
-    def _captured(self) -> SwingSetup | None:
+    def _captured(self) -> SwingSetup | Aim | None:
         """Return what is captured now, and take all images while something is."""
         status = self._runner.status
-        setup = status.setup if status.is_capturing else None
-        if self._measures is not (setup is not None):
-            self._measures = setup is not None
-            self._worker.measure(self._measures)
-        return setup
+        captured: SwingSetup | Aim | None = self._verified()
+        if captured is None and status.is_capturing:
+            captured = status.setup
+        if self._measures is not (captured is not None):
+            self._measures = captured is not None
+            for worker in self._workers:
+                worker.measure(self._measures)
+            self._pairs.forget()
+        return captured
+
+    def _verified(self) -> Aim | None:
+        """Return what a verification looks for; None while nobody is at one."""
+        status = None if self._verifier is None else self._verifier.status
+        return status.aim if status is not None and status.is_touching else None
 
     def _rest(self) -> float | None:
         """Return how long the camera may rest after each image, s; None for good."""
+        if self._verified() is not None:
+            return 0.0
         status = self._runner.status
         waits = status.state is None or status.state.phase is Phase.WAIT
         if status.is_capturing and not (waits or status.is_paused_by_user):
@@ -230,46 +254,115 @@ class Live:
             self._moved_ns = self._seen_ns
         self._scene = image.spots
 
-    def _next_frame(self) -> Frame | None:
-        if self._measures:
-            try:
-                return self._worker.next_frame(LONGEST_WAIT)
-            except FrameTimeout:
-                return None
-            except EndOfImages:
-                self._stopping.wait(LONGEST_WAIT)
-                return None
+    def _take_newest(self) -> None:
+        """Look at the newest image of each camera, as no swing takes them all."""
         self._ready.wait(LONGEST_WAIT)
         self._ready.clear()
-        return self._worker.latest()
+        for c, worker in enumerate(self._workers):
+            frame = worker.latest()
+            if frame is None:
+                continue
+            self._pairs.note(c, frame)
+            image = self._look(frame, self._aim, c)
+            if c == 0:
+                self._notice(image)
+                self._hand_over(frame, image.sighting, None)
+            self._listener.on_image(image)
 
-    def _take(self, frame: Frame, setup: SwingSetup | None) -> None:
-        wanted = setup or self._aim
-        if wanted is not self._wanted:
-            self._wanted, self._last = wanted, None
-        image = self._look(frame, wanted)
-        self._notice(image)
-        caps = self._worker.caps
+    def _take_next(self, captured: SwingSetup | Aim | None) -> None:
+        """Look at the next image, of two cameras at those of the next moment."""
+        wanted = captured or self._aim
+        frame = self._next_frame()
+        if frame is None:
+            return
+        frames = (frame, *frame.others)[: len(wanted.aims)]
+        images = [self._look(each, wanted, c) for c, each in enumerate(frames)]
+        self._notice(images[0])
+        sightings = [i.sighting for i in images if i.sighting is not None]
+        sighting = None
+        if len(sightings) == len(images):
+            sighting = replace(sightings[0], others=tuple(sightings[1:]))
+        if self._verifier is not None and isinstance(captured, Aim):
+            self._verifier.take(frame, sighting, captured)
+        elif not isinstance(captured, Aim):
+            self._hand_over(frame, sighting, captured)
+        for image in images:
+            self._listener.on_image(image)
+
+    def _next_frame(self) -> Frame | None:
+        """Return the next image, with that of the other camera at its moment."""
+        try:
+            if len(self._workers) == 1:
+                return self._workers[0].next_frame(LONGEST_WAIT)
+            return self._next_pair()
+        except FrameTimeout:
+            return None
+        except EndOfImages:
+            self._stopping.wait(LONGEST_WAIT)
+            return None
+
+    def _next_pair(self) -> Frame | None:
+        counts = {w.caps.n_images if w.caps else None for w in self._workers}
+        if len(counts) > 1 and None not in counts:
+            self._refuse_recordings()
+            return None
+        n_images = counts.pop() if len(counts) == 1 else None
+        wanted = self._pairs.wanted
+        try:
+            frame = self._workers[wanted].next_frame(LONGEST_WAIT)
+        except FrameTimeout:  # what the other has sent goes on, and finds no partner
+            wanted = 1 - wanted
+            frame = self._workers[wanted].next_frame(0.0)
+        return self._pairs.add(wanted, frame, n_images)
+
+    def _refuse_recordings(self) -> None:
+        """Tell once that two recordings are not of the same moments."""
+        if not self._has_refused:
+            self._has_refused = True
+            self._listener.on_camera(
+                Failed(
+                    LightpenError(
+                        sentence(
+                            "live.other-recording",
+                            "The recording of the second camera holds another number "
+                            "of images than that of the first. Choose two recordings "
+                            "of the same moments.",
+                        )
+                    )
+                ),
+                1,
+            )
+        self._stopping.wait(LONGEST_WAIT)
+
+    def _hand_over(
+        self, frame: Frame, sighting: Sighting | None, setup: SwingSetup | None
+    ) -> None:
+        caps = self._workers[0].caps
         n_images = None if caps is None else caps.n_images
-        stats = self._worker.stats
-        self._runner.take(frame, image.sighting, setup, n_images, stats)
-        self._listener.on_image(image)
+        self._runner.take(frame, sighting, setup, n_images, self.stats)
 
-    def _look(self, frame: Frame, wanted: Aim | SwingSetup) -> LiveImage:
-        camera, pen, mask = wanted.camera, wanted.pen, wanted.mask
+    def _look(self, frame: Frame, wanted: Aim | SwingSetup, c: int) -> LiveImage:
+        if wanted is not self._wanted:
+            self._wanted = wanted
+            self._last.clear()
+        aim = wanted.aims[c]
+        camera, pen, mask = aim.camera, aim.pen, aim.mask
         if camera is None or pen is None or not camera.fits(frame.image):
             try:
                 spots = detect_spots(frame.image, mask, full_scale=frame.full_scale)
-                return LiveImage(frame, spots, None)
+                return LiveImage(frame, spots, None, c)
             except MISHAPS:
-                return LiveImage(frame, Spots.none(), None)
-        sighting = look(*(frame.image, camera, pen, mask, self._last, frame.full_scale))
-        self._last = sighting
+                return LiveImage(frame, Spots.none(), None, c)
+        sighting = look(
+            *(frame.image, camera, pen, mask, self._last.get(c), frame.full_scale),
+            is_followed=isinstance(wanted, SwingSetup),
+        )
+        self._last[c] = sighting
         spots = Spots.none() if sighting.spots is None else sighting.spots
-        return LiveImage(frame, spots, sighting)
+        return LiveImage(frame, spots, sighting, c)
 
-    def _on_event(self, event: WorkerEvent) -> None:
+    def _on_event(self, c: int, event: WorkerEvent) -> None:
         if isinstance(event, FrameReady):
             self._ready.set()
         else:
-            self._listener.on_camera(event)
+            self._listener.on_camera(event, c)

@@ -1,6 +1,6 @@
 """The cameras that stand for the choice of a source."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -16,12 +16,16 @@ from lightpen.formats.opened_files import (
     PenFile,
     open_files,
 )
+from lightpen.formats.rig_files import read_rig
 from lightpen.formats.simulated_files import is_simulated, mark_simulated
 from lightpen.local_time import local_now
 from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.sample_rigs import beside
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import SourceChoice
+
+SECOND_SERIAL = "SIM-2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +54,17 @@ def sample_files(around: Surroundings, folder: Path) -> OpenedFiles:
         They cannot be written.
     """
     files = write_sample_files(around.scene, folder)
-    return OpenedFiles(CameraFile.read(files.camera), PenFile.read(files.pen))
+    return OpenedFiles(
+        CameraFile.read(files.camera), PenFile.read(files.pen), read_rig(files.rig)
+    )
 
 
 def files_of_before(
-    samples: Path, camera_path: Path | None, pen_path: Path | None, units: str | None
+    samples: Path,
+    camera_path: Path | None,
+    pen_path: Path | None,
+    units: str | None,
+    rig_path: Path | None = None,
 ) -> OpenedFiles:
     """Read the files that a station had in use.
 
@@ -66,7 +76,7 @@ def files_of_before(
     if samples.is_dir() and not is_simulated(samples):
         with suppress(FileError):  # where nothing can be written, nothing is accepted
             mark_simulated(samples)
-    return open_files(camera_path, pen_path, units)
+    return open_files(camera_path, pen_path, units, rig_path)
 
 
 def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
@@ -75,3 +85,25 @@ def camera_of(choice: SourceChoice, around: Surroundings) -> ImageCamera:
     if camera is None:
         return SimulatedCamera(around.scene, around.clock)
     return camera(SourcePlace(choice.place, choice.producer), around.clock)
+
+
+def cameras_of(
+    choices: Sequence[SourceChoice], around: Surroundings
+) -> tuple[ImageCamera, ...]:
+    """Return the cameras of one or two sources, not yet opened.
+
+    Two simulated ones see the same pen.
+    """
+    first, *others = (camera_of(choice, around) for choice in choices)
+    if not isinstance(first, SimulatedCamera):
+        return (first, *others)
+    scene = around.scene
+    rig = beside(scene.camera, scene.cone_cam)
+    return first, *(
+        SimulatedCamera(
+            *(scene, around.clock, first.operator), serial=SECOND_SERIAL, rig=rig
+        )
+        if isinstance(other, SimulatedCamera)
+        else other
+        for other in others
+    )

@@ -18,7 +18,7 @@ References
    description".
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from typing import NamedTuple
 
@@ -29,7 +29,9 @@ from lightpen.errors import CalibrationError
 from lightpen.sentences import sentence
 
 UNDISTORT_STEPS = 20
-UNDISTORT_TOLERANCE = 1e-12  # normalised units: 1e-8 px at any sensible focal length
+# Of a step of Newton's method, in normalised units: what is left is about its square,
+# less than 1e-8 px at any sensible focal length.
+UNDISTORT_TOLERANCE = 1e-7
 
 
 class PointMap(NamedTuple):
@@ -101,6 +103,11 @@ class Camera:
     def intrinsics(self) -> FloatArray:
         """``fx fy cx cy`` followed by the distortion coefficients."""
         return np.concatenate([[self.fx, self.fy, self.cx, self.cy], self.distortion])
+
+    def with_intrinsics(self, values: FloatArray) -> "Camera":
+        """Return the camera with other `intrinsics`, of as many coefficients."""
+        fx, fy, cx, cy = values[:4].tolist()
+        return replace(self, fx=fx, fy=fy, cx=cx, cy=cy, distortion=values[4:])
 
     def project(self, points_cam: FloatArray) -> FloatArray:
         """Return the pixels of points in the camera frame.

@@ -7,7 +7,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.pen_files import LARGEST_DIAMETER, NORMAL_TOLERANCE
+from lightpen.formats.pen_content import LARGEST_DIAMETER, NORMAL_TOLERANCE
 from lightpen.formats.tables import number_flaw
 from lightpen.model.pen import Pen
 from lightpen.pen_check.frame import FrameCheck, examine_frame, moved_into_frame

@@ -6,7 +6,9 @@ the two leaves nothing undecided: the tip is in force, and whoever finds the swi
 without its verdict next concludes it.
 
 The grade decides how: a tip that passes is accepted as it is, one that is to be checked
-only with a reason, which is stored, and one that is to be repeated not at all.
+only with a reason, which is stored, and one that is to be repeated not at all. Where a
+supervisor has laid down a password, one beyond the limit of U is accepted by a
+supervisor only.
 """
 
 from contextlib import suppress
@@ -17,6 +19,7 @@ from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.report import calibration_record
 from lightpen.estimation.verdict import Grade, Verdict
 from lightpen.formats.files import printable
+from lightpen.messages import Code
 from lightpen.record.archive import Archive
 from lightpen.record.assessment import Assessment, assess
 from lightpen.record.reading import (
@@ -28,13 +31,24 @@ from lightpen.record.reading import (
 )
 from lightpen.record.results import Result, Since, Why
 from lightpen.record.solving import Solution, record_inputs
+from lightpen.record.supervision import (
+    Signature,
+    Supervision,
+    require_supervisor,
+)
 from lightpen.record.unfinished import Unfinished
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
 
+BEYOND_LIMIT = {Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED}
+
 
 def accept(
-    archive: Archive, solution: Solution, now: datetime, reason: str = ""
+    archive: Archive,
+    solution: Solution,
+    now: datetime,
+    reason: str = "",
+    signature: Signature | None = None,
 ) -> Result:
     """Put the tip of a recorded swing in force, and conclude the swing.
 
@@ -50,11 +64,14 @@ def accept(
         With its time zone.
     reason : str
         Why it is accepted though it is to be checked.
+    signature : Signature, optional
+        Of a supervisor, where it takes one.
 
     Raises
     ------
     AcceptanceError
-        The tip is to be repeated, or to be checked and there is no reason.
+        The tip is to be repeated, or to be checked and there is no reason, or no
+        supervisor where it takes one.
     FileError
         Another program writes to the record, it has changed since it was solved, or the
         result cannot be stored; what was in force before stays so.
@@ -66,7 +83,11 @@ def accept(
         if result is None:
             assessment = assess(archive, record, solution)
             _require_acceptable(assessment.verdict, reason)
-            result = _result(record, solution, assessment, now, reason.strip())
+            supervisor = _supervisor(archive.supervision(), assessment, signature)
+            result = replace(
+                _result(record, solution, assessment, now, reason.strip()),
+                supervisor=supervisor,
+            )
             archive.store(result)
         _conclude(writer, record, result)
     return result
@@ -89,6 +110,32 @@ def conclude_accepted(archive: Archive, found: Unfinished) -> Unfinished:
         with suppress(FileError), RecordWriter.resume(record) as writer:
             _conclude(writer, record, result)
     return replace(found, interrupted=tuple(interrupted))
+
+
+def takes_supervisor(supervision: Supervision, assessment: Assessment) -> bool:
+    """Return whether only a supervisor can accept a tip: it is beyond the limit."""
+    told = assessment.verdict.reason, *assessment.doubts
+    is_beyond = any(each.code in BEYOND_LIMIT for each in told)
+    return supervision.is_guarded and is_beyond
+
+
+def _supervisor(
+    supervision: Supervision, assessment: Assessment, signature: Signature | None
+) -> str:
+    """Return the supervisor who accepts a tip; empty where it takes none."""
+    if not takes_supervisor(supervision, assessment):
+        return ""
+    if signature is None:
+        raise AcceptanceError(
+            sentence(
+                "acceptance.no-supervisor",
+                "The tip is beyond the limit of this station. {why} Only a supervisor "
+                "can accept it, with a reason.",
+                why=assessment.verdict.reason,
+            )
+        )
+    require_supervisor(supervision, signature)
+    return signature.name.strip()
 
 
 def _require_acceptable(verdict: Verdict, reason: str) -> None:
@@ -121,11 +168,7 @@ def _result(
 ) -> Result:
     last, change, since = assessment.last, assessment.change, None
     if last is not None and change is not None:
-        since = Since(
-            last.accepted,
-            tuple(change.difference.tolist()),
-            tuple(change.expanded_uncertainty.tolist()),
-        )
+        since = Since.of(last.accepted, change)
     return Result(
         names=recorded_names(record),
         accepted=now,

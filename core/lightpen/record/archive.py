@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 from lightpen.record.results import Result
+from lightpen.record.supervision import Supervision
 
 
 class Archive(Protocol):
@@ -70,6 +71,15 @@ class Archive(Protocol):
         ------
         FileError
             The archive cannot be read at all.
+        """
+
+    def supervision(self) -> Supervision:
+        """Return what supervisors have laid down for what it keeps.
+
+        Raises
+        ------
+        FileError
+            It cannot be read, or was changed.
         """
 
     def of_record(self, folder: Path) -> Result | None:

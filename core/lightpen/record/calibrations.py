@@ -4,6 +4,7 @@ Both hold the same record of the calibration, and tell when they were changed si
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -205,15 +206,47 @@ def read_calibration(path: Path) -> CalibrationFile:
         return _calibration(
             path, result.calibration, names.pen, names.tip, when, is_checked=True
         )
+    tree, is_checked = record_tree(data, path)
+    return _calibration(path, tree, "", "", None, is_checked=is_checked)
+
+
+def read_record(path: Path) -> Mapping[str, Any]:
+    """Read the record of a calibration as it was written.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is not as it was written.
+    """
+    data = read_bytes(path, WHAT, LIMIT)
+    if has_head(data):
+        return parse_result(data, path, Path).calibration
+    return record_tree(data, path)[0]
+
+
+def record_tree(data: bytes, path: Path) -> tuple[dict[str, Any], bool]:
+    """Return the record in a file, and whether a change would have been noticed.
+
+    Parameters
+    ----------
+    path : Path
+        For the sentence.
+
+    Raises
+    ------
+    FileError
+        It is not as it was written.
+    UsageError
+        It is no record.
+    """
     try:
         is_checked = has_checksum(data)
     except DamagedError as error:
         raise _changed(path) from error
     try:
-        tree = parse_json(data, dict[str, Any])
+        return parse_json(data, dict[str, Any]), is_checked
     except DamagedError as error:
         raise _changed(path) if is_checked else _other(path) from error
-    return _calibration(path, tree, "", "", None, is_checked=is_checked)
 
 
 def _calibration(

@@ -1,12 +1,11 @@
 """The archive as a folder: one file a result, beside the records of the swings.
 
-A file is written once and never changed. Its name is a number, one higher than that of
-any before: the order of acceptance, which no clock that was set back can turn round. Of
-two programs that take the same number one gets it, and the other the next. Where its
-swing is recorded is written as a path from the data folder, so that the whole of it can
-be moved, or copied to another machine. Results of simulated pens are in a folder of
-their own; those of earlier versions stand among the others, and are told by the swing
-that they come from. One whose swing is gone counts as real, and says nothing of it.
+A file is written once and never changed. Its name is a number: the order of acceptance.
+Where its swing is recorded is written as a path from the data folder, so that the whole
+of it can be moved, or copied to another machine. Results of simulated pens are in a
+folder of their own; those of earlier versions stand among the others, and are told by
+the swing that they come from. One whose swing is gone counts as real, and says nothing
+of it.
 """
 
 import os
@@ -14,31 +13,25 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
-from itertools import count
 from pathlib import Path, PureWindowsPath
 
-from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import (
-    FOLDER,
-    MEGABYTE,
-    create_whole,
-    printable,
-    read_bytes,
-    strerror,
-    sync_folder,
-    unreadable,
-)
+from lightpen.errors import FileError
+from lightpen.formats.files import MEGABYTE, printable, read_bytes, unreadable
 from lightpen.model.origin import Origin
+from lightpen.record.numbered_files import add_numbered, numbered_files
 from lightpen.record.reading import open_record, recorded_origin
 from lightpen.record.results import (
     Heading,
     Result,
+    Withdrawal,
     has_head,
     parse_heading,
     parse_result,
+    parse_withdrawal,
     result_bytes,
     withdrawal_bytes,
 )
+from lightpen.record.supervision import Supervision, read_supervision
 from lightpen.sentences import sentence
 
 RECORDS, RESULTS = "records", "results"
@@ -70,13 +63,14 @@ class FolderArchive:
 
     def store(self, result: Result) -> None:
         """Put a result in force; see `lightpen.record.archive.Archive`."""
-        data = result_bytes(result, self._place_of(result.record))
-        self._add(self._root(result.is_simulated), data)
+        data = result_bytes(result, self.place_of(result.record))
+        add_numbered(self._root(result.is_simulated), data)
 
     def take_back(self, result: Result, operator: str, now: datetime) -> None:
         """Let the result before be in force; see `lightpen.record.archive.Archive`."""
         names = result.names
-        file = self._newest(names.pen, names.tip, result.is_simulated)
+        is_simulated = result.is_simulated
+        file = self.file_in_force(names.pen, names.tip, is_simulated=is_simulated)
         if file is None or not _is_same(self.read(file), result):
             raise FileError(
                 sentence(
@@ -87,14 +81,27 @@ class FolderArchive:
                     pen=names.pen,
                 )
             )
-        self._add(file.parent, withdrawal_bytes(result, file.stem, operator, now))
+        add_numbered(file.parent, withdrawal_bytes(result, file.stem, operator, now))
 
     def in_force(
         self, pen: str, tip: str, *, is_simulated: bool = False
     ) -> Result | None:
         """Return the last accepted result of a pen and a tip, or None."""
-        file = self._newest(pen, tip, is_simulated)
+        file = self.file_in_force(pen, tip, is_simulated=is_simulated)
         return None if file is None else self.read(file)
+
+    def file_in_force(
+        self, pen: str, tip: str, *, is_simulated: bool = False
+    ) -> Path | None:
+        """Return the file of what `in_force` returns."""
+        for root in self._roots(is_simulated):
+            # Damage among the results of real pens is no matter to a simulated one.
+            passes = is_simulated and root == self.folder
+            for file, heading in self._standing(root, passes_over_damage=passes):
+                is_named = heading.pen in (pen, None) and heading.tip in (tip, None)
+                if is_named and self._is_simulated(heading) is is_simulated:
+                    return file
+        return None
 
     def tips(self, pen: str, *, is_simulated: bool = False) -> tuple[str, ...]:
         """Return the tips of a pen that have a result in force, the newest first."""
@@ -106,6 +113,10 @@ class FolderArchive:
         ]
         return tuple(filter(None, dict.fromkeys(found)))
 
+    def supervision(self) -> Supervision:
+        """Return what supervisors have laid down."""
+        return read_supervision(self._data)
+
     def of_record(self, folder: Path) -> Result | None:
         """Return the last accepted result of the swing in a folder, or None."""
         for root in self._roots(is_simulated=True):
@@ -116,23 +127,66 @@ class FolderArchive:
                         return self.read(file)
         return None
 
+    def all_files(self) -> tuple[Path, ...]:
+        """Return the files of all results and takings back, the oldest first.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        roots = reversed(self._roots(is_simulated=True))
+        return tuple(file for root in roots for file in reversed(numbered_files(root)))
+
+    def content(self, file: Path) -> Result | Withdrawal:
+        """Return what one of `all_files` holds.
+
+        Raises
+        ------
+        FileError
+            It cannot be read, or is damaged.
+        """
+        if _read_heading(file).takes_back is None:
+            return self.read(file)
+        return parse_withdrawal(read_bytes(file, WHAT, LIMIT), file)
+
+    def place_of(self, path: Path) -> str:
+        """Return where a file or folder is, from the data folder if it is in there."""
+        absolute = path.absolute()
+        inside = absolute.is_relative_to(self._data)
+        return (absolute.relative_to(self._data) if inside else absolute).as_posix()
+
+    def file_of(self, result: Result) -> Path:
+        """Return the file of a result that is not taken back.
+
+        Raises
+        ------
+        FileError
+            There is none any more.
+        """
+        place = self.place_of(result.record)
+        for root in self._roots(result.is_simulated):
+            for file, heading in self._standing(root, passes_over_damage=True):
+                if heading.record == place and _is_same(self.read(file), result):
+                    return file
+        names = result.names
+        raise FileError(
+            sentence(
+                "results.gone",
+                "The file of the result of tip {tip}, pen {pen}, is not in {folder} "
+                "any more. Restore it from a copy.",
+                tip=names.tip,
+                pen=names.pen,
+                folder=printable(str(self._root(result.is_simulated))),
+            )
+        )
+
     def _root(self, is_simulated: bool) -> Path:
         return (self._data / SIMULATED if is_simulated else self._data) / RESULTS
 
     def _roots(self, is_simulated: bool) -> tuple[Path, ...]:
         """Return where such results may be, the newer ones first."""
         return (self._root(True), self.folder) if is_simulated else (self.folder,)
-
-    def _newest(self, pen: str, tip: str, is_simulated: bool) -> Path | None:
-        """Return the file of the result in force."""
-        for root in self._roots(is_simulated):
-            # Damage among the results of real pens is no matter to a simulated one.
-            passes = is_simulated and root == self.folder
-            for file, heading in self._standing(root, passes_over_damage=passes):
-                is_named = heading.pen in (pen, None) and heading.tip in (tip, None)
-                if is_named and self._is_simulated(heading) is is_simulated:
-                    return file
-        return None
 
     def _is_simulated(self, heading: Heading) -> bool:
         origin = heading.origin
@@ -151,7 +205,7 @@ class FolderArchive:
     ) -> Iterator[tuple[Path, Heading]]:
         """Yield the results that are not taken back, the newest first."""
         taken_back = set[str]()
-        for file in self._files(root):
+        for file in numbered_files(root):
             try:
                 heading = _read_heading(file)
             except FileError:
@@ -162,37 +216,6 @@ class FolderArchive:
                 taken_back.add(heading.takes_back)
             elif file.stem not in taken_back:
                 yield file, heading
-
-    def _add(self, root: Path, data: bytes) -> None:
-        """Add a file, the newest of all."""
-        try:
-            root.mkdir(parents=True, exist_ok=True)
-            sync_folder(root.parent)
-        except OSError as error:
-            raise FileError(
-                sentence(
-                    "results.no-folder",
-                    "The folder {folder} cannot be made: {reason}. Make sure that it "
-                    "is yours to write.",
-                    folder=printable(str(root)),
-                    reason=strerror(error),
-                )
-            ) from error
-        newest = self._files(root)[:1]
-        number = 1 + (_number(newest[0]) if newest else 0)
-        for free in count(number):
-            with suppress(NameTakenError):  # by another program, just now
-                create_whole(root / f"{free:06d}.json", data)
-                return
-
-    def _files(self, root: Path) -> list[Path]:
-        """Return the files of results, the newest first; others are left alone."""
-        try:
-            paths = list(root.iterdir()) if root.is_dir() else []
-        except OSError as error:
-            raise unreadable(root, FOLDER, error) from error
-        files = [path for path in paths if path.suffix == ".json" and _number(path)]
-        return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
 
     def read(self, file: Path) -> Result:
         """Return the result in a file of the archive.
@@ -206,12 +229,6 @@ class FolderArchive:
         if result.origin is not None:
             return result
         return replace(result, origin=self._origin_of_swing(result.record))
-
-    def _place_of(self, record: Path) -> str:
-        """Return where a record is, from the data folder if it is in there."""
-        folder = record.absolute()
-        inside = folder.is_relative_to(self._data)
-        return (folder.relative_to(self._data) if inside else folder).as_posix()
 
     def _located(self, place: str) -> Path:
         """Return the folder of a record by what is written."""
@@ -227,12 +244,6 @@ class FolderArchive:
 def _is_same(one: Result, other: Result) -> bool:
     """Return whether two results are of the same acceptance."""
     return (one.accepted, one.record) == (other.accepted, other.record)
-
-
-def _number(file: Path) -> int:
-    """Return the place of a file in the order of acceptance; 0 for a foreign file."""
-    digits = file.stem.partition("_")[0]  # what follows were date and time of format 2
-    return int(digits) if digits.isdecimal() else 0
 
 
 def _read_heading(file: Path) -> Heading:

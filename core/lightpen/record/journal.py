@@ -36,7 +36,7 @@ Count: TypeAlias = Annotated[int, Meta(ge=0, le=10**9)]
 Row: TypeAlias = tuple[Entry, Entry, Entry]
 
 
-class CameraCounts(Struct):
+class CameraCounts(Struct, omit_defaults=True):
     """What became of the camera's images; see `lightpen.cameras.protocol.Stats`."""
 
     delivered: Count
@@ -44,9 +44,18 @@ class CameraCounts(Struct):
     missed: Count
     skipped: Count
     timeouts: Count
+    unpaired: Count = 0
 
 
-class ImageLine(Struct, tag_field="kind", tag="image"):
+class OtherImage(Struct):
+    """The image of another camera of a rig at that moment."""
+
+    sha256: Digest
+    device_time_ns: int | None
+    pixels: tuple[tuple[Length, Length] | None, ...]
+
+
+class ImageLine(Struct, tag_field="kind", tag="image", omit_defaults=True):
     """An image was acknowledged; see `lightpen.record.reading.RecordedImage`."""
 
     number: Number
@@ -57,6 +66,7 @@ class ImageLine(Struct, tag_field="kind", tag="image"):
     rotation: tuple[Row, Row, Row]
     translation: Vector
     camera: CameraCounts | None = None  # since the swing began
+    others: tuple[OtherImage, ...] = ()
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):
@@ -100,6 +110,17 @@ def line_bytes(line: Line) -> bytes:
     return with_checksum(text.encode()) + b"\n"
 
 
+def journal_bytes(folder: Path) -> bytes:
+    """Return the journal of a record as it is on the disk.
+
+    Raises
+    ------
+    FileError
+        There is no journal, or it cannot be read.
+    """
+    return read_bytes(folder / JOURNAL, sentence("file.journal", "journal"), LIMIT)
+
+
 def read_lines(folder: Path) -> list[bytes]:
     """Return the lines of the journal in a folder, without their ends.
 
@@ -113,7 +134,7 @@ def read_lines(folder: Path) -> list[bytes]:
     path = folder / JOURNAL
     if path.is_file() and path.stat().st_size == 0:
         return []
-    data = read_bytes(path, sentence("file.journal", "journal"), LIMIT)
+    data = journal_bytes(folder)
     *lines, rest = data.split(b"\n")
     if lines and (ZEROS in lines[-1] or lines[-1].startswith(b"\0")):
         lines.pop()
@@ -170,11 +191,11 @@ def sound_length(folder: Path) -> int:
     return min(length, (folder / JOURNAL).stat().st_size)
 
 
-def ends_in_verdict(folder: Path) -> bool:
-    """Return whether the end of the journal shows a verdict that no image follows.
+def last_verdict(folder: Path) -> str | None:
+    """Return the verdict at the end of the journal that no image follows.
 
     No more is read than its last lines, so that thousands of concluded records cost
-    little. That no verdict is seen there does not mean that there is none.
+    little. That none is seen there does not mean that there is none.
 
     Raises
     ------
@@ -183,7 +204,7 @@ def ends_in_verdict(folder: Path) -> bool:
     """
     path = folder / JOURNAL
     if path.exists() and not path.is_file():  # a pipe would never be read to its end
-        return False
+        return None
     with path.open("rb") as journal:
         length = journal.seek(0, os.SEEK_END)
         journal.seek(max(0, length - TAIL))
@@ -192,15 +213,18 @@ def ends_in_verdict(folder: Path) -> bool:
         try:
             last = _parse_line(line, has_checksum_always=False)
         except DamagedError:  # torn, or cut by the limit, too
-            return False
-        if isinstance(last, ImageLine | VerdictLine):
-            return isinstance(last, VerdictLine)
-    return False
+            return None
+        if isinstance(last, VerdictLine):
+            return last.verdict
+        if isinstance(last, ImageLine):
+            return None
+    return None
 
 
 def _parse_line(line: bytes, has_checksum_always: bool) -> Line:
     if not has_checksum(line) and has_checksum_always:
         raise DamagedError("There is no checksum.")
+    # A union of classes is a type, but no class.
     parsed: Line = parse_json(line, Line)  # type: ignore[arg-type]
     return parsed
 

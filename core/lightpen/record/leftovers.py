@@ -7,7 +7,7 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.folder_archive import RECORDS, RESULTS
-from lightpen.record.journal import JOURNAL, ends_in_verdict
+from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked
 from lightpen.record.reading import HEADER, IMAGES, OPENER
 
@@ -28,7 +28,7 @@ def sweep_leftovers(data: Path) -> None:
 
 def _sweep_record(folder: Path) -> None:
     with suppress(FileNotFoundError):
-        if ends_in_verdict(folder):
+        if last_verdict(folder) is not None:
             return
     is_fresh = time.time() - folder.stat().st_mtime < OLDEST
     sweep_parts(folder)

@@ -30,8 +30,8 @@ def swing_folder(path: Path) -> Path:
     for folder in (place, place.parent):
         if is_record(folder):
             return folder
-    if place.parent.name == RESULTS and place.suffix == ".json":
-        data = place.parents[2 if place.parents[1].name == SIMULATED else 1]
+    data = data_folder_of(place)
+    if data is not None:
         recorded = FolderArchive(data).read(place).record
         if is_record(recorded):
             return recorded
@@ -52,3 +52,11 @@ def swing_folder(path: Path) -> Path:
             path=printable(str(path)),
         )
     )
+
+
+def data_folder_of(result: Path) -> Path | None:
+    """Return the data folder that a file is a result of; None if it is in none."""
+    place = result.absolute()
+    if place.parent.name != RESULTS or place.suffix != ".json":
+        return None
+    return place.parents[2 if place.parents[1].name == SIMULATED else 1]

@@ -6,8 +6,11 @@ A record is a folder:
 ``header.json``      who, where, with what; written last when the record is made, so
                      that a folder without it is no record
 ``camera.*``         copy of the camera file, byte by byte
+``camera-2.*``       and of those of the other cameras of a rig
+``rig.*``            copy of the rig file, where there is one
 ``pen.*``            copy of the pen file
 ``images/*.png``     the kept images, lossless, numbered from 1
+``images-2/*.png``   those of the same moments by the second camera
 ``journal.jsonl``    what happened, see `lightpen.record.journal`
 ``swing.lightpen``   opens the swing in the program; holds nothing that is needed
 ==================== ===================================================================
@@ -52,11 +55,13 @@ from lightpen.formats.own_json import (
     require_usual,
 )
 from lightpen.formats.pen_files import PEN_FILE, read_pen
+from lightpen.formats.rig_files import RIG_FILE, read_rig
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
 from lightpen.record.assumed import Plain, recorded_assumptions
 from lightpen.record.journal import (
     JOURNAL,
@@ -64,6 +69,7 @@ from lightpen.record.journal import (
     ImageLine,
     Line,
     MoreLine,
+    OtherImage,
     OutLine,
     TakenOutLine,
     VerdictLine,
@@ -78,9 +84,11 @@ from lightpen.sentences import Sentence, sentence
 HEADER, IMAGES = "header.json", "images"
 OPENER = "swing.lightpen"  # by its suffix the system knows the program
 FORMAT = 2
+RIG_FORMAT = 3  # which earlier versions would take for the first camera alone
 FIRST_WITH_CHECKSUMS = 2
 HEADER_LIMIT = MEGABYTE
 DISCARDED = "discarded"
+CAMERA_STEM, PEN_STEM, RIG_STEM = "camera", "pen", "rig"
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,25 @@ class FileCopy:
     def of(cls, path: Path, what: Sentence) -> Self:
         """Read a file; ``what`` it is, for the sentences."""
         return cls(path.name, read_bytes(path, what, 4 * MEGABYTE))
+
+
+@dataclass(frozen=True, eq=False)
+class RigCopies:
+    """What a record keeps of a rig besides its first camera.
+
+    Attributes
+    ----------
+    file : FileCopy
+        Of the rig.
+    cameras : tuple of FileCopy
+        The files of the other cameras.
+    masks : tuple of (M, 3) array
+        Stray light in the images of each of them, px.
+    """
+
+    file: FileCopy
+    cameras: tuple[FileCopy, ...]
+    masks: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +143,8 @@ class Header:
         Circles of stray light: centre x, y and radius, px.
     settings : mapping
         What else the program wants to keep: exposure, limits, camera serial.
+    rig : RigCopies or None
+        Of a swing before several cameras.
     """
 
     camera: FileCopy
@@ -131,6 +160,12 @@ class Header:
     nominal_tip: FloatArray | None = None
     mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     settings: Mapping[str, Plain] = field(default_factory=dict)
+    rig: RigCopies | None = None
+
+    @property
+    def n_cameras(self) -> int:
+        """Number of cameras."""
+        return 1 if self.rig is None else 1 + len(self.rig.cameras)
 
 
 class FileEntry(Struct):
@@ -143,11 +178,23 @@ class FileEntry(Struct):
         require_path(self.name)
 
 
+class RigEntries(Struct):
+    """See `RigCopies`."""
+
+    rig_file: FileEntry
+    camera_files: tuple[FileEntry, ...]
+    masks_px: tuple[tuple[Vector, ...], ...]
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.camera_files) == len(self.masks_px):
+            raise ValueError("Each of the other cameras has a file and a mask.")
+
+
 class _Format(Struct):
     format: Annotated[int, Meta(ge=1)]
 
 
-class HeaderEntries(Struct):
+class HeaderEntries(Struct, omit_defaults=True):
     """The header as it is written; see `Header`."""
 
     format: int
@@ -164,6 +211,7 @@ class HeaderEntries(Struct):
     nominal_tip_mm: Vector | None
     mask_px: tuple[Vector, ...]
     settings: dict[str, Plain]
+    rig: RigEntries | None = None
 
     def __post_init__(self) -> None:
         require_usual(self.created)
@@ -187,6 +235,8 @@ class RecordedImage:
         cam_from_pen, mm.
     stats : Stats
         What became of the camera's images since the swing began.
+    others : tuple of OtherImage
+        Of the other cameras of a rig at this moment.
     """
 
     number: int
@@ -198,6 +248,12 @@ class RecordedImage:
     rotation: FloatArray
     translation: FloatArray
     stats: Stats = field(default_factory=Stats)
+    others: tuple[OtherImage, ...] = ()
+
+    @property
+    def rig_pixels(self) -> FloatArray:
+        """Centres by all cameras, (C, L, 2), px; NaN where an LED was not seen."""
+        return np.stack([self.pixels, *(_points(each.pixels) for each in self.others)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,23 +319,34 @@ class RecordSource:
     images : ImageSource
         All images, in the order of capture; a damaged one raises `FileError` when
         loaded.
-    mask : (M, 3) array
-        Circles of stray light: centre x, y and radius, px.
+    rig : Rig or None
+        Of several cameras.
+    other_images : tuple of ImageSource
+        Of the other cameras of a rig, of the same moments.
+    masks : tuple of (M, 3) array
+        Circles of stray light before each camera: centre x, y and radius, px.
     assumptions : Assumptions
         What stands in for what the files do not state.
     origin : Origin or None
         What the images are of; None where the record does not say.
+    units, led_diameter
+        As of `Header`.
     """
 
     folder: Path
     images: ImageSource
     camera: Camera
     pen: Pen
-    mask: FloatArray
-    camera_file: Path
+    masks: tuple[FloatArray, ...]
+    camera_files: tuple[Path, ...]
     pen_file: Path
     assumptions: Assumptions = USUAL
     origin: Origin | None = None
+    units: str | None = None
+    led_diameter: float | None = None
+    rig: Rig | None = None
+    rig_file: Path | None = None
+    other_images: tuple[ImageSource, ...] = ()
 
 
 def open_record(folder: Path) -> Record:
@@ -299,7 +366,10 @@ def open_record(folder: Path) -> Record:
     last = 0
     for number, line in enumerate(parsed, start=1):
         if isinstance(line, ImageLine):
-            if line.number <= last or len(line.pixels) != _n_leds(parsed):
+            others = (len(other.pixels) for other in line.others)
+            n_seen = [len(line.pixels), *others]
+            is_whole = n_seen == header.n_cameras * [_n_leds(parsed)]
+            if line.number <= last or not is_whole:
                 raise damaged_line(folder, number)
             last = line.number
     return _record(folder, header, parsed, length_of(lines))
@@ -337,11 +407,12 @@ def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) ->
 def record_files(record: Record) -> tuple[Path, ...]:
     """Return all files that a record consists of."""
     header = record.header
-    names = (
-        *(HEADER, JOURNAL, OPENER),
-        *(copy_name("camera", header.camera), copy_name("pen", header.pen)),
+    names = (HEADER, JOURNAL, OPENER, *header_copies(header))
+    images = (
+        record.folder / image_name(image.number, c)
+        for image in record.images
+        for c in range(header.n_cameras)
     )
-    images = (image.file for image in record.images)
     return (*(record.folder / name for name in names), *images)
 
 
@@ -376,8 +447,13 @@ def unacknowledged_images(record: Record) -> tuple[str, ...]:
     tuple of str
         Files, from the folder of the record, in their order.
     """
-    known = {image_name(image.number) for image in record.images}
-    found = (f"{IMAGES}/{path.name}" for path in (record.folder / IMAGES).glob("*.png"))
+    cameras = range(record.header.n_cameras)
+    known = {image_name(image.number, c) for image in record.images for c in cameras}
+    found = (
+        f"{images_folder(c)}/{path.name}"
+        for c in cameras
+        for path in (record.folder / images_folder(c)).glob("*.png")
+    )
     return tuple(sorted(set(found) - known))
 
 
@@ -390,64 +466,117 @@ def source(record: Record) -> RecordSource:
         The copy of the camera or pen file cannot be read.
     """
     header = record.header
-    camera_file = record.folder / copy_name("camera", header.camera)
-    pen_file = record.folder / copy_name("pen", header.pen)
+    camera_file = record.folder / copy_name(CAMERA_STEM, header.camera)
+    pen_file = record.folder / copy_name(PEN_STEM, header.pen)
 
-    def loaders() -> Iterator[Callable[[], Image]]:
-        for image in record.images:
-            yield partial(_load, image)
-
-    files = tuple(image.file for image in record.images)
+    rig_file, rig = None, None
+    masks: tuple[FloatArray, ...] = (header.mask,)
+    camera_files: tuple[Path, ...] = (camera_file,)
+    if header.rig is not None:
+        rig_file = record.folder / copy_name(RIG_STEM, header.rig.file)
+        camera_files += tuple(
+            record.folder / copy_name(camera_stem(c), file)
+            for c, file in enumerate(header.rig.cameras, start=1)
+        )
+        rig = read_rig(rig_file, camera_files).rig
+        masks += header.rig.masks
+    images = [_images_of(record, c) for c in range(len(camera_files))]
     return RecordSource(
         folder=record.folder,
-        images=ImageSource(tuple(file.name for file in files), files, loaders),
-        camera=read_camera(camera_file),
+        images=images[0],
+        camera=read_camera(camera_file) if rig is None else rig.cameras[0],
         pen=read_pen(pen_file, header.units, header.led_diameter, header.nominal_tip),
-        mask=header.mask,
-        camera_file=camera_file,
+        masks=masks,
+        camera_files=camera_files,
         pen_file=pen_file,
         assumptions=recorded_assumptions(header.settings),
         origin=recorded_origin(record),
+        units=header.units,
+        led_diameter=header.led_diameter,
+        rig=rig,
+        rig_file=rig_file,
+        other_images=tuple(images[1:]),
     )
 
 
-def _load(image: RecordedImage) -> Image:
-    data = read_bytes(image.file, IMAGE_FILE, MAX_FILE_SIZE)
-    if sha256(data).hexdigest() != image.sha256:
+def _images_of(record: Record, c: int) -> ImageSource:
+    """Return the images of the c-th camera."""
+    files = tuple(record.folder / image_name(i.number, c) for i in record.images)
+    hashes = [
+        image.sha256 if c == 0 else image.others[c - 1].sha256
+        for image in record.images
+    ]
+
+    def loaders() -> Iterator[Callable[[], Image]]:
+        for file, digest in zip(files, hashes, strict=True):
+            yield partial(_load, file, digest)
+
+    return ImageSource(tuple(file.name for file in files), files, loaders)
+
+
+def _load(file: Path, digest: str) -> Image:
+    data = read_bytes(file, IMAGE_FILE, MAX_FILE_SIZE)
+    if sha256(data).hexdigest() != digest:
         raise FileError(
             sentence(
                 "record.image-changed",
                 "{name} is not as it was recorded (wrong checksum). Restore it from "
                 "a copy.",
-                name=image.file.name,
+                name=file.name,
             )
         )
-    return decode_image(data, image.file.name)
+    return decode_image(data, file.name)
 
 
-def image_name(number: int) -> str:
-    """Return the file of an image, from the folder of its record."""
-    return f"{IMAGES}/{number:06d}.png"
+def images_folder(c: int) -> str:
+    """Return the folder of the images of the c-th camera, from that of its record."""
+    return IMAGES if c == 0 else f"{IMAGES}-{c + 1}"
 
 
-def copy_name(stem: str, file: FileCopy) -> str:
+def image_name(number: int, c: int = 0) -> str:
+    """Return the file of an image of the c-th camera, from the folder of its record."""
+    return f"{images_folder(c)}/{number:06d}.png"
+
+
+def camera_stem(c: int) -> str:
+    """Return what the copy of the file of the c-th camera is called."""
+    return CAMERA_STEM if c == 0 else f"{CAMERA_STEM}-{c + 1}"
+
+
+def header_copies(header: Header) -> Mapping[str, FileCopy]:
+    """Return the copies that a record keeps, by their files from its folder."""
+    by_stem = {CAMERA_STEM: header.camera, PEN_STEM: header.pen}
+    if header.rig is not None:
+        by_stem[RIG_STEM] = header.rig.file
+        for c, file in enumerate(header.rig.cameras, start=1):
+            by_stem[camera_stem(c)] = file
+    return {copy_name(stem, file): file for stem, file in by_stem.items()}
+
+
+def copy_name(stem: str, file: FileCopy | FileEntry) -> str:
     """Return the file of a copy, from the folder of its record."""
     return stem + Path(file.name).suffix.lower()
 
 
 def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
-    points = [(np.nan, np.nan) if p is None else p for p in line.pixels]
     return RecordedImage(
         number=line.number,
         file=folder / image_name(line.number),
         sha256=line.sha256,
         time=line.time,
         device_time_ns=line.device_time_ns,
-        pixels=np.array(points, dtype=np.float64).reshape(-1, 2),
+        pixels=_points(line.pixels),
         rotation=np.array(line.rotation, dtype=np.float64),
         translation=np.array(line.translation, dtype=np.float64),
         stats=Stats() if line.camera is None else Stats(**asdict(line.camera)),
+        others=line.others,
     )
+
+
+def _points(pixels: Sequence[tuple[float, float] | None]) -> FloatArray:
+    """Return LED centres (L, 2), px; NaN where an LED was not seen."""
+    points = [(np.nan, np.nan) if p is None else p for p in pixels]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
 def _read_header(folder: Path) -> HeaderEntries:
@@ -456,7 +585,7 @@ def _read_header(folder: Path) -> HeaderEntries:
     try:
         is_sound = has_checksum(data)
         number = parse_json(data, _Format).format
-        if number > FORMAT:
+        if number > RIG_FORMAT:
             raise _of_later_version(path, number)
         if number >= FIRST_WITH_CHECKSUMS and not is_sound:
             raise DamagedError("There is no checksum.")
@@ -469,8 +598,8 @@ def _header(folder: Path, entries: HeaderEntries) -> Header:
     """Return the header with the copies of the files that it names."""
     tip = entries.nominal_tip_mm
     return Header(
-        camera=_read_copy(folder, "camera", CAMERA_FILE, entries.camera_file),
-        pen=_read_copy(folder, "pen", PEN_FILE, entries.pen_file),
+        camera=_read_copy(folder, CAMERA_STEM, CAMERA_FILE, entries.camera_file),
+        pen=_read_copy(folder, PEN_STEM, PEN_FILE, entries.pen_file),
         created=entries.created,
         program=entries.program,
         station=entries.station,
@@ -482,6 +611,20 @@ def _header(folder: Path, entries: HeaderEntries) -> Header:
         nominal_tip=None if tip is None else np.array(tip, dtype=np.float64),
         mask=np.array(entries.mask_px, dtype=np.float64).reshape(-1, 3),
         settings=entries.settings,
+        rig=None if entries.rig is None else _rig_copies(folder, entries.rig),
+    )
+
+
+def _rig_copies(folder: Path, entries: RigEntries) -> RigCopies:
+    cameras = enumerate(entries.camera_files, start=1)
+    return RigCopies(
+        file=_read_copy(folder, RIG_STEM, RIG_FILE, entries.rig_file),
+        cameras=tuple(
+            _read_copy(folder, camera_stem(c), CAMERA_FILE, each) for c, each in cameras
+        ),
+        masks=tuple(
+            np.array(mask, dtype=np.float64).reshape(-1, 3) for mask in entries.masks_px
+        ),
     )
 
 
@@ -504,13 +647,13 @@ def _of_later_version(path: Path, number: int) -> FileError:
             "this version reads up to {known}). Open the record with that version.",
             path=printable(str(path)),
             number=number,
-            known=FORMAT,
+            known=RIG_FORMAT,
         )
     )
 
 
 def _read_copy(folder: Path, stem: str, what: Sentence, entry: FileEntry) -> FileCopy:
-    path = folder / (stem + Path(entry.name).suffix.lower())
+    path = folder / copy_name(stem, entry)
     data = read_bytes(path, what, 4 * MEGABYTE)
     if sha256(data).hexdigest() != entry.sha256:
         raise FileError(

@@ -13,7 +13,7 @@ uncertainty.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeAlias
@@ -24,6 +24,7 @@ from msgspec import Meta, Struct, to_builtins
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.estimation.report import json_bytes
+from lightpen.estimation.verdict import Change
 from lightpen.formats.files import printable
 from lightpen.formats.own_json import (
     DamagedError,
@@ -43,7 +44,6 @@ from lightpen.sentences import Sentence, sentence
 
 FORMAT = 4
 FIRST_WITH_CHECKSUM = 3
-OLD = timedelta(days=30)  # after which a tip is better calibrated again
 CALIBRATION = b',\n  "calibration": '  # ends the head; JSON has no line end in a text
 END = b"\n}\n"
 
@@ -72,6 +72,27 @@ class Heading(Struct):
 
     def __post_init__(self) -> None:
         require_path(self.record or "")
+
+
+class Withdrawal(Struct, frozen=True):
+    """What takes a result back.
+
+    Attributes
+    ----------
+    takes_back : str
+        Name of the result's file, without suffix.
+    operator : str
+        Who takes it back.
+    """
+
+    takes_back: str
+    at: Moment
+    operator: str
+    pen: str
+    tip: str
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
 
 
 class Why(Struct, frozen=True):
@@ -103,6 +124,15 @@ class Since(Struct, frozen=True):
     difference_mm: Vector
     expanded_uncertainty_mm: Vector
 
+    @classmethod
+    def of(cls, accepted: datetime, change: Change) -> Self:
+        """Return what is kept of a change since a result of some date."""
+        return cls(
+            accepted,
+            tuple(change.difference.tolist()),
+            tuple(change.expanded_uncertainty.tolist()),
+        )
+
 
 class _Entries(Struct):
     format: int
@@ -118,9 +148,11 @@ class _Entries(Struct):
     images: tuple[int, ...] | None = None
     origin: Origin | None = None
     reason: str = ""
+    supervisor: str = ""
     why: Why | None = None
     doubts: tuple[Why, ...] = ()
     change: Since | None = None
+    restores: Digest | None = None
     calibration_sha256: Digest | None = None
 
     def __post_init__(self) -> None:
@@ -164,12 +196,16 @@ class Result:
         What its images are of; None where neither it nor its swing says.
     reason : str
         Why it was accepted though its grade is no pass, in the words of who did.
+    supervisor : str
+        Who accepted it beyond the limit of its station; empty where nobody had to.
     why : Why or None
         What its grade is for.
     doubts : tuple of Why
         What else there was to look into.
     change : Since or None
         Since the result that was in force; None if there was none.
+    restores : str or None
+        Hash of the entry in the archive whose tip it puts in force again.
     """
 
     names: Names
@@ -183,6 +219,8 @@ class Result:
     why: Why | None = None
     doubts: tuple[Why, ...] = ()
     change: Since | None = None
+    supervisor: str = ""
+    restores: str | None = None
 
     @property
     def is_simulated(self) -> bool:
@@ -214,10 +252,6 @@ class Result:
         """Of tip and cone, (6, 6), mm^2; None of format 1."""
         return self._numbers("covariance")
 
-    def is_old(self, now: datetime) -> bool:
-        """Return whether the tip is better calibrated again by its age alone."""
-        return now - self.accepted > OLD
-
     def _numbers(self, key: str) -> FloatArray | None:
         numbers = self.calibration.get(key)
         return None if numbers is None else np.array(numbers, dtype=np.float64)
@@ -247,9 +281,11 @@ def result_bytes(result: Result, record: str) -> bytes:
         "images": result.images,
         "origin": result.origin,
         "reason": result.reason,
+        "supervisor": result.supervisor,
         "why": to_builtins(result.why),
         "doubts": to_builtins(result.doubts),
         "change": to_builtins(result.change),
+        "restores": result.restores,
         "calibration_sha256": sha256(rest).hexdigest(),
     }
     return with_checksum(json_bytes(head)).removesuffix(b"}") + rest
@@ -303,6 +339,26 @@ def parse_heading(start: bytes, file: Path) -> Heading:
         raise _damaged(file) from error
 
 
+def parse_withdrawal(data: bytes, file: Path) -> Withdrawal:
+    """Return what a file holds that takes a result back.
+
+    Parameters
+    ----------
+    file : Path
+        For the sentence.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        _heading(data)
+        return parse_json(data, Withdrawal)
+    except DamagedError as error:
+        raise _damaged(file) from error
+
+
 def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Result:
     """Return the result that a file holds.
 
@@ -342,9 +398,11 @@ def parse_result(data: bytes, file: Path, locate: Callable[[str], Path]) -> Resu
             calibration=_calibration(data, number),
             origin=entries.origin,
             reason=entries.reason,
+            supervisor=entries.supervisor,
             why=entries.why,
             doubts=entries.doubts,
             change=entries.change,
+            restores=entries.restores,
         )
     except DamagedError as error:
         raise _damaged(file) from error

@@ -19,11 +19,14 @@ from lightpen.detection.observations import (
     observe_images,
 )
 from lightpen.detection.reasons import Reason
+from lightpen.detection.rig_observations import observe_rig_images
 from lightpen.errors import CalibrationError
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.camera_path import steadied
 from lightpen.estimation.joint import ContactModel, reduce
-from lightpen.formats.hashes import Inputs, all_hashed, hashed
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
+from lightpen.formats.pairing import Pairing
+from lightpen.model.rig import rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.reading import Record, RecordSource, source
 from lightpen.sentences import sentence
@@ -41,6 +44,8 @@ class Solution:
         Of the images, in the record.
     observations : Observations
         What all N images show, whether they take part or not.
+    others : tuple of Observations
+        What those of the other cameras of a rig show, of the same moments.
     taken_out : mapping of int to str
         Numbers of images that do not take part, and why.
     residuals : (N, L, 2) array
@@ -55,6 +60,7 @@ class Solution:
     taken_out: Mapping[int, str]
     calibration: Calibration
     residuals: FloatArray
+    others: tuple[Observations, ...] = ()
 
     @property
     def misfits(self) -> FloatArray:
@@ -99,10 +105,20 @@ def solve_record(
             )
         )
     found = source(record)
-    observations = observe_images(
-        found.images, found.camera, found.pen, report, mask=found.mask
-    )
-    return _solved(found, record.all_numbers, observations, record.taken_out)
+    if found.rig is None:
+        seen: tuple[Observations, ...] = (
+            observe_images(
+                found.images, found.camera, found.pen, report, mask=found.masks[0]
+            ),
+        )
+    else:
+        sources = (found.images, *found.other_images)
+        moments = np.arange(len(record.images))[:, None]
+        pairing = Pairing(np.repeat(moments, len(sources), axis=1))
+        seen = observe_rig_images(
+            sources, pairing, found.rig, found.pen, report, found.masks
+        )
+    return _solved(found, record.all_numbers, seen, record.taken_out)
 
 
 def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
@@ -118,7 +134,8 @@ def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
     CalibrationError
         The rest does not determine the tip; the text says what is missing.
     """
-    return _solved(solution.source, solution.numbers, solution.observations, taken_out)
+    seen = (solution.observations, *solution.others)
+    return _solved(solution.source, solution.numbers, seen, taken_out)
 
 
 def load_image(solution: Solution, number: int) -> Image:
@@ -139,19 +156,28 @@ def record_inputs(source: RecordSource) -> Inputs:
 
     Images that are gone took no part and are not among them.
     """
+    images = [
+        file for each in (source.images, *source.other_images) for file in each.files
+    ]
+    rig = None
+    if source.rig_file is not None:
+        rig = RigInputs(hashed(source.rig_file), all_hashed(source.camera_files))
     return Inputs(
-        camera=hashed(source.camera_file),
-        pen=hashed(source.pen_file),
-        observations=all_hashed([f for f in source.images.files if f.is_file()]),
+        camera=kept(source.camera_files[0]),
+        pen=kept(source.pen_file),
+        observations=all_hashed([file for file in images if file.is_file()]),
         nominal_tip=source.pen.nominal_tip,
+        rig=rig,
         origin=source.origin,
+        units=source.units,
+        led_diameter=source.led_diameter,
     )
 
 
 def _solved(
     source: RecordSource,
     numbers: IntArray,
-    observations: Observations,
+    seen: tuple[Observations, ...],
     taken_out: Mapping[int, str],
 ) -> Solution:
     reasons = {
@@ -159,16 +185,20 @@ def _solved(
         for index, number in enumerate(numbers.tolist())
         if number in taken_out
     }
-    calibration = calibrate(
-        source.camera, source.pen, leave_out(observations, reasons), source.assumptions
+    calibration = calibrate_rig(
+        source.rig or rig_of(source.camera),
+        source.pen,
+        [leave_out(each, reasons) for each in seen],
+        source.assumptions,
     )
     return Solution(
         source=source,
         numbers=numbers,
-        observations=observations,
+        observations=seen[0],
         taken_out=dict(taken_out),
         calibration=calibration,
-        residuals=_all_residuals(source, observations, calibration),
+        residuals=_all_residuals(source, seen[0], calibration),
+        others=seen[1:],
     )
 
 
@@ -177,9 +207,10 @@ def _all_residuals(
 ) -> FloatArray:
     """Return the residuals of all images, (N, L, 2), as `Solution` has them."""
     joint = calibration.joint
+    own = joint.of_camera(0, source.pen.n_leds)
     pixels = steadied(source.camera, observations, calibration.cameras[0].path).pixels
     residuals = np.full_like(pixels, np.nan)
-    residuals[calibration.used] = joint.residuals[joint.used.any(axis=1)]
+    residuals[calibration.used] = own.residuals[joint.used.any(axis=1)]
     shows_pen = np.isfinite(observations.translations[:, 0])
     others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, strerror
-from lightpen.record.journal import JOURNAL, ends_in_verdict
+from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked
 from lightpen.record.reading import (
     DISCARDED,
@@ -130,7 +130,7 @@ def _read_unfinished(folder: Path) -> Record | None:
     """Return the record in a folder if it has images and no verdict, else None."""
     journal = folder / JOURNAL
     try:
-        if ends_in_verdict(folder):
+        if last_verdict(folder) is not None:
             return None
         has_lines = journal.stat().st_size > 0
     except (FileNotFoundError, NotADirectoryError):

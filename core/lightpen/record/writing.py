@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from hashlib import sha256
 from io import FileIO
@@ -29,6 +29,7 @@ from lightpen.record.journal import (
     ImageLine,
     Line,
     MoreLine,
+    OtherImage,
     OutLine,
     TakenOutLine,
     VerdictLine,
@@ -40,20 +41,42 @@ from lightpen.record.names import Names, folder_name
 from lightpen.record.reading import (
     FORMAT,
     HEADER,
-    IMAGES,
     OPENER,
+    RIG_FORMAT,
     FileCopy,
     FileEntry,
     Header,
     HeaderEntries,
     Record,
-    copy_name,
+    RigCopies,
+    RigEntries,
+    header_copies,
     image_name,
+    images_folder,
     open_record,
 )
 from lightpen.sentences import sentence
 
 OPENER_TEXT = b"Open this file to see the swing of this folder in Lightpen.\n"
+
+
+@dataclass(frozen=True, eq=False)
+class OtherView:
+    """What another camera of a rig saw at the moment of an image.
+
+    Attributes
+    ----------
+    image : (H, W) array
+        Grey image, 8 or 16 bit.
+    pixels : (L, 2) array
+        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    device_time_ns : int or None
+        By the clock of the camera.
+    """
+
+    image: Image
+    pixels: FloatArray
+    device_time_ns: int | None
 
 
 class RecordWriter:
@@ -95,12 +118,14 @@ class RecordWriter:
         with ExitStack() as stack:
             writer = cls(folder, 1, 0)  # locked from here on
             stack.callback(writer.close)
+            copies = header_copies(header)
             try:
-                (folder / IMAGES).mkdir()
+                for c in range(header.n_cameras):
+                    (folder / images_folder(c)).mkdir()
             except OSError as error:
                 raise _unwritable(folder, error) from error
-            write_whole(folder / copy_name("camera", header.camera), header.camera.data)
-            write_whole(folder / copy_name("pen", header.pen), header.pen.data)
+            for name, copy in copies.items():
+                write_whole(folder / name, copy.data)
             write_whole(folder / HEADER, _header_bytes(header))
             write_whole(folder / OPENER, OPENER_TEXT)
             _sync_folder(folder)
@@ -119,7 +144,8 @@ class RecordWriter:
             cannot be written.
         """
         writer = cls(record.folder, record.next_number, record.length)
-        sweep_parts(record.folder / IMAGES)
+        for c in range(record.header.n_cameras):
+            sweep_parts(record.folder / images_folder(c))
         return writer
 
     @classmethod
@@ -159,8 +185,9 @@ class RecordWriter:
         time: float,
         device_time_ns: int | None = None,
         stats: Stats | None = None,
+        others: Sequence[OtherView] = (),
     ) -> int:
-        """Record one image.
+        """Record one image, or those of a moment.
 
         Parameters
         ----------
@@ -176,6 +203,8 @@ class RecordWriter:
             By the clock of the camera.
         stats : Stats, optional
             What became of the camera's images since the swing began.
+        others : sequence of OtherView, optional
+            Of the other cameras of a rig, in their order.
 
         Returns
         -------
@@ -188,24 +217,38 @@ class RecordWriter:
             The image could not be written. All images before it are safe.
         """
         number = self._next_number
-        data = encode_png(image)
-        path = self._folder / image_name(number)
-        write_whole(path, data)
-        _sync_folder(path.parent)
+        digest = self._write_image(image, number, 0)
+        other_images = tuple(
+            OtherImage(
+                self._write_image(other.image, number, c),
+                other.device_time_ns,
+                tuple(map(_point, other.pixels)),
+            )
+            for c, other in enumerate(others, start=1)
+        )
         self._write_line(
             ImageLine(
                 number=number,
-                sha256=sha256(data).hexdigest(),
+                sha256=digest,
                 time=time,
                 device_time_ns=device_time_ns,
                 pixels=tuple(map(_point, pixels)),
                 rotation=rotation.tolist(),
                 translation=translation.tolist(),
                 camera=None if stats is None else CameraCounts(**asdict(stats)),
+                others=other_images,
             )
         )
         self._next_number = number + 1
         return number
+
+    def _write_image(self, image: Image, number: int, c: int) -> str:
+        """Put an image of the c-th camera on the disk, and return its checksum."""
+        data = encode_png(image)
+        path = self._folder / image_name(number, c)
+        write_whole(path, data)
+        _sync_folder(path.parent)
+        return sha256(data).hexdigest()
 
     def take_out(self, numbers: Sequence[int], reason: str) -> None:
         """Leave images out of the calibration; they stay on the disk."""
@@ -324,7 +367,7 @@ def _own_journal(folder: Path, length: int) -> FileIO:
 def _header_bytes(header: Header) -> bytes:
     tip = header.nominal_tip
     entries = HeaderEntries(
-        format=FORMAT,
+        format=FORMAT if header.rig is None else RIG_FORMAT,
         created=header.created,
         program=header.program,
         station=header.station,
@@ -338,10 +381,19 @@ def _header_bytes(header: Header) -> bytes:
         nominal_tip_mm=None if tip is None else tip.tolist(),
         mask_px=header.mask.tolist(),
         settings=dict(header.settings),
+        rig=None if header.rig is None else _rig_entries(header.rig),
     )
     text = json.dumps(to_builtins(entries), indent=1, ensure_ascii=False)
     # The bytes of a file name that is no text become JSON escapes.
     return with_checksum(text.encode("utf-8", "backslashreplace"))
+
+
+def _rig_entries(rig: RigCopies) -> RigEntries:
+    return RigEntries(
+        rig_file=_file_entry(rig.file),
+        camera_files=tuple(map(_file_entry, rig.cameras)),
+        masks_px=tuple(mask.tolist() for mask in rig.masks),
+    )
 
 
 def _file_entry(file: FileCopy) -> FileEntry:

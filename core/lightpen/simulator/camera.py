@@ -6,7 +6,7 @@ up and the image is noisier.
 """
 
 from dataclasses import replace
-from math import ceil
+from math import ceil, floor
 from typing import Literal
 
 import numpy as np
@@ -27,6 +27,7 @@ from lightpen.cameras.protocol import (
     Stats,
     sealed,
 )
+from lightpen.model.rig import Rig
 from lightpen.sentences import sentence
 from lightpen.simulator.faults import Faults
 from lightpen.simulator.hand import Held, Operator
@@ -61,6 +62,8 @@ class SimulatedCamera:
         left out.
     operator : Operator, optional
         Must go by the same clock.
+    rig : Rig, optional
+        The camera is the second of it, and the scene before the first.
     lamps : tuple of Lamp
         Foreign lights in the picture.
     """
@@ -73,8 +76,13 @@ class SimulatedCamera:
         *,
         lamps: tuple[Lamp, ...] = (),
         serial: str = SERIAL,
+        rig: Rig | None = None,
     ) -> None:
         self.scene = scene or Scene()
+        self._place = np.eye(3), np.zeros(3)  # cam_from_rig
+        if rig is not None:
+            self._place = rig.rotations[1], rig.translations[1]
+            self.scene = replace(self.scene, camera=rig.cameras[1], viewpoint=1)
         self._clock = clock or MachineClock()
         n_leds = self.scene.pen.n_leds
         self.operator = operator or Operator(
@@ -189,7 +197,8 @@ class SimulatedCamera:
         self.probe()
         if not self._is_streaming:
             self._is_streaming = True
-            self._next_end = self._now + self._period
+            # On the beat of the clock, as if one signal triggered all cameras.
+            self._next_end = (floor(self._now / self._period) + 1) * self._period
 
     def stop(self) -> None:
         """Let no more images come; nothing if none do."""
@@ -329,7 +338,7 @@ class SimulatedCamera:
     def _image_plan(self, scene: Scene, seq: int, times: FloatArray) -> ImagePlan:
         """Return what is seen in the exposure between the first and the last time."""
         held = self.operator.held(times)
-        rotations, translations = _poses(scene, held)
+        rotations, translations = self._poses(scene, held)
         moved = _pixels_moved(scene, rotations, translations)
         if held.is_away or moved <= STILL:
             path = slice(1, 2)
@@ -338,11 +347,18 @@ class SimulatedCamera:
             n_poses = min(3 + int(moved / scene.optics.psf_sigma), MAX_POSES)
             parts = (np.arange(n_poses) + 0.5) / n_poses
             between = times[0] + parts * (times[-1] - times[0])
-            shown = _poses(scene, self.operator.held(between))
+            shown = self._poses(scene, self.operator.held(between))
         gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
         gains[[led - 1 for led in held.covered]] = 0
         view = View(*shown, gains, self._lamps, faces=self._faces)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
+
+    def _poses(self, scene: Scene, held: Held) -> tuple[FloatArray, FloatArray]:
+        """Return cam_from_pen of a pen that is held so."""
+        R, t = self._place
+        rotations = held.postures.rotations
+        translations = scene.cone_cam + held.offsets - rotations @ scene.tip_pen
+        return R @ rotations, translations @ R.T + t
 
 
 def _applied(
@@ -363,12 +379,6 @@ def _with_gain(scene: Scene, settings: CameraSettings) -> Scene:
         offset=scene.sensor.offset / gain,  # the same number in the image
     )
     return replace(scene, optics=optics, sensor=sensor)
-
-
-def _poses(scene: Scene, held: Held) -> tuple[FloatArray, FloatArray]:
-    """Return cam_from_pen of a pen that is held so."""
-    rotations = held.postures.rotations
-    return rotations, scene.cone_cam + held.offsets - rotations @ scene.tip_pen
 
 
 def _pixels_moved(

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera
 from lightpen.model.rig import Rig
 from lightpen.model.rigid import rotation_from_vector
@@ -14,6 +15,7 @@ LENS_SPREAD = 0.004  # of the focal length, from one lens of a kind to the next
 CENTRE_SPREAD = np.array([7.0, -5.0])  # px
 ROTATION_SIGMA = 1e-4  # rad, of a rig that was calibrated with a board
 TRANSLATION_SIGMA = 0.1  # mm
+BASELINE = 500.0  # mm, of a camera and the one beside it
 
 
 def row_of_cameras(n_cameras: int, baseline: float) -> Rig:
@@ -38,6 +40,26 @@ def row_of_cameras(n_cameras: int, baseline: float) -> Rig:
         translations=-rotations[:, :, 0] * places[:, None],
         covariance=np.diag(sigmas**2),
         names=NAMES[:n_cameras],
+    )
+
+
+def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
+    """Return the rig of a camera and another to its right, which sees the cone alike.
+
+    Parameters
+    ----------
+    cone_cam : (3,) array
+        Before the camera, mm.
+    """
+    u, _, w = cone_cam
+    turn = np.array([0.0, np.arctan2(u, w) - np.arctan2(u - BASELINE, w), 0.0])
+    R = rotation_from_vector(turn)
+    return Rig(
+        cameras=(camera, replace(camera, fx=camera.fx * (1 + LENS_SPREAD))),
+        rotations=np.stack([np.eye(3), R]),
+        translations=np.stack([np.zeros(3), -BASELINE * R[:, 0]]),
+        covariance=np.diag(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3) ** 2),
+        names=NAMES[:2],
     )
 
 

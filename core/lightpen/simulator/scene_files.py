@@ -31,6 +31,7 @@ from lightpen.simulator.image_plans import (
 )
 from lightpen.simulator.render import hidden_fraction, led_levels
 from lightpen.simulator.rims import disc_rims, measure_insides
+from lightpen.simulator.sample_rigs import beside
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera, rim_gaps
 
@@ -50,9 +51,10 @@ NOTES = (
 
 @dataclass(frozen=True)
 class SampleFiles:
-    """The files that go with a simulated camera."""
+    """The files that go with simulated cameras: of the first, of both, of the pen."""
 
     camera: Path
+    rig: Path
     pen: Path
 
 
@@ -192,8 +194,14 @@ def write_sample_files(scene: Scene, folder: Path) -> SampleFiles:
     except OSError as error:
         raise _no_folder(folder, error) from error
     mark_simulated(folder)
-    files = SampleFiles(folder / "camera.yaml", folder / "pen.json")
+    files = SampleFiles(
+        folder / "camera.yaml", folder / "rig.json", folder / "pen.json"
+    )
+    rig = beside(scene.camera, scene.cone_cam)
+    second = folder / "camera-2.yaml"
     write_camera(scene.camera, files.camera, "opencv")
+    write_camera(rig.cameras[1], second, "opencv")
+    write_rig(rig, files.rig, [files.camera.name, second.name])
     write_pen(scene.pen, files.pen)
     return files
 

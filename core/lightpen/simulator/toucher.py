@@ -6,11 +6,23 @@ from math import pi
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.simulator.hand import Operator
-from lightpen.verification.session import SessionSetup, SessionState, TaskKind
+from lightpen.simulator.hand import Doing, Operator
+from lightpen.verification.choices import TaskKind
+from lightpen.verification.session import SessionSetup, SessionState
 
 LEANT, LEANT_FAR = 0.2, 0.4  # rad
 RING_STEPS = 12
+BAR_STEP = 15.0  # mm, from one place of the bar to the next
+DOWNWARDS = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """A touch that the operator was led to."""
+
+    task: TaskKind | None
+    run: int
+    step: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,24 +63,27 @@ class Toucher:
     def __init__(self, operator: Operator, artefacts: Artefacts | None = None) -> None:
         self._operator = operator
         self._artefacts = artefacts or Artefacts()
-        self._last: tuple[int, int] | None = None
+        self._wanted: _Wanted | None = None
 
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
-        """Do what a state of the verification asks for."""
-        step = len(state.touches)
-        if self._last == (state.n_done, step):
+        """Do what a state of the verification asks for; a lifted tip is put back."""
+        wanted = _Wanted(state.task(setup), len(state.runs), len(state.touches))
+        is_lifted = self._operator.doing in (Doing.LIFTED, Doing.ABSENT)
+        if wanted == self._wanted and not (is_lifted and wanted.task is not None):
             return
-        self._last = (state.n_done, step)
-        task, artefacts = state.task(setup), self._artefacts
-        if task is TaskKind.FIXED_POINT:
-            if step == 0:
+        before, self._wanted = self._wanted, wanted
+        step, artefacts = wanted.step, self._artefacts
+        if wanted.task is TaskKind.FIXED_POINT:
+            if is_lifted or before is None or before.task is not wanted.task:
                 self._operator.seat()
             tilt = (LEANT, LEANT_FAR)[step % 2]
-            self._operator.lean_towards(tilt, 2 * pi * step / setup.n_touches, 0.0)
-        elif task is TaskKind.CIRCLE:
+            direction = 2 * pi * step / setup.choices.n_touches
+            self._operator.lean_towards(tilt, direction, 0.0)
+        elif wanted.task is TaskKind.CIRCLE:
             self._operator.touch(artefacts.on_ring(step))
-        elif task is TaskKind.LENGTH:
+        elif wanted.task is TaskKind.LENGTH:
             ends = artefacts.bar_start, artefacts.bar_end
-            self._operator.touch(ends[step % 2])
+            lower = BAR_STEP * wanted.run * DOWNWARDS
+            self._operator.touch(ends[step % 2] + lower)
         else:
             self._operator.leave()

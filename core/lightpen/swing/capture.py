@@ -1,13 +1,13 @@
 """From a live image to a longer record: decide, and put on disk what is kept."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 from lightpen.arrays import Image
 from lightpen.cameras.protocol import Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
-from lightpen.record.writing import RecordWriter
+from lightpen.record.writing import OtherView, RecordWriter
 from lightpen.swing.rules import Transition, advance
 from lightpen.swing.state import Happening, SwingSetup, SwingState
 
@@ -24,6 +24,7 @@ def capture_image(
     device_time_ns: int | None = None,
     stats: Stats | None = None,
     rule: Rule | None = None,
+    others: Sequence[OtherView] = (),
 ) -> Transition:
     """Take one image into a swing.
 
@@ -43,6 +44,8 @@ def capture_image(
         What became of the camera's images since the swing began.
     rule : Rule, optional
         What the image does to the swing; that of a live one by default.
+    others : sequence of OtherView, optional
+        What the other cameras of a rig saw at that moment.
 
     Returns
     -------
@@ -74,5 +77,6 @@ def capture_image(
                 time,
                 device_time_ns,
                 stats,
+                others,
             )
     return transition

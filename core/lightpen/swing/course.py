@@ -10,8 +10,9 @@ from datetime import datetime
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
+from lightpen.archive.late_logbook import LateLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
@@ -31,8 +32,9 @@ from lightpen.record.reading import (
 )
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution, solve_again, solve_record
+from lightpen.record.supervision import Signature
 from lightpen.record.unfinished import discard_swing
-from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
+from lightpen.record.writing import OtherView, RecordWriter, make_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.capture import Rule, capture_image
@@ -48,26 +50,12 @@ from lightpen.swing.rules import (
     resume,
     stillness,
 )
-from lightpen.swing.serial_queue import Act, Report, Task
+from lightpen.swing.serial_queue import Act, Report, Start, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.tally import Tally
 
 T = TypeVar("T")
-
-
-class Start(Protocol):
-    """Has something computed elsewhere; see `SerialQueue.start`."""
-
-    def __call__(
-        self,
-        work: Callable[[Report], T],
-        then: Callable[[T], None],
-        otherwise: Callable[[Sentence], None],
-        on_bug: Act,
-        on_progress: Report,
-    ) -> Task:
-        """Return the task; one of the three callables is called in its turn."""
 
 
 class SwingCourse:
@@ -83,6 +71,8 @@ class SwingCourse:
         Of the accepted results.
     now : callable
         Returns date and time with the time zone.
+    logbook : LateLogbook or None
+        That what becomes of swings is entered in; without one, files alone tell of it.
     """
 
     def __init__(
@@ -92,12 +82,15 @@ class SwingCourse:
         listener: SwingListener,
         now: Callable[[], datetime],
         start: Start,
+        logbook: LateLogbook | None,
     ) -> None:
         self._records = records
         self._archive = archive
         self._listener = listener
         self._now = now
         self._start_task = start
+        self._logbook = logbook
+        self._catching_up: Task | None = None
         self._status = SwingStatus()
         self._attendance = Attendance()
         self._writer: RecordWriter | None = None
@@ -175,7 +168,7 @@ class SwingCourse:
         """Know what is chosen now; images of another source are not of this swing."""
         before = self._attendance.choices
         self._attendance = replace(self._attendance, choices=preparation)
-        is_other = before is not None and before.source != preparation.source
+        is_other = before is not None and before.sources != preparation.sources
         if is_other and self._status.is_capturing:
             self.abandon()
         self._republish()
@@ -302,6 +295,7 @@ class SwingCourse:
             transition = capture_image(
                 *(setup, before, writer, frame.image, sighting, time),
                 *(frame.device_ts_ns, self._tally.total, rule),
+                _others(frame, sighting),
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)
@@ -388,6 +382,7 @@ class SwingCourse:
         else:
             self._writer.conclude(DISCARDED)
         self.abandon()
+        self._trying(partial(self._enter_set_aside, status))
 
     def start_over(self) -> None:
         """Set the swing aside, if its tip is not in force, and begin anew."""
@@ -563,19 +558,21 @@ class SwingCourse:
         status = replace(status, state=transition.state)
         self._publish(status, *(transition.events if is_first else ()))
 
-    def accept(self, reason: str) -> None:
+    def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Put the tip in force, or say why it cannot be."""
-        self._trying(lambda: self._store(reason))
+        self._trying(lambda: self._store(reason, signature))
 
-    def _store(self, reason: str) -> None:
+    def _store(self, reason: str, signature: Signature | None) -> None:
         status, solution = self._status, self._status.solution
         if solution is None or self._task is not None or status.result is not None:
             return
         self._publish(replace(status, activity=Activity.ACCEPTING))
         try:
-            result = accept(self._archive, solution, self._now(), reason)
+            now = self._now()
+            result = accept(self._archive, solution, now, reason, signature)
             status = replace(status, result=result)
             self._relieve()
+            self._trying(self._enter_owed)
         except AcceptanceError:  # something else has come into force meanwhile
             record = open_record(solution.source.folder)
             assessment = assess(self._archive, record, solution)
@@ -593,7 +590,46 @@ class SwingCourse:
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)
+        self._trying(self._enter_owed)
         self._publish(replace(status, taken_back=result))
+
+    # Logbook
+
+    def open_logbook(self) -> None:
+        """Enter what the files tell of, beside the images: it may take long."""
+        if self._logbook is not None:
+            self._catching_up = self._start_task(
+                *(self._logbook.enter_owed, self._on_caught_up, self._tell_trouble),
+                *(lambda: None, lambda fraction: None),
+            )
+
+    def shut_down(self) -> None:
+        """Leave the swing as it is on the disk, and let go of the archive."""
+        self.abandon()
+        if self._catching_up is not None:
+            self._catching_up.cancel()
+        if self._logbook is not None:
+            self._trying(self._logbook.close)
+
+    def _on_caught_up(self, troubles: tuple[Sentence, ...]) -> None:
+        for trouble in troubles:
+            self._tell_trouble(trouble)
+
+    def _enter_owed(self) -> None:
+        if self._logbook is not None:
+            self._logbook.enter_owed()
+
+    def _enter_set_aside(self, before: SwingStatus) -> None:
+        if self._logbook is not None:
+            solution, assessment = before.solution, before.assessment
+            self._logbook.enter_set_aside(solution, assessment, self._now())
+
+
+def _others(frame: Frame, sighting: Sighting) -> tuple[OtherView, ...]:
+    return tuple(
+        OtherView(other.image, seen.pixels, other.device_ts_ns)
+        for other, seen in zip(frame.others, sighting.others, strict=True)
+    )
 
 
 @dataclass(frozen=True, eq=False)

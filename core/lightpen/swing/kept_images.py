@@ -8,13 +8,13 @@ from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.pose import fit_poses
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
-from lightpen.estimation.joint import JointFit, fit_joint
+from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI
 from lightpen.estimation.reach import NOT_REACHED, Reach, Reached, reach_of
 from lightpen.model.assumptions import USUAL, Assumptions
-from lightpen.model.camera import Camera
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
 from lightpen.swing.seat import Seat, fit_seat, tip_distances
 
 MIN_JOINT = 8  # images of the first joint fit
@@ -33,10 +33,10 @@ class KeptImages:
         Number of each image in the swing's record.
     times : (N,) array
         Seconds.
-    pixels : (N, L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    pixels : (N, C, L, 2) array
+        Ellipse centres of the LEDs in each camera, px; NaN where an LED was not seen.
     rotations, translations : (N, 3, 3) and (N, 3) array
-        Pose of each image alone, cam_from_pen, mm.
+        Pose of each image alone, cam_from_pen of the first camera, mm.
     cofactors : (N, 6, 6) array
         Covariances of these poses for a noise of 1 px, rad and mm.
     sigmas : (N,) array
@@ -97,12 +97,12 @@ class KeptImages:
         return np.asarray(np.sqrt(total / np.maximum(counted.sum(axis=1), 1)))
 
 
-def none_kept(n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
+def none_kept(n_cameras: int, n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
     """Return no images of a pen with this number of LEDs."""
     return KeptImages(
         numbers=np.zeros(0, dtype=np.int64),
         times=np.zeros(0),
-        pixels=np.zeros((0, n_leds, 2)),
+        pixels=np.zeros((0, n_cameras, n_leds, 2)),
         rotations=np.zeros((0, 3, 3)),
         translations=np.zeros((0, 3)),
         cofactors=np.zeros((0, 6, 6)),
@@ -112,7 +112,7 @@ def none_kept(n_leds: int, assumed: Assumptions = USUAL) -> KeptImages:
 
 
 def kept_before(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     numbers: IntArray,
     pixels: FloatArray,
@@ -126,14 +126,14 @@ def kept_before(
     ----------
     numbers : (N,) array of int
         In the swing's record.
-    pixels : (N, L, 2) array
+    pixels : (N, C, L, 2) array
         px; NaN where an LED was not seen.
     rotations, translations : (N, 3, 3) and (N, 3) array
-        cam_from_pen, mm.
+        cam_from_pen of the first camera, mm.
     """
     if not len(numbers):
-        return none_kept(pen.n_leds, assumed)
-    poses = fit_poses(camera, pen, pixels, rotations, translations)
+        return none_kept(rig.n_cameras, pen.n_leds, assumed)
+    poses = fit_poses(rig.cameras[0], pen, pixels[:, 0], rotations, translations)
     kept = KeptImages(
         numbers=numbers,
         times=np.full(len(numbers), -np.inf),
@@ -144,11 +144,11 @@ def kept_before(
         sigmas=np.full(len(numbers), poses.sigma),
         assumed=assumed,
     )
-    return _refit(camera, pen, kept, poses.rotations)
+    return _refit(rig, pen, kept, poses.rotations)
 
 
 def keep(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     kept: KeptImages,
     sighting: Sighting,
@@ -159,7 +159,7 @@ def keep(
     longer = KeptImages(
         numbers=np.append(kept.numbers, number),
         times=np.append(kept.times, time),
-        pixels=np.concatenate([kept.pixels, sighting.pixels[None]]),
+        pixels=np.concatenate([kept.pixels, sighting.rig_pixels[None]]),
         rotations=np.concatenate([kept.rotations, sighting.rotation[None]]),
         translations=np.concatenate([kept.translations, sighting.translation[None]]),
         cofactors=np.concatenate([kept.cofactors, sighting.cofactors[None]]),
@@ -167,22 +167,18 @@ def keep(
         assumed=kept.assumed,
     )
     if kept.joint is None:
-        return _refit(camera, pen, longer, longer.rotations)
+        return _refit(rig, pen, longer, longer.rotations)
     starts = np.concatenate([kept.joint.rotations, sighting.rotation[None]])
     longer = replace(longer, seat=kept.seat, reach=kept.reach)
-    return _refit(camera, pen, longer, starts, is_near=True)
+    return _refit(rig, pen, longer, starts, is_near=True)
 
 
-def first_images(
-    camera: Camera, pen: Pen, kept: KeptImages, n_images: int
-) -> KeptImages:
+def first_images(rig: Rig, pen: Pen, kept: KeptImages, n_images: int) -> KeptImages:
     """Return the first of the images, and the fit to them."""
-    return _leave_out(camera, pen, kept, np.arange(len(kept)) >= n_images)
+    return _leave_out(rig, pen, kept, np.arange(len(kept)) >= n_images)
 
 
-def _leave_out(
-    camera: Camera, pen: Pen, kept: KeptImages, out: BoolArray
-) -> KeptImages:
+def _leave_out(rig: Rig, pen: Pen, kept: KeptImages, out: BoolArray) -> KeptImages:
     """Return the images but those of ``out`` (N,), and the fit to the rest."""
     stay = ~out
     starts = kept.rotations if kept.joint is None else kept.joint.rotations
@@ -198,11 +194,11 @@ def _leave_out(
         joint=None,
         reach=None,
     )
-    return _refit(camera, pen, rest, starts[stay]) if len(rest) else rest
+    return _refit(rig, pen, rest, starts[stay]) if len(rest) else rest
 
 
 def _refit(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     kept: KeptImages,
     starts: FloatArray,
@@ -219,8 +215,9 @@ def _refit(
     if not fixed:
         return replace(kept, seat=seat)
     try:
-        joint = fit_joint(
-            *(camera, pen, kept.pixels, starts, seat.tip_pen, seat.cone_cam),
+        joint = fit_contact(
+            ContactModel(rig, pen, kept.pixels),
+            *(starts, seat.tip_pen, seat.cone_cam),
             is_near=is_near,
         )
     except CalibrationError:  # an image too bad to settle; the next ones may help
@@ -229,7 +226,7 @@ def _refit(
     if posture_spread(joint.rotations[used])[0][0] < MIN_SPREAD:
         return replace(kept, seat=seat)  # as the solution of the whole swing judges
     fitted = Seat(joint.tip_pen, joint.cone_cam, joint.covariance)
-    reach = reach_of(camera, pen, kept.pixels, joint, kept.reach)
+    reach = reach_of(rig, pen, kept.pixels, joint, kept.reach)
     reached = reach.reached(joint, max(joint.sigma, NO_NOISE), kept.assumed)
     return replace(kept, seat=fitted, joint=joint, reach=reach, reached=reached)
 
@@ -246,7 +243,7 @@ def distance_unit(kept: KeptImages) -> float:
 
 
 def without_slipped(
-    camera: Camera, pen: Pen, kept: KeptImages, since: float = np.inf
+    rig: Rig, pen: Pen, kept: KeptImages, since: float = np.inf
 ) -> tuple[KeptImages, set[int]]:
     """Leave out the images whose tip is not in the cone.
 
@@ -270,7 +267,7 @@ def without_slipped(
         if not out.any():
             break
         numbers |= set(map(int, kept.numbers[out]))
-        kept = _leave_out(camera, pen, kept, out)
+        kept = _leave_out(rig, pen, kept, out)
     return kept, numbers
 
 

@@ -16,18 +16,22 @@ from lightpen.detection.aim import Aim
 from lightpen.formats.camera_files import CAMERA_FILE
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.formats.pen_files import PEN_FILE
+from lightpen.formats.rig_files import RIG_FILE, RigFile
 from lightpen.local_time import local_now
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
 from lightpen.record.assumed import Plain, assumption_entries
 from lightpen.record.names import Names
-from lightpen.record.reading import FileCopy, Header
+from lightpen.record.reading import FileCopy, Header, RigCopies
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.record.results import Result
 from lightpen.swing.state import SwingSetup
+
+N_CAMERAS = 2  # that are live at once
 
 
 class SourceKind(StrEnum):
@@ -80,6 +84,34 @@ class CameraInUse:
     settings: CameraSettings
 
 
+@dataclass(frozen=True, eq=False)
+class SecondCamera:
+    """A second camera, which sees the pen from elsewhere at the same moments.
+
+    Attributes
+    ----------
+    rig_file : RigFile or None
+        Where both cameras stand, and their intrinsics.
+    image_size : pair of int or None
+        Width and height of its images, px; None while there are none.
+    in_use : CameraInUse or None
+        None until it is open.
+    mask : (M, 3) array
+        Circles of stray light in its images: centre x, y and radius, px.
+    """
+
+    source: SourceChoice = field(default_factory=SourceChoice)
+    rig_file: RigFile | None = None
+    image_size: tuple[int, int] | None = None
+    in_use: CameraInUse | None = None
+    mask: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def rig(self) -> Rig | None:
+        """Both cameras."""
+        return None if self.rig_file is None else self.rig_file.rig
+
+
 class Lack(StrEnum):
     """What keeps a step from being complete, in the order of the steps."""
 
@@ -93,6 +125,11 @@ class Lack(StrEnum):
     IMAGES = "images"
     CAMERA_FILE = "camera file"
     IMAGE_SIZE = "image size"
+    SECOND_DEVICE = "second device"
+    SECOND_IMAGES = "second images"
+    RIG_FILE = "rig file"
+    RIG_OF_TWO = "rig of two"
+    SECOND_IMAGE_SIZE = "second image size"
     PEN_FILE = "pen file"
     SAVED_LEDS = "saved leds"
 
@@ -115,6 +152,8 @@ class Preparation:
         What stands in for what the files do not state.
     has_unsaved_leds : bool
         Whether LEDs were edited or opened that are not those of the file in use.
+    second : SecondCamera or None
+        None where one camera looks alone.
     """
 
     names: Names = field(default_factory=Names)
@@ -128,11 +167,21 @@ class Preparation:
     limits: SwingLimits = field(default_factory=SwingLimits)
     assumptions: Assumptions = USUAL
     has_unsaved_leds: bool = False
+    second: SecondCamera | None = None
 
     @property
     def camera(self) -> Camera | None:
-        """The intrinsics."""
+        """The intrinsics, of a rig those of its first camera."""
+        if self.second is not None:
+            return None if self.second.rig is None else self.second.rig.cameras[0]
         return None if self.camera_file is None else self.camera_file.camera
+
+    @property
+    def sources(self) -> tuple[SourceChoice, ...]:
+        """Where the images of each camera come from."""
+        if self.second is None:
+            return (self.source,)
+        return (self.source, self.second.source)
 
     @property
     def pen(self) -> Pen | None:
@@ -146,7 +195,8 @@ class Preparation:
     @property
     def origin(self) -> Origin:
         """What its images are of: nothing is real that needs a simulated file."""
-        files = self.camera_file, self.pen_file
+        seen_by = self.camera_file if self.second is None else self.second.rig_file
+        files = seen_by, self.pen_file
         if any(file is not None and file.is_simulated for file in files):
             return Origin.SIMULATED
         return _ORIGINS.get(self.source.kind, Origin.LIVE)
@@ -173,6 +223,52 @@ class Preparation:
             mask=np.zeros((0, 3)),
         )
 
+    @property
+    def rig_file(self) -> RigFile | None:
+        """The file of both cameras, where there are two."""
+        return None if self.second is None else self.second.rig_file
+
+    def with_rig(self, rig_file: RigFile | None) -> Self:
+        """Return it with another file of both cameras; it needs two."""
+        if self.second is None:
+            return self
+        return replace(self, second=replace(self.second, rig_file=rig_file))
+
+    def with_second(self, source: SourceChoice | None) -> Self:
+        """Return it with another second camera, or without.
+
+        The rig file stays, unless it is a simulated one of a real camera or the other
+        way round; the stray light is of the camera before.
+        """
+        if source is None:
+            return replace(self, second=None)
+        before = self.second or SecondCamera()
+        if self.second is not None and source == before.source:
+            return self
+        rig_file, simulates = before.rig_file, source.kind == SourceKind.SIMULATED
+        if rig_file is not None and rig_file.is_simulated is not simulates:
+            rig_file = None
+        return replace(self, second=SecondCamera(source, rig_file))
+
+    def without_images(self) -> Self:
+        """Return it as long as no image of its cameras has come."""
+        second = self.second
+        if second is not None:
+            second = replace(second, image_size=None, in_use=None)
+        return replace(self, image_size=None, camera_in_use=None, second=second)
+
+    def mask_of(self, camera: int) -> FloatArray:
+        """Return the stray light in the images of a camera, from 0, (M, 3), px."""
+        if camera == 0 or self.second is None:
+            return self.mask
+        return self.second.mask
+
+    def with_mask(self, camera: int, mask: FloatArray) -> Self:
+        """Return it with other stray light in the images of a camera, from 0."""
+        if camera == 0 or self.second is None:
+            return replace(self, mask=mask)
+        return replace(self, second=replace(self.second, mask=mask))
+
     def renamed(self, names: Names) -> Self:
         """Return it with other names; another tip has another ball and nominal centre.
 
@@ -198,7 +294,12 @@ class Preparation:
     @property
     def aim(self) -> Aim:
         """What to look for in the images."""
-        return Aim(self.camera, self.pen, self.mask)
+        others: tuple[Aim, ...] = ()
+        if self.second is not None:
+            rig = self.second.rig
+            camera = None if rig is None else rig.cameras[1]
+            others = (Aim(camera, self.pen, self.second.mask),)
+        return Aim(self.camera, self.pen, self.mask, others)
 
     def start_lacks(self) -> tuple[Lack, ...]:
         """Return what the step Start lacks."""
@@ -221,10 +322,28 @@ class Preparation:
         elif self.image_size is None:
             lacks.append(Lack.IMAGES)
         camera = self.camera
-        if camera is None:
+        if camera is None and self.second is None:
             lacks.append(Lack.CAMERA_FILE)
-        elif self.image_size not in (None, camera.image_size):
+        if camera is not None and self.image_size not in (None, camera.image_size):
             lacks.append(Lack.IMAGE_SIZE)
+        return (*lacks, *self._second_lacks())
+
+    def _second_lacks(self) -> tuple[Lack, ...]:
+        """Return what is missing of a second camera that is wanted."""
+        second = self.second
+        if second is None:
+            return ()
+        lacks = []
+        if second.source.lacks_place:
+            lacks.append(Lack.SECOND_DEVICE)
+        elif second.image_size is None:
+            lacks.append(Lack.SECOND_IMAGES)
+        if second.rig is None:
+            lacks.append(Lack.RIG_FILE)
+        elif second.rig.n_cameras != N_CAMERAS:
+            lacks.append(Lack.RIG_OF_TWO)
+        elif second.image_size not in (None, second.rig.cameras[1].image_size):
+            lacks.append(Lack.SECOND_IMAGE_SIZE)
         return tuple(lacks)
 
     def leds_lacks(self) -> tuple[Lack, ...]:
@@ -245,10 +364,13 @@ class Preparation:
         if camera is None or pen is None:
             raise ValueError("`camera_file` and `pen_file` must be chosen.")
         is_recording = self.source.kind == SourceKind.RECORDED
+        second = self.second
         return SwingSetup(
             *(camera, pen, self.limits, self.mask),
             assumptions=self.assumptions,
             is_recording=is_recording,
+            beside=None if second is None else second.rig,
+            other_masks=() if second is None else (second.mask,),
         )
 
     def swings_like(self, other: "Preparation") -> bool:
@@ -261,17 +383,31 @@ class Preparation:
             and self.assumptions == other.assumptions
             and _same(self.nominal_tip, other.nominal_tip)
             and np.array_equal(self.mask, other.mask)
+            and self._has_second_of(other)
         )
+
+    def _has_second_of(self, other: "Preparation") -> bool:
+        one, two = self.second, other.second
+        if one is None or two is None:
+            return one is two
+        return one.rig_file is two.rig_file and np.array_equal(one.mask, two.mask)
 
     def header(self, settings: dict[str, Plain] | None = None) -> Header:
         """Return the header of a record that begins now; files are read again."""
-        if self.camera_file is None or self.pen_file is None:
-            raise ValueError("`camera_file` and `pen_file` must be chosen.")
+        rig_file = None if self.second is None else self.second.rig_file
+        if rig_file is not None:
+            camera_path = rig_file.camera_files[0]
+        elif self.camera_file is not None:
+            camera_path = self.camera_file.path
+        else:
+            raise ValueError("`camera_file` or a rig must be chosen.")
+        if self.pen_file is None:
+            raise ValueError("`pen_file` must be chosen.")
         limits, origin = self.limits, self.origin
         if origin is Origin.RECORDED and is_simulated_recording(self.source.place):
             origin = Origin.SIMULATED
         return Header(
-            camera=FileCopy.of(self.camera_file.path, CAMERA_FILE),
+            camera=FileCopy.of(camera_path, CAMERA_FILE),
             pen=FileCopy.of(self.pen_file.path, PEN_FILE),
             created=local_now(),
             program=f"lightpen {version('lightpen')}",
@@ -289,6 +425,7 @@ class Preparation:
                 "source": str(self.source.kind),
                 "source_place": self.source.place,
                 **_camera_entries(self.camera_in_use),
+                **_second_entries(self.second),
                 "max_uncertainty_mm": limits.max_uncertainty,
                 "min_images": limits.min_images,
                 "max_images": limits.max_images,
@@ -297,6 +434,7 @@ class Preparation:
                 **assumption_entries(self.assumptions),
                 **(settings or {}),
             },
+            rig=None if self.second is None else _rig_copies(self.second),
         )
 
 
@@ -318,6 +456,29 @@ def _camera_entries(used: CameraInUse | None) -> dict[str, Plain]:
         else f"{region.width} x {region.height} at {region.x}, {region.y}",
     }
     return {name: entry for name, entry in entries.items() if entry is not None}
+
+
+def _second_entries(second: SecondCamera | None) -> dict[str, Plain]:
+    """Return what a record tells of the second camera."""
+    if second is None:
+        return {}
+    entries: dict[str, Plain] = {
+        "source": str(second.source.kind),
+        "source_place": second.source.place,
+        **_camera_entries(second.in_use),
+    }
+    return {f"second_{name}": entry for name, entry in entries.items()}
+
+
+def _rig_copies(second: SecondCamera) -> RigCopies | None:
+    file = second.rig_file
+    if file is None:
+        return None
+    return RigCopies(
+        file=FileCopy.of(file.path, RIG_FILE),
+        cameras=tuple(FileCopy.of(path, CAMERA_FILE) for path in file.camera_files[1:]),
+        masks=(second.mask,),
+    )
 
 
 _ORIGINS: dict[str, Origin] = {

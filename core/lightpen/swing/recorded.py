@@ -58,7 +58,7 @@ def read_image(
         state = _with_dropped(state, flaw)
     elif not is_known:
         number = state.next_number
-        kept = keep(setup.camera, setup.pen, state.kept, sighting, number, time)
+        kept = keep(setup.rig, setup.pen, state.kept, sighting, number, time)
         state = replace(state, kept=kept, next_number=number + 1)
         events = (SwingEvent(Happening.KEPT, (number,)),)
     return _ended_by_last(Transition(state, events))

@@ -1,5 +1,6 @@
 """An interrupted swing read back, to go on with it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,9 +42,11 @@ class Resumable:
     setup: SwingSetup
     state: SwingState
 
-    def is_of(self, source: SourceChoice) -> bool:
-        """Return whether images of this source can go on with it."""
-        settings = self.record.header.settings
+    def is_of(self, sources: Sequence[SourceChoice]) -> bool:
+        """Return whether images of these sources can go on with it."""
+        if len(sources) != self.setup.rig.n_cameras:
+            return False
+        source, settings = sources[0], self.record.header.settings
         kind, place = settings.get("source"), settings.get("source_place")
         if kind is None:  # of a version that did not say
             return True
@@ -66,7 +69,7 @@ def read_resumable(folder: Path) -> Resumable:
     """
     record = open_record(folder)
     setup = recorded_setup(record)
-    if not _shows(record, setup.pen):
+    if not _shows(record, setup.pen, setup.rig.n_cameras):
         raise damaged_file(folder / JOURNAL)
     if record.more is not None:
         min_images, max_images = record.more
@@ -93,14 +96,14 @@ def read_for_more(folder: Path) -> Resumable:
     return replace(swing, record=open_record(folder), setup=setup)
 
 
-def _shows(record: Record, pen: Pen) -> bool:
-    """Return whether the journal can be of this pen before a camera.
+def _shows(record: Record, pen: Pen, n_cameras: int) -> bool:
+    """Return whether the journal can be of this pen before so many cameras.
 
     Lines of format 1 have no checksum that would tell.
     """
     for image in record.images:
         R, t = image.rotation, image.translation
-        if len(image.pixels) != pen.n_leds:
+        if image.rig_pixels.shape[:2] != (n_cameras, pen.n_leds):
             return False
         if not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=ROUNDING):
             return False
@@ -121,10 +124,10 @@ def resume_swing(setup: SwingSetup, record: Record, time: float = 0.0) -> SwingS
     """
     images = record.used_images
     kept = kept_before(
-        setup.camera,
+        setup.rig,
         setup.pen,
         record.numbers,
-        np.array([image.pixels for image in images]),
+        np.array([image.rig_pixels for image in images]),
         np.array([image.rotation for image in images]),
         np.array([image.translation for image in images]),
         setup.assumptions,
@@ -142,7 +145,9 @@ def recorded_setup(record: Record) -> SwingSetup:
     """
     found = source(record)
     return SwingSetup(
-        *(found.camera, found.pen, recorded_limits(record), found.mask),
+        *(found.camera, found.pen, recorded_limits(record), found.masks[0]),
         assumptions=found.assumptions,
         is_recording=is_of_recording(record),
+        beside=found.rig,
+        other_masks=found.masks[1:],
     )

@@ -174,7 +174,7 @@ def start_again(
         s.
     """
     state = start_swing(setup, time)
-    trace = trace_of(setup.camera, setup.pen, kept)
+    trace = trace_of(setup.rig, setup.pen, kept)
     return replace(state, kept=kept, next_number=next_number, trace=trace)
 
 
@@ -291,8 +291,8 @@ def _capturing(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Tran
 def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transition:
     """Keep an image, and drop those that turn out to have slipped."""
     number, counts = state.next_number, state.counts
-    kept = keep(setup.camera, setup.pen, state.kept, sighting, number, state.time)
-    kept, dropped = without_slipped(setup.camera, setup.pen, kept)
+    kept = keep(setup.rig, setup.pen, state.kept, sighting, number, state.time)
+    kept, dropped = without_slipped(setup.rig, setup.pen, kept)
     state = replace(state, kept=kept)
     if number in dropped:  # it was never recorded
         return _dropped(replace(state, n_dropped=_more(state, 1)), dropped - {number})
@@ -330,7 +330,7 @@ def _astray(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transit
     begins = not len(state.stray_rotations)
     if begins:
         since = state.strayed_since - ABOUT_TO_SLIP
-        kept, dropped = without_slipped(setup.camera, setup.pen, kept, since)
+        kept, dropped = without_slipped(setup.rig, setup.pen, kept, since)
     strays = _with_new(setup, state.stray_rotations, sighting)
     n_new = len(strays) - len(state.stray_rotations)
     state = replace(
@@ -481,9 +481,8 @@ def _dropped(state: SwingState, numbers: set[int]) -> Transition:
 def _dropped_all(setup: SwingSetup, state: SwingState) -> Transition:
     """Drop all images: they were taken while the tip was in a wrong place."""
     numbers = set(map(int, state.kept.numbers))
-    return _dropped(
-        replace(state, kept=none_kept(setup.pen.n_leds, setup.assumptions)), numbers
-    )
+    kept = none_kept(setup.rig.n_cameras, setup.pen.n_leds, setup.assumptions)
+    return _dropped(replace(state, kept=kept), numbers)
 
 
 def _more(

@@ -12,11 +12,13 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
+from lightpen.archive.late_logbook import LateLogbook
 from lightpen.cameras.protocol import Frame, Stats
 from lightpen.detection.sighting import Sighting
 from lightpen.local_time import local_now
 from lightpen.record.archive import Archive
 from lightpen.record.results import Result
+from lightpen.record.supervision import Signature
 from lightpen.swing.course import SwingCourse
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable
@@ -39,6 +41,8 @@ class SwingRunner:
         Of the accepted results.
     now : callable
         Returns date and time with the time zone.
+    logbook : LateLogbook, optional
+        That what becomes of swings is entered in; without one, files alone tell of it.
     """
 
     def __init__(
@@ -47,9 +51,12 @@ class SwingRunner:
         archive: Archive,
         listener: SwingListener,
         now: Callable[[], datetime] = local_now,
+        logbook: LateLogbook | None = None,
     ) -> None:
         self._queue = SerialQueue("swing", lambda: self._course.recover())
-        self._course = SwingCourse(records, archive, listener, now, self._queue.start)
+        self._course = SwingCourse(
+            *(records, archive, listener, now, self._queue.start, logbook)
+        )
 
     @property
     def status(self) -> SwingStatus:
@@ -121,15 +128,17 @@ class SwingRunner:
         """Go on with this swing after its verdict, as soon as its images are read."""
         self._queue.ask(self._course.capture_more)
 
-    def accept(self, reason: str = "") -> None:
+    def accept(self, reason: str = "", signature: Signature | None = None) -> None:
         """Put the tip in force; the one before stays where it cannot be stored.
 
         Parameters
         ----------
         reason : str
             Why it is accepted though it is to be checked.
+        signature : Signature, optional
+            Of a supervisor, where it takes one.
         """
-        self._queue.ask(partial(self._course.accept, reason))
+        self._queue.ask(partial(self._course.accept, reason, signature))
 
     def take_back(self, result: Result, operator: str) -> None:
         """Let the result before one in force be in force again.
@@ -153,9 +162,13 @@ class SwingRunner:
         """Leave the swing; its record can be resumed."""
         self._queue.ask(self._course.abandon)
 
+    def open_logbook(self) -> None:
+        """Have entered what the files tell of and the archive does not yet."""
+        self._queue.ask(self._course.open_logbook)
+
     def shut_down(self) -> None:
         """Do what was commanded, leave the swing to be resumed, and end."""
-        self._queue.end(self._course.abandon)
+        self._queue.end(self._course.shut_down)
 
     def await_end(self, timeout_s: float) -> bool:
         """Wait for the end after `shut_down` and return whether it came."""

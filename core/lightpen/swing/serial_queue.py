@@ -5,7 +5,7 @@ from functools import partial
 from queue import SimpleQueue
 from threading import Event, Thread
 from time import monotonic
-from typing import TypeAlias, TypeVar
+from typing import Protocol, TypeAlias, TypeVar
 
 from lightpen.errors import Cancelled, LightpenError
 from lightpen.sentences import Sentence
@@ -179,3 +179,17 @@ class Task:
         """Wait for its end."""
         if self._thread is not None:
             self._thread.join(timeout_s)
+
+
+class Start(Protocol):
+    """Has something computed elsewhere; see `SerialQueue.start`."""
+
+    def __call__(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Sentence], None],
+        on_bug: Act,
+        on_progress: Report,
+    ) -> Task:
+        """Return the task; one of the three callables is called in its turn."""

@@ -16,6 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
+from lightpen.detection.aim import Aim
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.messages import SHOW_PEN, images_read
@@ -25,6 +26,7 @@ from lightpen.model.coverage import dial_counts
 from lightpen.model.limits import SwingLimits
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture
+from lightpen.model.rig import Rig, rig_of
 from lightpen.sentences import Sentence
 from lightpen.swing.kept_images import (
     MIN_JOINT,
@@ -99,6 +101,10 @@ class SwingSetup:
         Circles of stray light: centre x, y and radius, px.
     assumptions : Assumptions
         What stands in for what the files do not state.
+    beside : Rig or None
+        The camera with others beside it, where there are any.
+    other_masks : tuple of (M, 3) array
+        Stray light in the images of the others.
     is_recording : bool
         Whether its images were recorded before: all are read, once and in their order,
         and nobody is asked to lean the pen.
@@ -110,6 +116,20 @@ class SwingSetup:
     mask: FloatArray | None = None
     assumptions: Assumptions = USUAL
     is_recording: bool = False
+    beside: Rig | None = None
+    other_masks: tuple[FloatArray, ...] = ()
+
+    @property
+    def rig(self) -> Rig:
+        """All cameras; one alone is a rig of one."""
+        return self.beside or rig_of(self.camera)
+
+    @property
+    def aims(self) -> tuple[Aim, ...]:
+        """What is looked for in the images of each camera."""
+        masks = (self.mask, *self.other_masks)
+        cameras = zip(self.rig.cameras, masks, strict=True)
+        return tuple(Aim(camera, self.pen, mask) for camera, mask in cameras)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,12 +177,12 @@ NO_TRACE = Trace(
 )
 
 
-def trace_of(camera: Camera, pen: Pen, kept: KeptImages) -> Trace:
+def trace_of(rig: Rig, pen: Pen, kept: KeptImages) -> Trace:
     """Return how the estimate went along with images that were kept before."""
     trace = NO_TRACE
     counts = np.linspace(0, len(kept), N_TRACED + 1).astype(np.int64)[1:]
     for n_images in sorted({int(n) for n in counts if n >= MIN_JOINT} - {len(kept)}):
-        trace = trace.with_estimate(first_images(camera, pen, kept, n_images))
+        trace = trace.with_estimate(first_images(rig, pen, kept, n_images))
     return trace.with_estimate(kept)
 
 
@@ -262,7 +282,7 @@ def start_swing(setup: SwingSetup, time: float = 0.0) -> SwingState:
         since=time,
         time=time,
         message=images_read(0, 0) if is_recording else SHOW_PEN,
-        kept=none_kept(setup.pen.n_leds, setup.assumptions),
+        kept=none_kept(setup.rig.n_cameras, setup.pen.n_leds, setup.assumptions),
         next_number=1,
         n_dropped=Counter(),
         seat=None,

@@ -20,6 +20,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.model.coverage import posture_spread
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
@@ -28,8 +29,7 @@ from lightpen.verification.assessment import (
     refused,
 )
 from lightpen.verification.fixed_point import LIFTED, MIN_SPREAD
-from lightpen.verification.limits import VerificationLimits
-from lightpen.verification.touch import Touch
+from lightpen.verification.touch import Touch, joint_covariance, mean_point
 
 N_POSTURES, N_TOUCHES = 5, 5
 ASTRAY = 8.0  # times the median distance from the middle of all
@@ -181,13 +181,8 @@ def _expected(
 ) -> float:
     """Return the mean location error of points that scatter as is known of them."""
     rng = np.random.default_rng(0)
-    rows = np.concatenate(
-        [np.mean([t.sensitivity for t in touches], axis=0) for _, touches in postures]
-    )
-    covariance = rows @ instrument.covariance @ rows.T
-    for i, (_, touches) in enumerate(postures):
-        own = slice(3 * i, 3 * i + 3)
-        covariance[own, own] += sum(t.noise for t in touches) / len(touches) ** 2
+    means = [mean_point(touches) for _, touches in postures]
+    covariance = joint_covariance(means, instrument)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = (rng.standard_normal((100, len(root))) @ root.T).reshape(100, -1, 3)

@@ -1,5 +1,6 @@
 """What a verification found: a grade, the reason that counts most, and what to do."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from lightpen.estimation.verdict import Grade
@@ -20,6 +21,9 @@ CHECK_FILES = sentence(
 )
 
 
+WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)  # last
+
+
 @dataclass(frozen=True)
 class Conformity:
     """What a verification found.
@@ -36,6 +40,11 @@ class Conformity:
     def is_accepted(self) -> bool:
         """Whether nothing was found against the tip."""
         return self.grade is Grade.PASS
+
+
+def worst(found: Iterable[Conformity]) -> Conformity:
+    """Return the worst of several; of equals the first."""
+    return max(found, key=lambda each: WORST.index(each.grade))
 
 
 def accepted(reason: Sentence) -> Conformity:

@@ -18,6 +18,7 @@ from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
@@ -28,10 +29,11 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch
 
 MIN_TOUCHES = 6
+LEAST_POINTS = 3  # that tell a circle at all
+EDGE_ON = 0.9  # of the normal along u
 MIN_ANGLE = 270.0  # degrees
 SMALLEST = 0.5  # mm, of what can be a circle at all
 THIN = 0.02  # of the points' extent: less across is a line
@@ -59,7 +61,8 @@ class CircleFit:
         Distances of the points from the circle in its plane, outwards, and from its
         plane, mm.
     angles : (N,) array
-        Where the points lie on it, rad.
+        Where the points lie on it, rad: from the right of the camera against the
+        clock, as the camera sees them.
     weights : (N, 3) array
         Derivative of the radius by each point.
     """
@@ -216,7 +219,7 @@ def fit_circle(points_cam: FloatArray) -> CircleFit:
             )
         )
     normal = axes[2] if axes[2][2] < 0 else -axes[2]
-    across = axes[0]
+    across = _across(normal)
     up = np.cross(normal, across)
     plane = np.stack([across, up])
     flat = (points_cam - middle) @ plane.T
@@ -244,6 +247,26 @@ def fit_circle(points_cam: FloatArray) -> CircleFit:
         angles=np.arctan2(spokes[:, 1], spokes[:, 0]),
         weights=np.linalg.pinv(J)[2][:, None] * (outwards @ plane),
     )
+
+
+def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
+    """Return the circle that most of the points (N, 3), mm, lie on, by these alone.
+
+    None before they tell one.
+    """
+    if len(points_cam) < LEAST_POINTS:
+        return None
+    try:
+        return fit_circle(points_cam[_on_ring(points_cam)])
+    except CalibrationError:
+        return None
+
+
+def _across(normal: FloatArray) -> FloatArray:
+    """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
+    axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
+    across = axis - (axis @ normal) * normal
+    return np.asarray(across / np.linalg.norm(across))
 
 
 def _measure_run(

@@ -20,6 +20,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     VERIFY_AGAIN,
@@ -27,8 +28,7 @@ from lightpen.verification.assessment import (
     accepted,
     refused,
 )
-from lightpen.verification.limits import VerificationLimits
-from lightpen.verification.touch import Touch
+from lightpen.verification.touch import Touch, mean_point
 
 MIN_VISITS = 2
 
@@ -83,17 +83,13 @@ def measure_drift(
                 "it before, during and after the session.",
             )
         )
-    points, rows, noises = [], [], []
-    for _, touches in visits:
-        points.append(np.mean([touch.point_cam for touch in touches], axis=0))
-        rows.append(np.mean([touch.sensitivity for touch in touches], axis=0))
-        noises.append(sum(touch.noise for touch in touches) / len(touches) ** 2)
-    moves = np.array(points) - points[0]
+    first, *others = [mean_point(touches) for _, touches in visits]
+    moves = np.array([each.point_cam - first.point_cam for each in (first, *others)])
     variances = np.zeros_like(moves)
-    for i in range(1, len(visits)):
-        row = rows[i] - rows[0]
-        covariance = row @ instrument.covariance @ row.T + noises[i] + noises[0]
-        variances[i] = np.diag(covariance)
+    for i, each in enumerate(others, start=1):
+        row = each.sensitivity - first.sensitivity
+        shared = row @ instrument.covariance @ row.T
+        variances[i] = np.diag(shared + each.noise + first.noise)
     uncertainties = COVERAGE_FACTOR * np.sqrt(variances)
     names = tuple(name for name, _ in visits)
     return Drift(

@@ -15,6 +15,7 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.model.coverage import posture_spread
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
@@ -24,7 +25,6 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch, joint_covariance, with_tip
 
 USUAL_TOUCHES = 10
@@ -124,7 +124,7 @@ def measure_fixed_point(
         There are too few touches of one point.
     """
     kept, left_out = _at_one_place(touches)
-    calibrated = _scatter(kept)
+    calibrated = scatter_of(kept)
     covariance = joint_covariance(kept, instrument)
     change, change_covariance = _other_tip(kept)
     spread = change_covariance + instrument.covariance[:3, :3]
@@ -138,11 +138,7 @@ def measure_fixed_point(
         touches=kept,
         left_out=left_out,
         calibrated=calibrated,
-        nominal=(
-            None
-            if nominal_tip is None
-            else _scatter([with_tip(each, instrument, nominal_tip) for each in kept])
-        ),
+        nominal=nominal_scatter(kept, instrument, nominal_tip),
         uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean)),
         expected_deviation=expected,
         tip_change=change,
@@ -167,8 +163,18 @@ def _steady(scatter: Scatter) -> Sentence:
     )
 
 
-def _scatter(touches: Sequence[Touch]) -> Scatter:
+def scatter_of(touches: Sequence[Touch]) -> Scatter:
+    """Return the coordinates of touches."""
     return Scatter(np.array([touch.point_cam for touch in touches]))
+
+
+def nominal_scatter(
+    touches: Sequence[Touch], instrument: Instrument, nominal_tip: FloatArray | None
+) -> Scatter | None:
+    """Return the coordinates of touches with the nominal tip; None if not known."""
+    if nominal_tip is None:
+        return None
+    return scatter_of([with_tip(each, instrument, nominal_tip) for each in touches])
 
 
 def _at_one_place(
@@ -176,7 +182,7 @@ def _at_one_place(
 ) -> tuple[tuple[Touch, ...], tuple[Touch, ...]]:
     if not touches:
         raise _too_few(0)
-    points = _scatter(touches).points
+    points = scatter_of(touches).points
     distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     limit = max(ASTRAY * float(np.median(distances)), LIFTED)
     kept = tuple(t for t, d in zip(touches, distances, strict=True) if d <= limit)

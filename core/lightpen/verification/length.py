@@ -13,6 +13,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
     CHECK_FILES,
@@ -22,7 +23,6 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch
 
 MIN_APART = 0.1  # of the certified length, between two ends

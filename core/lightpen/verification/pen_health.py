@@ -10,7 +10,7 @@ along its line of sight, ``w / f`` smaller, at the same place in the image.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -191,12 +191,9 @@ def _cone_seen(calibration: CalibrationFile, camera: Camera) -> FloatArray | Non
     fitted = calibration.instrument
     if fitted is None or len(fitted.intrinsics) != len(camera.intrinsics):
         return None
-    fx, fy, cx, cy = fitted.intrinsics[:4].tolist()
-    seen_by = replace(
-        camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=fitted.intrinsics[4:]
-    )
+    seen_by = camera.with_intrinsics(fitted.intrinsics)
     pixel = seen_by.project(calibration.cone_cam)
-    return np.append(pixel, calibration.cone_cam[2] / fx)
+    return np.append(pixel, calibration.cone_cam[2] / seen_by.fx)
 
 
 def _assessment(

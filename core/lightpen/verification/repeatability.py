@@ -15,6 +15,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
+from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
     CALIBRATE_AGAIN,
@@ -25,7 +26,6 @@ from lightpen.verification.assessment import (
     refused,
 )
 from lightpen.verification.fixed_point import Scatter
-from lightpen.verification.limits import VerificationLimits
 
 MIN_TIPS = 2
 STUDY = 30  # repeats of a type-1 gauge study, at least

@@ -2,12 +2,13 @@
 
 `advance` takes the state and what the next image shows. Each task ends by itself when
 its touches suffice, and the next begins when the pen moves on; live images and recorded
-ones go through the same steps.
+ones go through the same steps. Touches that can be none of the task are dropped with a
+word on it, as nobody is at the screen to take them out.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,27 +16,25 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
-from lightpen.estimation.verdict import Grade
 from lightpen.sentences import Sentence, sentence
-from lightpen.verification.assessment import Conformity
+from lightpen.verification.assessment import Conformity, worst
+from lightpen.verification.choices import TaskKind, VerificationChoices, ball_offset
 from lightpen.verification.circle import (
+    ANOTHER,
     MIN_ANGLE,
-    MIN_TOUCHES,
     Circle,
-    fit_circle,
+    CircleFit,
     measure_circle,
+    ring_so_far,
 )
-from lightpen.verification.fixed_point import (
-    USUAL_TOUCHES,
-    FixedPoint,
-    measure_fixed_point,
-)
+from lightpen.verification.fixed_point import FixedPoint, measure_fixed_point
 from lightpen.verification.length import Length, measure_length
-from lightpen.verification.limits import VerificationLimits
+from lightpen.verification.sources import require_leds_fit
 from lightpen.verification.touch import Touch, measure_touches
 from lightpen.verification.touching import (
     TouchEvent,
     TouchHappening,
+    TouchPhase,
     TouchRules,
     TouchState,
 )
@@ -46,15 +45,36 @@ NEW_PLACE = 3.0  # mm, on a ring
 OTHER_END = 10.0  # mm
 EVERYWHERE = 1e6  # mm or rad: no other place, no other posture makes a touch new
 RING_TOUCHES = 10
-WORST = (Grade.PASS, Grade.CHECK, Grade.REPEAT)
+ELSEWHERE = 5.0  # mm from the others: the tip was not in the cone at all
+WORTH_TELLING = 0.5  # of its images, that were held before a touch was broken off
 
+Found: TypeAlias = FixedPoint | Circle | Length
+Runs: TypeAlias = Sequence[tuple[str, Sequence[Touch]]]
 
-class TaskKind(StrEnum):
-    """What is touched."""
-
-    FIXED_POINT = "fixed point"
-    CIRCLE = "circle"
-    LENGTH = "length"
+BROKEN_OFF = sentence(
+    "session.broken-off",
+    "The pen was lifted or moved before the touch was taken, so it does not count. "
+    "Hold it still until it is.",
+)
+STILL_IN_CONE = sentence(
+    "session.still-in-cone",
+    "The fixed point is done: this touch of the cone does not count. Touch the ring.",
+)
+_KNOWN = {
+    TaskKind.FIXED_POINT: sentence(
+        "session.same-posture",
+        "This posture was taken before. Leave the tip in the cone and lean the pen "
+        "another way.",
+    ),
+    TaskKind.CIRCLE: sentence(
+        "session.same-place",
+        "This place of the ring was touched before. Touch it where it was not.",
+    ),
+    TaskKind.LENGTH: sentence(
+        "session.same-end",
+        "This end was touched before. Touch the other one.",
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,34 +83,17 @@ class SessionSetup:
 
     Attributes
     ----------
-    n_touches : int
-        Of the fixed point.
-    radius, length : float or None
-        Certified, mm; None leaves that task away.
+    ball_diameter : float or None
+        Of the tip, mm; needed where a ring is touched in a bore or round a boss.
     nominal_tip, cone_cam : (3,) array or None
         See `lightpen.verification.fixed_point.measure_fixed_point`.
-    n_frames : int
-        Images of a touch.
     """
 
     instrument: Instrument
-    limits: VerificationLimits = field(default_factory=VerificationLimits)
-    n_touches: int = USUAL_TOUCHES
-    radius: float | None = None
-    length: float | None = None
+    choices: VerificationChoices = field(default_factory=VerificationChoices)
+    ball_diameter: float | None = None
     nominal_tip: FloatArray | None = None
     cone_cam: FloatArray | None = None
-    n_frames: int = TouchRules().n_frames
-
-    @property
-    def tasks(self) -> tuple[TaskKind, ...]:
-        """What is touched, in order."""
-        tasks = [TaskKind.FIXED_POINT]
-        if self.radius is not None:
-            tasks.append(TaskKind.CIRCLE)
-        if self.length is not None:
-            tasks.append(TaskKind.LENGTH)
-        return tuple(tasks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,40 +102,50 @@ class SessionState:
 
     Attributes
     ----------
-    n_done : int
-        Tasks that are finished.
     touching : TouchState
-        Of the task at hand.
+        Of the run at hand.
     touches : tuple of Touch
         Measured for it.
+    runs : tuple of tuple of Touch
+        Runs of the task at hand that are done.
     trouble : Sentence or None
-        Why its touches do not suffice yet, though they are as many as needed.
+        What was wrong with the last touch, or why the touches do not suffice yet
+        though they are as many as needed.
     """
 
-    n_done: int = 0
     touching: TouchState = field(default_factory=TouchState)
     touches: tuple[Touch, ...] = ()
+    runs: tuple[tuple[Touch, ...], ...] = ()
     trouble: Sentence | None = None
     fixed_point: FixedPoint | None = None
     circle: Circle | None = None
     length: Length | None = None
 
+    def found(self, kind: TaskKind) -> Found | None:
+        """Return what a task has found; None until it is done."""
+        found: dict[TaskKind, Found | None] = {
+            TaskKind.FIXED_POINT: self.fixed_point,
+            TaskKind.CIRCLE: self.circle,
+            TaskKind.LENGTH: self.length,
+        }
+        return found[kind]
+
     def task(self, setup: SessionSetup) -> TaskKind | None:
         """Return what is to be touched now; None when all is done."""
-        tasks = setup.tasks
-        return tasks[self.n_done] if self.n_done < len(tasks) else None
+        to_do = (each for each in setup.choices.kinds if self.found(each) is None)
+        return next(to_do, None)
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether anything was touched or found."""
+        has_found = any(self.found(kind) is not None for kind in TaskKind)
+        return has_found or bool(self.touches or self.runs)
 
     @property
     def assessment(self) -> Conformity | None:
         """The worst that was found so far."""
-        found = [
-            each.assessment
-            for each in (self.fixed_point, self.circle, self.length)
-            if each is not None
-        ]
-        if not found:
-            return None
-        return max(found, key=lambda each: WORST.index(each.grade))
+        found = [each for each in map(self.found, TaskKind) if each is not None]
+        return worst([each.assessment for each in found]) if found else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,23 +170,95 @@ def advance(
     task = state.task(setup)
     if task is None:
         return SessionTransition(state)
-    touched = advance_touch(
-        *(setup.instrument, rules_of(setup, task), state.touching, name, sighting)
-    )
+    rules = rules_of(setup, task)
+    touched = advance_touch(setup.instrument, rules, state.touching, name, sighting)
+    events = tuple(each for each in touched.events if _is_worth_telling(rules, each))
+    happened = {event.what for event in events}
     state = replace(state, touching=touched.state)
-    if not any(event.what is TouchHappening.TAKEN for event in touched.events):
-        return SessionTransition(state, touched.events)
-    touches = measure_touches(setup.instrument, touched.state.taken)
-    state = replace(state, touches=touches, trouble=None)
+    if TouchHappening.BROKEN_OFF in happened:
+        state = replace(state, trouble=BROKEN_OFF)
+    if TouchHappening.TAKEN not in happened:
+        return SessionTransition(state, events)
     try:
-        ended = _ENDS[task](setup, state)
+        state = _with_touch(setup, replace(state, trouble=None), task)
+        if not _suffices(setup, state, task):
+            return SessionTransition(state, events)
+        state = _with_run(setup, state, task)
     except CalibrationError as error:
-        return SessionTransition(replace(state, trouble=error.sentence), touched.events)
-    if ended is None:
-        return SessionTransition(state, touched.events)
-    still = replace(touched.state, taken=(), places=())
-    ended = replace(ended, n_done=state.n_done + 1, touching=still, touches=())
-    return SessionTransition(ended, touched.events, task)
+        state = replace(state, trouble=error.sentence)
+    is_finished = state.found(task) is not None
+    return SessionTransition(state, events, task if is_finished else None)
+
+
+def end_task(setup: SessionSetup, state: SessionState) -> SessionTransition:
+    """End the task at hand with the touches that there are, or say why it cannot."""
+    task = state.task(setup)
+    if task is None:
+        return SessionTransition(state)
+    runs = (*state.runs, state.touches) if state.touches else state.runs
+    try:
+        ended = with_found(state, measure(setup, task, _numbered(runs)))
+    except CalibrationError as error:
+        return SessionTransition(replace(state, trouble=error.sentence))
+    return SessionTransition(ended, finished=task)
+
+
+def measure(setup: SessionSetup, task: TaskKind, runs: Runs) -> Found:
+    """Return what a task finds by its touches.
+
+    Raises
+    ------
+    CalibrationError
+        They do not suffice.
+    """
+    choices, instrument = setup.choices, setup.instrument
+    match task:
+        case TaskKind.FIXED_POINT:
+            return measure_fixed_point(
+                [touch for _, touches in runs for touch in touches],
+                *(instrument, choices.limits, setup.nominal_tip, setup.cone_cam),
+            )
+        case TaskKind.CIRCLE:
+            return measure_circle(
+                *(runs, instrument, choices.radius, choices.limits),
+                certified_uncertainty=choices.radius_uncertainty,
+                ball_offset=ball_offset(choices.surface, setup.ball_diameter),
+            )
+        case TaskKind.LENGTH:
+            return measure_length(
+                *(runs, instrument, choices.length, choices.limits),
+                certified_uncertainty=choices.length_uncertainty,
+            )
+
+
+def with_found(state: SessionState, found: Found) -> SessionState:
+    """Return it with what a task has found; the next begins when the pen moves on."""
+    state = without_touches(state)
+    match found:
+        case FixedPoint():
+            return replace(state, fixed_point=found)
+        case Circle():
+            return replace(state, circle=found)
+        case Length():
+            return replace(state, length=found)
+
+
+def touched_anew(state: SessionState, task: TaskKind) -> SessionState:
+    """Return it with one task to be done again, and no touches of the one at hand."""
+    state = without_touches(state)
+    match task:
+        case TaskKind.FIXED_POINT:
+            return replace(state, fixed_point=None)
+        case TaskKind.CIRCLE:
+            return replace(state, circle=None)
+        case TaskKind.LENGTH:
+            return replace(state, length=None)
+
+
+def without_touches(state: SessionState) -> SessionState:
+    """Return it with the next run to begin; a pen at rest has to move on first."""
+    touching = replace(state.touching, taken=(), places=())
+    return replace(state, touching=touching, touches=(), runs=(), trouble=None)
 
 
 def rules_of(setup: SessionSetup, task: TaskKind) -> TouchRules:
@@ -181,14 +266,18 @@ def rules_of(setup: SessionSetup, task: TaskKind) -> TouchRules:
     turn, distance = {
         TaskKind.FIXED_POINT: (float(NEW_POSTURE), EVERYWHERE),
         TaskKind.CIRCLE: (EVERYWHERE, NEW_PLACE),
-        TaskKind.LENGTH: (EVERYWHERE, OTHER_END),
+        TaskKind.LENGTH: (EVERYWHERE, min(OTHER_END, setup.choices.length / 2)),
     }[task]
-    return TouchRules(setup.n_frames, min_turn=turn, min_distance=distance)
+    return TouchRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
 
 
 def instruction(setup: SessionSetup, state: SessionState) -> Sentence:
     """Return what the operator should do now."""
-    task, n_touches = state.task(setup), len(state.touches)
+    task, n_touches, choices = state.task(setup), len(state.touches), setup.choices
+    if task is None:
+        return sentence("session.done", "The verification is done. Put the pen down.")
+    if state.touching.phase is TouchPhase.KNOWN:
+        return _KNOWN[task]
     if state.trouble is not None:
         return state.trouble
     if task is TaskKind.FIXED_POINT:
@@ -197,7 +286,7 @@ def instruction(setup: SessionSetup, state: SessionState) -> Sentence:
             "Put the tip into the cone and hold it still, each time leant another way: "
             "{n_touches} of {needed}.",
             n_touches=n_touches,
-            needed=setup.n_touches,
+            needed=choices.n_touches,
         )
     if task is TaskKind.CIRCLE:
         return sentence(
@@ -208,59 +297,144 @@ def instruction(setup: SessionSetup, state: SessionState) -> Sentence:
             needed=MIN_ANGLE,
             n_touches=n_touches,
         )
-    if task is TaskKind.LENGTH:
-        return sentence(
-            "session.touch-ends",
-            "Touch one end of the length, then the other, and hold still on each: "
-            "{n_touches} of 2.",
-            n_touches=n_touches,
-        )
-    return sentence("session.done", "The verification is done. Put the pen down.")
-
-
-def covered(touches: tuple[Touch, ...]) -> float:
-    """Return how much of a ring touches cover, degrees; 0 before they tell it."""
-    if len(touches) < MIN_TOUCHES:
-        return 0.0
-    try:
-        return fit_circle(np.array([touch.point_cam for touch in touches])).covered
-    except CalibrationError:
-        return 0.0
-
-
-def _end_fixed_point(setup: SessionSetup, state: SessionState) -> SessionState | None:
-    if len(state.touches) < setup.n_touches:
-        return None
-    found = measure_fixed_point(
-        state.touches,
-        setup.instrument,
-        setup.limits,
-        setup.nominal_tip,
-        setup.cone_cam,
+    return sentence(
+        "session.touch-ends",
+        "Touch one end of the length, then the other, and hold still on each: "
+        "{n_touches} of 2.",
+        n_touches=n_touches,
     )
-    return replace(state, fixed_point=found)
 
 
-def _end_circle(setup: SessionSetup, state: SessionState) -> SessionState | None:
-    if setup.radius is None or len(state.touches) < RING_TOUCHES:
-        return None
-    if covered(state.touches) < MIN_ANGLE:
-        return None
-    run = (str(TaskKind.CIRCLE), state.touches)
-    found = measure_circle([run], setup.instrument, setup.radius, setup.limits)
-    return replace(state, circle=found)
+def fraction_done(setup: SessionSetup, state: SessionState) -> float:
+    """Return how much of the task at hand is done, 0 to 1."""
+    choices, n_touches = setup.choices, len(state.touches)
+    match state.task(setup):
+        case TaskKind.FIXED_POINT:
+            return min(n_touches / choices.n_touches, 1.0)
+        case TaskKind.CIRCLE:
+            part = min(covered(state.touches) / MIN_ANGLE, n_touches / RING_TOUCHES)
+            return (len(state.runs) + min(part, 1.0)) / choices.n_runs
+        case TaskKind.LENGTH:
+            return (len(state.runs) + n_touches / 2) / choices.n_places
+    return 1.0
 
 
-def _end_length(setup: SessionSetup, state: SessionState) -> SessionState | None:
-    if setup.length is None or len(state.touches) < 2:
-        return None
-    run = (str(TaskKind.LENGTH), state.touches)
-    found = measure_length([run], setup.instrument, setup.length, setup.limits)
-    return replace(state, length=found)
+def ring_fit(touches: Sequence[Touch]) -> CircleFit | None:
+    """Return the circle that touches lie on so far; None before they tell it."""
+    return ring_so_far(np.array([touch.point_cam for touch in touches]).reshape(-1, 3))
 
 
-_ENDS: dict[TaskKind, Callable[[SessionSetup, SessionState], SessionState | None]] = {
-    TaskKind.FIXED_POINT: _end_fixed_point,
-    TaskKind.CIRCLE: _end_circle,
-    TaskKind.LENGTH: _end_length,
-}
+def covered(touches: Sequence[Touch]) -> float:
+    """Return how much of a ring touches cover, degrees; 0 before they tell it."""
+    fit = ring_fit(touches)
+    return 0.0 if fit is None else fit.covered
+
+
+def _is_worth_telling(rules: TouchRules, event: TouchEvent) -> bool:
+    """Return whether an event is news: a hand that comes to rest stops and goes."""
+    needed = rules.n_settling + WORTH_TELLING * rules.n_frames
+    return event.what is TouchHappening.TAKEN or len(event.names) >= needed
+
+
+def _with_touch(
+    setup: SessionSetup, state: SessionState, task: TaskKind
+) -> SessionState:
+    """Measure anew with the last touch; drop it if it can be none of the task."""
+    touches = measure_touches(setup.instrument, state.touching.taken)
+    try:
+        require_leds_fit(touches[-1].label, touches[-1:])
+    except CalibrationError as error:
+        kept = range(len(touches) - 1)
+        return replace(_with_touches(state, touches, kept), trouble=error.sentence)
+    if task is TaskKind.FIXED_POINT:
+        return _without_others(state, touches)
+    if task is TaskKind.CIRCLE and _is_in_cone(state, touches[-1]):
+        kept = range(len(touches) - 1)
+        return replace(_with_touches(state, touches, kept), trouble=STILL_IN_CONE)
+    if task is TaskKind.LENGTH and len(touches) == 2:
+        return _with_true_ends(setup, state, touches)
+    return replace(state, touches=touches)
+
+
+def _is_in_cone(state: SessionState, touch: Touch) -> bool:
+    """Return whether a touch is of the fixed point, which is done."""
+    if state.fixed_point is None:
+        return False
+    way = touch.point_cam - state.fixed_point.calibrated.mean
+    return float(np.linalg.norm(way)) <= ELSEWHERE
+
+
+def _without_others(state: SessionState, touches: tuple[Touch, ...]) -> SessionState:
+    """Drop touches that are not of the cone, as of a pen that was laid down."""
+    points = np.array([touch.point_cam for touch in touches])
+    distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    kept = np.flatnonzero(distances <= ELSEWHERE).tolist()
+    if len(touches) < 3 or len(kept) == len(touches):  # of two, nobody knows which
+        return replace(state, touches=touches)
+    trouble = sentence(
+        "session.elsewhere",
+        "A touch {distance:.0f} mm from the others does not count: the tip was not in "
+        "the cone. Put it into the cone and hold it still.",
+        distance=float(distances.max()),
+    )
+    return replace(_with_touches(state, touches, kept), trouble=trouble)
+
+
+def _with_true_ends(
+    setup: SessionSetup, state: SessionState, touches: tuple[Touch, ...]
+) -> SessionState:
+    """Take the last touch for a first end if the two are those of no such length."""
+    one, other = (touch.point_cam for touch in touches)
+    distance, certified = float(np.linalg.norm(one - other)), setup.choices.length
+    if abs(distance - certified) <= ANOTHER * certified:
+        return replace(state, touches=touches)
+    trouble = sentence(
+        "session.no-ends",
+        "The two touches lie {distance:.2f} mm apart, {certified} mm is certified: "
+        "they are not of its two ends. Touch the end opposite to the last touch.",
+        distance=distance,
+        certified=certified,
+    )
+    return replace(_with_touches(state, touches, (1,)), trouble=trouble)
+
+
+def _with_touches(
+    state: SessionState, touches: tuple[Touch, ...], kept: Sequence[int]
+) -> SessionState:
+    touching = replace(
+        state.touching,
+        taken=tuple(state.touching.taken[i] for i in kept),
+        places=tuple(state.touching.places[i] for i in kept),
+    )
+    return replace(state, touching=touching, touches=tuple(touches[i] for i in kept))
+
+
+def _suffices(setup: SessionSetup, state: SessionState, task: TaskKind) -> bool:
+    """Return whether the touches are enough for a run."""
+    n_touches = len(state.touches)
+    match task:
+        case TaskKind.FIXED_POINT:
+            return n_touches >= setup.choices.n_touches
+        case TaskKind.CIRCLE:
+            return n_touches >= RING_TOUCHES and covered(state.touches) >= MIN_ANGLE
+        case TaskKind.LENGTH:
+            return n_touches >= 2
+
+
+def _with_run(setup: SessionSetup, state: SessionState, task: TaskKind) -> SessionState:
+    """End a run, and with the last of them the task."""
+    runs = (*state.runs, state.touches)
+    found = measure(setup, task, _numbered(runs))
+    if len(runs) < _n_runs(setup.choices, task):
+        return replace(without_touches(state), runs=runs)
+    return with_found(state, found)
+
+
+def _n_runs(choices: VerificationChoices, task: TaskKind) -> int:
+    return {TaskKind.CIRCLE: choices.n_runs, TaskKind.LENGTH: choices.n_places}.get(
+        task, 1
+    )
+
+
+def _numbered(runs: Sequence[tuple[Touch, ...]]) -> Runs:
+    return [(f"#{i}", touches) for i, touches in enumerate(runs, start=1)]

@@ -1,6 +1,7 @@
 """From files to touches: the calibration that is verified, and the images of a run."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -94,18 +95,8 @@ def instrument_of(
     same_camera = sha256(camera_file) == calibration.camera_sha256 and len(
         camera.intrinsics
     ) == len(fitted.intrinsics)
-    fx, fy, cx, cy = fitted.intrinsics[:4].tolist()
-    n_coefficients = len(fitted.intrinsics) - 4
-    as_fitted = replace(
-        camera,
-        fx=fx,
-        fy=fy,
-        cx=cx,
-        cy=cy,
-        distortion=fitted.intrinsics[4:].reshape(n_coefficients),
-    )
     instrument = Instrument(
-        camera=as_fitted,
+        camera=camera.with_intrinsics(fitted.intrinsics),
         pen=replace(pen, leds=fitted.leds, diameter=fitted.diameter),
         tip_pen=calibration.tip_pen,
         covariance=fitted.covariance,
@@ -156,6 +147,23 @@ def touches_of(
             )
         )
     touches = measure_touches(instrument, held)
+    require_leds_fit(name, touches)
+    named = {each.name for touch in touches for each in touch.rejected}
+    rejected = tuple(
+        RejectedFrame(image, reason)
+        for image, reason in zip(seen.names, seen.reasons, strict=True)
+        if reason and image not in named
+    )
+    return TouchRun(name, touches, rejected)
+
+
+def require_leds_fit(name: str, touches: Sequence[Touch]) -> None:
+    """Refuse touches whose images are not of the LEDs of the pen.
+
+    Raises
+    ------
+    CalibrationError
+    """
     rms = float(np.median([touch.rms for touch in touches]))
     if rms > MAX_RMS:
         raise CalibrationError(
@@ -169,13 +177,6 @@ def touches_of(
                 usual=USUAL_SIGMA,
             )
         )
-    named = {each.name for touch in touches for each in touch.rejected}
-    rejected = tuple(
-        RejectedFrame(image, reason)
-        for image, reason in zip(seen.names, seen.reasons, strict=True)
-        if reason and image not in named
-    )
-    return TouchRun(name, touches, rejected)
 
 
 def _held(

@@ -111,6 +111,24 @@ class Touch:
         return np.asarray(self.noise + shared)
 
 
+@dataclass(frozen=True, eq=False)
+class MeanPoint:
+    """One point by several touches, as `Touch` has it."""
+
+    point_cam: FloatArray
+    noise: FloatArray
+    sensitivity: FloatArray
+
+
+def mean_point(touches: Sequence[Touch]) -> MeanPoint:
+    """Return the mean of touches of one point."""
+    return MeanPoint(
+        point_cam=np.mean([touch.point_cam for touch in touches], axis=0),
+        noise=np.sum([touch.noise for touch in touches], axis=0) / len(touches) ** 2,
+        sensitivity=np.mean([touch.sensitivity for touch in touches], axis=0),
+    )
+
+
 def measure_touches(
     instrument: Instrument, held: Sequence[StillFrames]
 ) -> tuple[Touch, ...]:
@@ -185,12 +203,14 @@ def on_surface(
     return replace(touch, point_cam=touch.point_cam + ball_radius * direction_cam)
 
 
-def joint_covariance(touches: Sequence[Touch], instrument: Instrument) -> FloatArray:
+def joint_covariance(
+    points: Sequence[Touch | MeanPoint], instrument: Instrument
+) -> FloatArray:
     """Return the covariance of several points with what they share, (3 n, 3 n)."""
-    rows = np.concatenate([touch.sensitivity for touch in touches])
+    rows = np.concatenate([point.sensitivity for point in points])
     covariance = rows @ instrument.covariance @ rows.T
-    for i, touch in enumerate(touches):
-        covariance[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += touch.noise
+    for i, point in enumerate(points):
+        covariance[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] += point.noise
     return np.asarray(covariance)
 
 

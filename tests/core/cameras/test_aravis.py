@@ -3,7 +3,12 @@
 The simulated camera is Aravis' own, over UDP; only the images in it are ours.
 """
 
+import signal
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
+from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -18,17 +23,20 @@ from lightpen.cameras.protocol import (
     DeviceBusy,
     DeviceLost,
     DeviceNotFound,
+    FrameIncomplete,
     Region,
 )
 from lightpen.cameras.worker import (
     CameraWorker,
     Connection,
     ConnectionChanged,
+    Failed,
     Troubled,
     WorkerEvent,
 )
 
 TIMEOUT = 20.0  # s until a test gives up
+SLACK = 2.0  # s that a busy machine may add
 RNG = np.random.default_rng(5)
 
 
@@ -172,3 +180,158 @@ def test_a_camera_that_is_unplugged_comes_back_with_its_settings(
     errors = [event.error for event in events if isinstance(event, Troubled)]
     assert isinstance(errors[0], DeviceLost)
     assert "no longer answers" in str(errors[0])
+
+
+# What befalls the stream
+
+
+def test_an_image_that_lost_packets_is_counted_and_never_seen(
+    gige: GigeSimulator,
+) -> None:
+    scene: Image = RNG.integers(0, 256, (512, 512), np.uint8)
+    gige.serve(lambda exposure_us, gain: scene)
+    seen = camera()
+    seen.open()
+    seen.configure(CameraSettings(packet_size=1500, region=Region(0, 0, 512, 512)))
+    gige.lose_packets(0.002)
+    seen.start()
+    first = last = None
+    while seen.stats().delivered < 5 or seen.stats().incomplete < 5:
+        try:
+            frame = seen.read(TIMEOUT)
+        except FrameIncomplete:
+            continue
+        np.testing.assert_array_equal(frame.image, scene)
+        first = frame.seq if first is None else first
+        last = frame.seq
+    stats = seen.stats()
+    seen.close()
+
+    assert first is not None
+    assert last is not None
+    # Every number that the camera gave is accounted for.
+    assert stats.delivered + stats.incomplete + stats.missed > last - first
+
+
+class Server:
+    """A simulated camera in a process of its own, to which something befalls."""
+
+    def __init__(self) -> None:
+        program = Path(__file__).parents[2] / "gige_simulator.py"
+        self._words = [sys.executable, str(program), "LP02", ADDRESS]
+        self.begin()
+
+    def begin(self) -> None:
+        self.process = subprocess.Popen(self._words, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline() == "there\n"
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+
+@pytest.fixture
+def server(loopback: str) -> Iterator[Server]:
+    server = Server()
+    yield server
+    server.end()
+
+
+class Watched:
+    """A worker, and what its camera went through."""
+
+    def __init__(self) -> None:
+        self.events: list[WorkerEvent] = []
+        self._news = Event()
+        settings = CameraSettings(region=Region(0, 0, 160, 120), frame_rate=20.0)
+        device = DeviceCamera(AravisDevice(ADDRESS))
+        self.worker = CameraWorker(device, settings, self._note)
+        self.worker.measure(True)
+        self.worker.start()
+        self.worker.next_frame(TIMEOUT)
+
+    @property
+    def connections(self) -> list[Connection]:
+        return [e.connection for e in self.events if isinstance(e, ConnectionChanged)]
+
+    def await_connection(self, connection: Connection) -> float:
+        """Wait until the camera is so, and return how long that took, s."""
+        start = time.monotonic()
+        while self.connections[-1] is not connection:
+            assert self._news.wait(TIMEOUT)
+            self._news.clear()
+        return time.monotonic() - start
+
+    def next_new_frame(self) -> None:
+        self.worker.measure(False)
+        self.worker.measure(True)
+        self.worker.next_frame(TIMEOUT)
+
+    def _note(self, event: WorkerEvent) -> None:
+        self.events.append(event)
+        self._news.set()
+
+
+@pytest.fixture
+def watched(server: Server) -> Iterator[Watched]:
+    watched = Watched()
+    yield watched
+    watched.worker.stop()
+    assert not any(isinstance(event, Failed) for event in watched.events)
+
+
+def test_a_camera_that_hangs_for_a_moment_is_silent_and_goes_on(
+    server: Server, watched: Watched
+) -> None:
+    server.process.send_signal(signal.SIGSTOP)
+    watched.await_connection(Connection.SILENT)
+    server.process.send_signal(signal.SIGCONT)
+    watched.await_connection(Connection.STREAMING)
+    watched.next_new_frame()
+
+    assert Connection.LOST not in watched.connections
+
+
+def test_a_camera_that_hangs_for_long_is_lost_and_found_again(
+    server: Server, watched: Watched
+) -> None:
+    server.process.send_signal(signal.SIGSTOP)
+    told = watched.await_connection(Connection.LOST)
+    server.process.send_signal(signal.SIGCONT)
+    back = watched.await_connection(Connection.STREAMING)
+    watched.next_new_frame()
+
+    assert told < 7 + SLACK  # what the people at a station are promised
+    assert back < 5 + SLACK
+
+
+def test_a_camera_whose_power_fails_is_back_when_it_has_power_again(
+    server: Server, watched: Watched
+) -> None:
+    server.end()
+    told = watched.await_connection(Connection.LOST)
+    server.begin()
+    back = watched.await_connection(Connection.STREAMING)
+    watched.next_new_frame()
+
+    assert told < 7 + SLACK
+    assert back < 5 + SLACK
+
+
+def test_a_second_program_does_not_disturb_the_images_of_the_first(
+    gige: GigeSimulator,
+) -> None:
+    first, second = camera(), camera()
+    first.open()
+    first.configure(CameraSettings(region=Region(0, 0, 160, 120)))
+    first.start()
+    first.read(TIMEOUT)
+    with pytest.raises(DeviceBusy):
+        second.open()
+    seqs = [first.read(TIMEOUT).seq for _ in range(5)]
+    stats = first.stats()
+    first.close()
+
+    assert len(set(seqs)) == 5
+    assert stats.incomplete == 0

@@ -43,11 +43,29 @@ def test_tracked_and_found_from_nothing_are_the_same() -> None:
     np.testing.assert_allclose(tracked.rotation, fresh.rotation, atol=1e-9)
 
 
-def test_a_jump_is_found_although_the_last_image_misleads() -> None:
+def test_a_pen_that_is_followed_is_where_the_whole_image_has_it() -> None:
+    last = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
+    mask = np.array([[60.0, 60.0, 40.0]])
+    for time in (1.05, 1.1, 1.15, 1.2):
+        image, _ = seen(time)
+        image[:200, :200] = 255  # far from the pen
+        last = look(image, SCENE.camera, SCENE.pen, mask, last, is_followed=True)
+        whole = look(image, SCENE.camera, SCENE.pen)
+
+        assert last.spots is not None
+        assert len(last.spots) == last.n_leds == SCENE.pen.n_leds
+        # Background and noise are those of fewer pixels.
+        np.testing.assert_allclose(last.pixels, whole.pixels, atol=0.003)
+
+
+def test_a_pen_that_is_no_longer_there_is_sought_in_the_whole_image() -> None:
     before = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
     image, image_plan = seen(4.0)
-    sighting = look(image, SCENE.camera, SCENE.pen, before=before)
-    np.testing.assert_allclose(sighting.rotation, image_plan.rotation, atol=2e-4)
+    for is_followed in (False, True):
+        sighting = look(
+            *(image, SCENE.camera, SCENE.pen, None, before), is_followed=is_followed
+        )
+        np.testing.assert_allclose(sighting.rotation, image_plan.rotation, atol=2e-4)
 
 
 def test_masked_light_is_not_seen() -> None:

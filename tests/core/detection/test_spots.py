@@ -541,3 +541,11 @@ def test_any_grey_image_is_accepted(image: Image, enlarged: int) -> None:
 def test_images_that_are_not_grey_are_refused(image: Image) -> None:
     with pytest.raises(ValueError, match="must be a 2-D array of uint8 or uint16, got"):
         detect_spots(image)
+
+
+@pytest.mark.parametrize("width", range(1200, 1264, 7))
+def test_images_of_any_width_are_searched(width: int) -> None:
+    image = np.zeros((1100, width), np.uint8)
+    image[500:540, 600:640] = 200
+
+    assert len(detect_spots(image)) == 1

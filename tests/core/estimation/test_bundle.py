@@ -65,11 +65,6 @@ def in_frame_of(measured: Pen, swing: Swing) -> FloatArray:
     return np.asarray(R @ swing.tip_pen + t)
 
 
-def with_intrinsics(camera: Camera, intrinsics: FloatArray) -> Camera:
-    fx, fy, cx, cy = intrinsics[:4].tolist()
-    return replace(camera, fx=fx, fy=fy, cx=cx, cy=cy, distortion=intrinsics[4:])
-
-
 # How a state moves by one column of a view; ``k`` counts within its kind.
 Move = Callable[[BundleState, int, float], BundleState]
 
@@ -99,7 +94,7 @@ def camera_changed(state: BundleState, k: int, step: float) -> BundleState:
     camera = rig.cameras[1]
     n = len(camera.intrinsics)
     if k < n:
-        changed = with_intrinsics(camera, camera.intrinsics + step * np.eye(n)[k])
+        changed = camera.with_intrinsics(camera.intrinsics + step * np.eye(n)[k])
         return replace(state, rig=replace(rig, cameras=(rig.cameras[0], changed)))
     rotations, translations = rig.rotations.copy(), rig.translations.copy()
     if k < n + 3:
@@ -246,7 +241,7 @@ def test_the_tip_and_the_cone_scatter_as_their_covariance_says() -> None:
         assert PEN.diameter_sigma is not None
         width = PEN.diameter + PEN.diameter_sigma * rng.standard_normal()
         measured = replace(measured, diameter=width)
-        rig = rig_of(with_intrinsics(CAMERA, drawn))
+        rig = rig_of(CAMERA.with_intrinsics(drawn))
         bundle = adjusted(rig, measured, swing, pixels)
         error = np.hstack(
             [
@@ -274,7 +269,7 @@ def test_two_cameras_find_the_focal_length_of_one_that_is_off() -> None:
         rng = np.random.default_rng(100 + seed)
         swing = swing_poses(60, rng)
         pixels = simulate_rig_centers(pair(), PEN, swing, 0.03, rng)
-        off = with_intrinsics(CAMERA, CAMERA.intrinsics * ([1.001] * 2 + [1.0] * 7))
+        off = CAMERA.with_intrinsics(CAMERA.intrinsics * ([1.001] * 2 + [1.0] * 7))
         rig = pair(replace(off, covariance=None))
         bundle = adjusted(rig, PEN, swing, pixels)
         errors.append(bundle.state.tip_pen - swing.tip_pen)

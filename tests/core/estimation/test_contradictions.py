@@ -37,26 +37,13 @@ def drawn_covariance() -> FloatArray:
     return covariance
 
 
-def with_intrinsics(intrinsics: FloatArray, covariance: FloatArray | None) -> Camera:
-    fx, fy, cx, cy = intrinsics[:4].tolist()
-    return replace(
-        CAMERA,
-        fx=fx,
-        fy=fy,
-        cx=cx,
-        cy=cy,
-        distortion=intrinsics[4:],
-        covariance=covariance,
-    )
-
-
 def off_by(covariance: FloatArray | None, **changes: float) -> Camera:
     """Return the camera with a relative ``focal_length``, ``cx`` or ``cy`` off."""
     intrinsics = CAMERA.intrinsics
     intrinsics[:2] *= 1 + changes.get("focal_length", 0.0)
     intrinsics[2] += changes.get("cx", 0.0)
     intrinsics[3] += changes.get("cy", 0.0)
-    return with_intrinsics(intrinsics, covariance)
+    return replace(CAMERA.with_intrinsics(intrinsics), covariance=covariance)
 
 
 def calibrated(
@@ -89,10 +76,10 @@ def test_camera_files_as_good_as_they_say_are_put_right_and_covered() -> None:
     lengths, inside = [], []
     for seed in range(n_runs):
         rng = np.random.default_rng(seed)
-        file = with_intrinsics(
-            rng.multivariate_normal(CAMERA.intrinsics, covariance), covariance
+        file = CAMERA.with_intrinsics(
+            rng.multivariate_normal(CAMERA.intrinsics, covariance)
         )
-        swing, result = calibrated(file, seed)
+        swing, result = calibrated(replace(file, covariance=covariance), seed)
         error = result.joint.tip_pen - swing.tip_pen
         lengths.append(float(np.linalg.norm(error)))
         inside.append(np.abs(error) <= result.budget.expanded_uncertainty[:3])
@@ -103,11 +90,8 @@ def test_camera_files_as_good_as_they_say_are_put_right_and_covered() -> None:
 
 
 def test_a_true_camera_file_is_hardly_ever_contradicted() -> None:
-    covariance = drawn_covariance()
-    found = [
-        calibrated(with_intrinsics(CAMERA.intrinsics, covariance), seed, 30)[1]
-        for seed in range(10)
-    ]
+    file = replace(CAMERA, covariance=drawn_covariance())
+    found = [calibrated(file, seed, 30)[1] for seed in range(10)]
 
     assert not any(result.contradictions for result in found)
 
@@ -129,8 +113,9 @@ def test_a_wrong_file_that_states_nothing_never_passes_a_tip_beyond_u(
 def test_a_file_without_distortion_never_passes_and_is_named() -> None:
     straight = CAMERA.intrinsics
     straight[4:] = 0.0
+    file = replace(CAMERA.with_intrinsics(straight), covariance=None)
     for seed in range(6):
-        _, result = calibrated(with_intrinsics(straight, None), seed)
+        _, result = calibrated(file, seed)
         assert judge(result, LIMITS).grade is not Grade.PASS
         assert any("k1" in name for name in names(result))
 
@@ -175,7 +160,6 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
 
 
 def test_noise_that_lasts_contradicts_no_true_file() -> None:
-    true = with_intrinsics(CAMERA.intrinsics, CAMERA.covariance)
     contradicted = 0
     for seed in range(20):
         rng = np.random.default_rng([seed, 5])
@@ -188,8 +172,8 @@ def test_noise_that_lasts_contradicts_no_true_file() -> None:
         )
         pixels = exact + 0.03 * errors
         centers = Centers(np.arange(15), pixels, Path("simulated"))
-        observations = observe_centers(centers, true, PEN)
-        contradicted += bool(calibrate(true, PEN, observations).contradictions)
+        observations = observe_centers(centers, CAMERA, PEN)
+        contradicted += bool(calibrate(CAMERA, PEN, observations).contradictions)
 
     assert contradicted <= 1
 

@@ -57,7 +57,9 @@ def test_the_derivative_of_the_contact_model_agrees_with_differences() -> None:
     truth = swing(4)
     model = ContactModel.of(CAMERA, PEN, np.zeros((4, PEN.n_leds, 2)))
     R, x0, u0 = truth.rotations, truth.tip_pen, truth.cone_cam
-    J = model.at(R, x0, u0).jacobian
+    state = model.at(R, x0, u0)
+    by_place = state.jacobian[..., 3:] @ state.by_tip_and_cone[:, None]
+    J = np.concatenate([state.jacobian[..., :3], by_place], axis=3)
 
     h = 1e-4
     for k in range(9):

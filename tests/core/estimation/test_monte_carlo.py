@@ -72,9 +72,12 @@ def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
         camera=replace(camera, covariance=1e-12 * camera.covariance),
         pen=pen,
         sigma=1e-6,
-        led_sigma=0.0,
+        led_covariance=0.0 * trials.led_covariance,
+        form_covariances=0.0 * trials.form_covariances,
+        jitter=np.zeros((3, 3)),
         priors=replace(
             trials.priors,
+            center_bias=0.0,
             cameras=(replace(trials.priors.cameras[0], covariance=np.zeros((9, 9))),),
             scale=replace(trials.priors.scale, covariance=np.zeros((1, 1))),
             temperature=replace(trials.priors.temperature, covariance=np.zeros((1, 1))),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.moments import observe_rig_centers
 from lightpen.detection.reasons import Reason
+from lightpen.detection.rig_observations import observe_rig_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.report import calibration_record, warnings_of

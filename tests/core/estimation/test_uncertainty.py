@@ -277,3 +277,16 @@ def test_the_weakest_direction_is_where_the_covariance_is_largest() -> None:
     squares = [budget.weakest_share(share) ** 2 for share in budget.shares]
     assert sum(squares) == pytest.approx(budget.weakest_uncertainty**2)
     assert budget.weakest_share(budget.largest_share) ** 2 == max(squares)
+
+
+def test_a_seat_that_jitters_counts_as_seat_and_not_as_noise_too() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(3):
+        jitter = 0.01 * rng.standard_normal(SWING.translations.shape)
+        moved = replace(SWING, translations=SWING.translations + jitter)
+        budget = calibrated(0.03 * noise(8), moved).budget
+
+        assert any(share.name is ShareName.SEAT for share in budget.shares)
+        # Chance alone makes it 1.5 once in a hundred; the jitter would make it 2.5.
+        assert budget.block_ratio < 2
+        assert budget.correlation_factor < 2

@@ -69,7 +69,7 @@ class Screen:
         self._tell(lambda: self.images.append(image))
         self.may_go_on.wait(TIMEOUT)
 
-    def on_camera(self, event: WorkerEvent) -> None:
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
         self._tell(lambda: self.camera.append(event))
 
     def wait_until(self, is_so: Callable[[], bool]) -> None:
@@ -103,7 +103,7 @@ def make_live(station: "Station", screen: Screen) -> Iterator[MakeLive]:
     def make(camera: ImageCamera | None = None, *, starts: bool = True) -> Live:
         settings = CameraSettings(frame_rate=FRAME_RATE)
         live = Live(
-            *(camera or station.new_camera(), settings, screen, station.runner),
+            *([camera or station.new_camera()], settings, screen, station.runner),
             clock=station.clock,
         )
         lives.append(live)
@@ -222,7 +222,7 @@ def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
     monkeypatch.setattr("lightpen.live.looking.UNHURRIED", TIMEOUT)
     (tmp_path / "still.png").write_bytes(encode_png(PAINTED))
     camera = ReplayCamera(str(tmp_path), loops=True)
-    live = Live(camera, CameraSettings(), screen, station.runner)
+    live = Live([camera], CameraSettings(), screen, station.runner)
     live.start()
     screen.wait_for_images(1)
     time.sleep(1.0)
@@ -252,6 +252,24 @@ def test_what_rests_is_looked_at_less_often_until_it_moves() -> None:
 
 
 # Images
+
+
+def test_an_image_of_12_bits_reaches_the_spots_at_its_full_depth(
+    make_live: MakeLive, screen: Screen, tmp_path: Path
+) -> None:
+    noise = np.random.default_rng(1).integers(0, 16, PAINTED.shape)
+    deep = np.where(PAINTED > 0, 16 * PAINTED.astype(np.uint16) + noise, 0)
+    deep = deep.astype(np.uint16)
+    (tmp_path / "deep.png").write_bytes(encode_png(deep))
+    make_live(ReplayCamera(str(tmp_path), loops=True, clock=SkippingClock()))
+    screen.wait_for_images(1)
+    image = screen.images[-1]
+    centers = detect_spots((deep >> 4).astype(np.uint8)).centers
+
+    assert image.frame.bits == 12
+    expected = detect_spots(deep, full_scale=4095).centers
+    np.testing.assert_array_equal(image.spots.centers, expected)
+    assert not np.array_equal(image.spots.centers, centers)
 
 
 def test_a_slow_reader_is_shown_the_newest_image(
@@ -389,12 +407,13 @@ def test_exposure_and_gain_are_set_while_images_come(
 ) -> None:
     live = make_live()
     screen.wait_for_images(1)
-    live.set_exposure(500.0)
-    live.set_gain(6.0)
+    live.worker().set_exposure(500.0)
+    live.worker().set_gain(6.0)
     screen.wait_until(lambda: screen.images[-1].frame.exposure_us == 500.0)
 
-    assert live.caps is not None
-    assert live.caps.gain_db is not None
+    caps = live.worker().caps
+    assert caps is not None
+    assert caps.gain_db is not None
 
 
 def test_stopping_twice_or_before_the_start_does_no_harm(make_live: MakeLive) -> None:
@@ -447,7 +466,7 @@ def crashed(
     return live
 
 
-def fail(*_: object) -> None:
+def fail(*_: object, **__: object) -> None:
     raise LookingError
 
 

@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings, DeviceNotFound
-from lightpen.live.sources import Surroundings, camera_of
+from lightpen.detection.sighting import look
+from lightpen.live.sources import Surroundings, camera_of, cameras_of
 from lightpen.record.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.sample_rigs import beside
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import SourceChoice, SourceKind
 
@@ -72,3 +75,33 @@ def test_a_recording_that_is_not_there_is_found_missing_when_it_is_opened(
     camera = camera_of(choice, around)
     with pytest.raises(DeviceNotFound, match="no folder, video or image at"):
         camera.open()
+
+
+def test_two_simulated_cameras_see_one_pen_from_two_places(
+    around: Surroundings,
+) -> None:
+    first, second = cameras_of([SourceChoice(), SourceChoice()], around)
+    assert isinstance(first, SimulatedCamera)
+    assert isinstance(second, SimulatedCamera)
+    assert first.operator is second.operator
+    assert first.serial != second.serial
+    first.operator.seat()
+    around.clock.wait(6.0)  # until the pen is there
+    images = []
+    for camera in (first, second):
+        camera.open()
+        camera.start()
+        images.append(camera.read(1.0).image)
+    rig = beside(around.scene.camera, around.scene.cone_cam)
+    pen, tip, cone = around.scene.pen, around.scene.tip_pen, around.scene.cone_cam
+    seen = [
+        look(image, camera, pen)
+        for image, camera in zip(images, rig.cameras, strict=True)
+    ]
+    assert all(sighting.has_pose for sighting in seen)
+    in_second = seen[1].rotation @ tip + seen[1].translation
+    back = rig.rotations[1].T @ (in_second - rig.translations[1])
+    np.testing.assert_allclose(
+        back, seen[0].rotation @ tip + seen[0].translation, atol=1.0
+    )
+    assert np.linalg.norm(back - cone) < 100

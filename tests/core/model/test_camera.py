@@ -27,11 +27,6 @@ def camera(distortion: FloatArray, focal_length: float = 4638.0) -> Camera:
     )
 
 
-def with_intrinsics(values: FloatArray) -> Camera:
-    fx, fy, cx, cy = values[:4]
-    return Camera(2448, 2048, fx, fy, cx, cy, values[4:])
-
-
 def points_in_view(n: int, seed: int = 1) -> FloatArray:
     rng = np.random.default_rng(seed)
     depth = rng.uniform(600, 1800, n)
@@ -123,8 +118,8 @@ def test_jacobian_by_the_intrinsics_agrees_with_central_differences(
         step = 1e-2 if k < 4 else 1e-5  # px, coefficient
         shift = np.zeros(len(cam.intrinsics))
         shift[k] = step
-        ahead = with_intrinsics(cam.intrinsics + shift).pixels(normalised)
-        behind = with_intrinsics(cam.intrinsics - shift).pixels(normalised)
+        ahead = cam.with_intrinsics(cam.intrinsics + shift).pixels(normalised)
+        behind = cam.with_intrinsics(cam.intrinsics - shift).pixels(normalised)
         # The pixels are known to 4e-13 px; the step divides that by 2e-5.
         np.testing.assert_allclose(
             J[..., k], (ahead - behind) / (2 * step), rtol=1e-7, atol=1e-6

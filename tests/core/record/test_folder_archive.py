@@ -615,3 +615,20 @@ def test_a_write_protected_folder_is_told_and_keeps_the_old_tip_in_force(
     assert x_in_force(archive) == 1.0
     assert stored_elsewhere(archive, words=obedient) == ""
     assert x_in_force(archive) == 2.0
+
+
+def test_the_file_of_a_result_is_found_among_others_while_it_is_there(
+    tmp_path: Path,
+) -> None:
+    archive = FolderArchive(tmp_path)
+    swing, later = tmp_path / "records" / "1", NOON + timedelta(hours=1)
+    first, second = result(record=swing), result(record=swing, accepted=later)
+    for each in (first, second, result(record=swing.with_name("2"))):
+        archive.store(each)
+
+    files = [archive.file_of(each) for each in (first, second)]
+
+    assert [file.name for file in files] == ["000001.json", "000002.json"]
+    files[0].unlink()
+    with pytest.raises(FileError, match=r"T-10.*is not in"):
+        archive.file_of(first)

@@ -116,7 +116,7 @@ def test_the_record_brings_its_own_camera_and_pen(
     assert found.camera.fx == paper_camera().fx
     np.testing.assert_array_equal(found.pen.leds, paper_pen().leds)
     np.testing.assert_array_equal(found.pen.nominal_tip, header.nominal_tip)
-    np.testing.assert_array_equal(found.mask, header.mask)
+    np.testing.assert_array_equal(found.masks[0], header.mask)
 
 
 def test_killed_at_any_moment_it_keeps_every_acknowledged_image(
@@ -199,7 +199,7 @@ def test_damage_in_the_middle_is_refused_and_located(
 @pytest.mark.parametrize(
     ("number", "sentence"),
     [
-        (3, r"written by a later version of the program \(format 3; this version read"),
+        (4, r"written by a later version of the program \(format 4; this version read"),
         (0, "header.json is damaged"),
         ("new", "header.json is damaged"),
         (None, "header.json is damaged"),

@@ -14,7 +14,6 @@ from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.results import (
     CALIBRATION,
-    OLD,
     Result,
     Since,
     Why,
@@ -45,11 +44,6 @@ RESULT = Result(
     doubts=(Why("warning.drift", "The cone moved."),),
     change=Since(NOON - timedelta(days=1), (0.1, 0.2, 0.3), (0.01, 0.01, 0.01)),
 )
-
-
-@pytest.mark.parametrize(("age", "old"), [(OLD, False), (1.01 * OLD, True)])
-def test_a_tip_grows_old(age: timedelta, old: bool) -> None:
-    assert RESULT.is_old(NOON + age) is old
 
 
 def test_the_head_tells_whose_it_is_and_needs_no_more_of_the_file() -> None:

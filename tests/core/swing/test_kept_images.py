@@ -12,6 +12,7 @@ from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.observation_files import Centers
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
+from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -29,6 +30,7 @@ from lightpen.swing.kept_images import (
 )
 
 CAMERA, PEN = paper_camera(), paper_pen()
+RIG = rig_of(CAMERA)
 
 
 def centers(swing: Swing) -> np.ndarray:
@@ -38,12 +40,12 @@ def centers(swing: Swing) -> np.ndarray:
 
 def grown(swing: Swing) -> KeptImages:
     """Keep the images of a swing one by one, 0.1 s apart."""
-    kept = none_kept(PEN.n_leds)
+    kept = none_kept(1, PEN.n_leds)
     for i, pixels in enumerate(centers(swing)):
         sighting = sight_centers(
             *(CAMERA, PEN, pixels, swing.rotations[i], swing.translations[i])
         )
-        kept = keep(CAMERA, PEN, kept, sighting, i + 1, 0.1 * i)
+        kept = keep(RIG, PEN, kept, sighting, i + 1, 0.1 * i)
     return kept
 
 
@@ -66,14 +68,14 @@ def test_the_uncertainty_during_the_swing_is_that_of_the_verdict(
     pixels = centers(swing)
     most = n_images - 4
     kept = kept_before(
-        *(camera, PEN, np.arange(most), pixels[:most]),
+        *(rig_of(camera), PEN, np.arange(most), pixels[:most, None]),
         *(swing.rotations[:most], swing.translations[:most]),
     )
     for i in range(most, n_images):  # an image more adds its own alone
         sighting = sight_centers(
             *(camera, PEN, pixels[i], swing.rotations[i], swing.translations[i])
         )
-        kept = keep(camera, PEN, kept, sighting, i + 1, 0.1 * i)
+        kept = keep(rig_of(camera), PEN, kept, sighting, i + 1, 0.1 * i)
     seen = observe_centers(
         Centers(np.arange(n_images), pixels, Path("simulated")), camera, PEN
     )
@@ -87,7 +89,7 @@ def test_what_is_assumed_of_the_station_counts_during_the_swing() -> None:
     swing = swing_poses(40, np.random.default_rng(2))
     usual, worn = (
         kept_before(
-            *(CAMERA, PEN, np.arange(40), centers(swing)),
+            *(RIG, PEN, np.arange(40), centers(swing)[:, None]),
             *(swing.rotations, swing.translations, assumed),
         )
         for assumed in (USUAL, replace(USUAL, form_error=0.01))
@@ -100,7 +102,7 @@ def test_kept_one_by_one_or_all_at_once_gives_the_same_tip() -> None:
     swing = swing_poses(30, np.random.default_rng(0))
     kept = grown(swing)
     together = kept_before(
-        *(CAMERA, PEN, kept.numbers, kept.pixels),
+        *(RIG, PEN, kept.numbers, kept.pixels),
         *(swing.rotations, swing.translations),
     )
     assert kept.joint is not None
@@ -122,18 +124,18 @@ def test_nothing_is_certain_before_the_postures_allow_a_joint_fit() -> None:
 
 def test_slipped_images_are_left_out_and_no_others() -> None:
     out = [5, 6, 31]
-    kept, numbers = without_slipped(CAMERA, PEN, grown(slipping(out, 0.5)))
+    kept, numbers = without_slipped(RIG, PEN, grown(slipping(out, 0.5)))
     assert numbers == {6, 7, 32}
     assert not np.isin(kept.numbers, list(numbers)).any()
     clean = grown(slipping([], 0.0))
-    assert without_slipped(CAMERA, PEN, clean)[1] == set()
+    assert without_slipped(RIG, PEN, clean)[1] == set()
 
 
 def test_images_from_before_a_slip_need_not_be_far_out() -> None:
     # Half out: between the two gates.
     kept = grown(slipping([38, 39], 0.06))
-    _, sure = without_slipped(CAMERA, PEN, kept)
-    _, suspected = without_slipped(CAMERA, PEN, kept, since=3.75)
+    _, sure = without_slipped(RIG, PEN, kept)
+    _, suspected = without_slipped(RIG, PEN, kept, since=3.75)
     assert sure < suspected
     assert suspected <= {39, 40}
 
@@ -149,11 +151,11 @@ def test_the_uncertainty_is_that_of_the_direction_known_least() -> None:
 def test_images_from_before_an_interruption_are_from_before_any_slip() -> None:
     swing = slipping([38, 39], 0.06)
     kept = kept_before(
-        *(CAMERA, PEN, np.arange(40), centers(swing)),
+        *(RIG, PEN, np.arange(40), centers(swing)[:, None]),
         *(swing.rotations, swing.translations),
     )
-    sure = without_slipped(CAMERA, PEN, kept)[1]
-    assert without_slipped(CAMERA, PEN, kept, since=-1e9)[1] == sure
+    sure = without_slipped(RIG, PEN, kept)[1]
+    assert without_slipped(RIG, PEN, kept, since=-1e9)[1] == sure
 
 
 def test_an_image_that_the_fit_leaves_out_has_the_misfit_of_all_its_leds() -> None:
@@ -171,7 +173,7 @@ def test_a_tip_that_wobbles_throughout_costs_no_images() -> None:
     swing = swing_poses(60, np.random.default_rng(0))
     wobble = 0.15 * np.random.default_rng(2).standard_normal((60, 3))
     swing.translations[:] += wobble
-    kept, numbers = without_slipped(CAMERA, PEN, grown(swing))
+    kept, numbers = without_slipped(RIG, PEN, grown(swing))
     assert distance_unit(kept) > 1.5
     assert len(numbers) <= 2
 
@@ -180,9 +182,9 @@ def test_a_tip_that_wobbles_throughout_costs_no_images() -> None:
 def test_hardly_any_images_do_no_harm(n_images: int) -> None:
     swing = swing_poses(3, np.random.default_rng(0))
     kept = kept_before(
-        *(CAMERA, PEN, np.arange(n_images), centers(swing)[:n_images]),
+        *(RIG, PEN, np.arange(n_images), centers(swing)[:n_images, None]),
         *(swing.rotations[:n_images], swing.translations[:n_images]),
     )
     assert len(kept) == n_images
-    assert without_slipped(CAMERA, PEN, kept)[1] == set()
+    assert without_slipped(RIG, PEN, kept)[1] == set()
     assert distance_unit(kept) == 1.0

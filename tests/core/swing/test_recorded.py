@@ -188,7 +188,7 @@ def test_a_reading_goes_on_with_its_own_recording_only(
     (folder,) = station.interrupted()
     swing = read_resumable(folder)
 
-    assert swing.is_of(SourceChoice(SourceKind.RECORDED, str(recording.place)))
-    assert not swing.is_of(SourceChoice(SourceKind.RECORDED, str(tmp_path)))
-    assert not swing.is_of(SourceChoice(SourceKind.SIMULATED))
+    assert swing.is_of([SourceChoice(SourceKind.RECORDED, str(recording.place))])
+    assert not swing.is_of([SourceChoice(SourceKind.RECORDED, str(tmp_path))])
+    assert not swing.is_of([SourceChoice(SourceKind.SIMULATED)])
     assert source(swing.record).origin is Origin.SIMULATED

@@ -175,8 +175,8 @@ def capturing_from(n_kept: int, sigma: float = 0.05) -> SwingState:
     """Return a swing that captures and has kept the first so many postures."""
     setup, some = SwingSetup(paper_camera(), paper_pen()), slice(n_kept)
     kept = kept_before(
-        *(setup.camera, setup.pen, np.arange(n_kept) + 1),
-        *(centers_of(POSTURES, sigma)[some], POSTURES.rotations[some]),
+        *(setup.rig, setup.pen, np.arange(n_kept) + 1),
+        *(centers_of(POSTURES, sigma)[some, None], POSTURES.rotations[some]),
         POSTURES.translations[some],
     )
     return replace(

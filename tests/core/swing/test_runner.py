@@ -45,7 +45,7 @@ class Screen:
     def on_image(self, image: LiveImage) -> None:
         """Nothing is shown."""
 
-    def on_camera(self, event: WorkerEvent) -> None:
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
         """Nothing happens to this camera."""
 
 
@@ -58,7 +58,7 @@ def test_a_swing_goes_from_the_first_image_to_the_accepted_tip_without_a_key(
     station, witness = present, present.witness
     assert (station.status.state, station.status.is_capturing) == (None, False)
     live = Live(
-        *(station.new_camera(), CameraSettings(frame_rate=FRAME_RATE)),
+        *([station.new_camera()], CameraSettings(frame_rate=FRAME_RATE)),
         *(Screen(), station.runner),
         clock=station.clock,
     )

@@ -49,7 +49,7 @@ def state_of(setup: SwingSetup, swing: Swing) -> SwingState:
         np.random.default_rng(1),
     )
     kept = kept_before(
-        *(setup.camera, setup.pen, np.arange(len(swing)), pixels),
+        *(setup.rig, setup.pen, np.arange(len(swing)), pixels[:, None]),
         *(swing.rotations, swing.translations),
     )
     return replace(start_swing(setup), kept=kept)
@@ -156,7 +156,7 @@ def test_a_target_out_of_reach_is_chosen_anew_after_a_while() -> None:
         target_since=10.0,
     )
     pose = state.kept.rotations[-1], state.kept.translations[-1]
-    sighting = sight_centers(CAMERA, PEN, state.kept.pixels[-1], *pose)
+    sighting = sight_centers(CAMERA, PEN, state.kept.pixels[-1, 0], *pose)
 
     soon = guided(setup, replace(state, time=13.9), sighting)
     late = guided(setup, replace(state, time=14.0), sighting)

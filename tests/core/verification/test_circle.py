@@ -9,8 +9,8 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
 from lightpen.verification.circle import Circle, fit_circle, measure_circle
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch
 
 Touching = Callable[..., tuple[Touch, ...]]

@@ -8,9 +8,9 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.fixed_point import measure_fixed_point
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch
 
 Touching = Callable[..., tuple[Touch, ...]]

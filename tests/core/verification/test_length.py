@@ -9,9 +9,9 @@ import pytest
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.length import measure_length
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.touch import Touch
 
 Touching = Callable[..., tuple[Touch, ...]]

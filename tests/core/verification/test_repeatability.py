@@ -8,9 +8,9 @@ import pytest
 
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
 from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.charts import write_chart
-from lightpen.verification.limits import VerificationLimits
 from lightpen.verification.repeatability import (
     TipEstimate,
     measure_repeatability,

@@ -28,6 +28,7 @@ def observe_rig_images(
     rig: Rig,
     pen: Pen,
     report: Report = lambda fraction: None,
+    masks: Sequence[FloatArray | None] | None = None,
 ) -> tuple[Observations, ...]:
     """Find and label the LEDs in the images of a rig; see `observe_images`.
 
@@ -35,6 +36,8 @@ def observe_rig_images(
     ----------
     pairing : Pairing
         Which images of the sources are of the same moment.
+    masks : sequence of (M, 3) array or None, optional
+        Circles of stray light before each camera: centre x, y and radius, px.
 
     Returns
     -------
@@ -53,7 +56,8 @@ def observe_rig_images(
             report((c + fraction) / len(sources))
 
         try:
-            seen.append(observe_images(source, rig.cameras[c], pen, part))
+            mask = None if masks is None else masks[c]
+            seen.append(observe_images(source, rig.cameras[c], pen, part, mask=mask))
         except FileError as error:
             raise FileError(_with_exchange(rig, c, error.sentence)) from error
         except CalibrationError as error:

@@ -1,0 +1,1 @@
+"""Every calibration that was ever accepted, refused or abandoned, entry by entry."""

@@ -1,0 +1,387 @@
+"""The chains in a database: appended to where they are at home, copied elsewhere."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any
+from uuid import uuid4
+
+from sqlalchemy import Connection, Row, func, insert, select, update
+
+from lightpen.archive.database import Database
+from lightpen.archive.entries import (
+    NOTHING_BEFORE,
+    Event,
+    Head,
+    Kind,
+    Written,
+    chained,
+    read_entry,
+    text_sha256,
+)
+from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.errors import ArchiveError
+from lightpen.formats.own_json import DamagedError
+from lightpen.sentences import Sentence, sentence
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
+_AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
+BATCH = 200  # entries that are copied in one transaction
+
+
+@dataclass(frozen=True)
+class Copied:
+    """What became of entries that were to be copied.
+
+    Attributes
+    ----------
+    n_new : int
+        That were not there yet.
+    """
+
+    n_new: int
+    n_known: int
+
+
+def own_chain(database: Database) -> str:
+    """Return the chain that is at home in a database; it begins with the first call."""
+    with database.writing() as connection:
+        chain = connection.execute(_AT_HOME).scalar_one_or_none()
+        if chain is None:
+            chain = uuid4().hex
+            _begin(connection, chain, is_own=True)
+    return chain
+
+
+def chain_at_home(database: Database) -> str | None:
+    """Return the chain that is at home in a database, if it has begun."""
+    with database.reading() as connection:
+        return connection.execute(_AT_HOME).scalar_one_or_none()
+
+
+def append(
+    database: Database, chain: str, event: Event, record: str | None = None
+) -> Written | None:
+    """Append an entry to a chain that is at home in a database.
+
+    When this returns, the entry is kept whatever happens next; when it raises, or is
+    killed, it is kept whole or not at all. Of two programs that enter the same result
+    file, or that the same swing was set aside, one does; the other gets None.
+
+    Parameters
+    ----------
+    record : str, optional
+        As JSON; the event has its hash.
+
+    Raises
+    ------
+    ArchiveError
+        It cannot be kept.
+    """
+    with database.writing() as connection:
+        if _is_entered(connection, chain, event):
+            return None
+        entry = chained(_head(connection, chain), event)
+        if record is not None:
+            _keep_records(connection, {text_sha256(record): record})
+        _put(connection, chain, [entry])
+    return entry
+
+
+def copy_entries(
+    database: Database,
+    chain: str,
+    entries: Iterable[Written],
+    records: Mapping[str, str],
+) -> Copied:
+    """Let the copy of a chain grow by entries, in their order; known ones are passed.
+
+    Raises
+    ------
+    ArchiveError
+        They do not go on where the copy ends, or the copy says otherwise.
+    """
+    with database.writing() as connection:
+        if connection.dialect.name == "postgresql":
+            connection.execute(select(func.pg_advisory_xact_lock(int(chain[:15], 16))))
+        head = _head(connection, chain)
+        if head.number == 0 and not _is_known(connection, chain):
+            _begin(connection, chain, is_own=False)
+        known, new = _parted(entries, head.number)
+        _require_same(connection, chain, known)
+        _require_next(head, new)
+        _keep_records(connection, _named(new, records))
+        _put(connection, chain, new)
+    return Copied(len(new), len(known))
+
+
+def heads(database: Database) -> tuple[Head, ...]:
+    """Return how far each chain has come."""
+    with database.reading() as connection:
+        rows = connection.execute(select(CHAINS).order_by(CHAINS.c.chain)).all()
+    return tuple(Head(row.chain, row.number, row.sha256) for row in rows)
+
+
+def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[Written]:
+    """Yield the entries of a chain in their order.
+
+    Parameters
+    ----------
+    after : int
+        Number of the entry before the first.
+
+    Raises
+    ------
+    ArchiveError
+        One is damaged.
+    """
+    while True:
+        batch = batch_of(database, chain, after)
+        yield from batch
+        if len(batch) < BATCH:
+            return
+        after = batch[-1].entry.number
+
+
+def batch_of(database: Database, chain: str, after: int) -> tuple[Written, ...]:
+    """Return the next few entries of a chain, as `entries_of`."""
+    wanted = (
+        select(ENTRIES.c.number, ENTRIES.c.text)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.number > after)
+        .order_by(ENTRIES.c.number)
+        .limit(BATCH)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(wanted).all()
+    return tuple(read_row(database, row.number, row.text) for row in rows)
+
+
+def records_of(database: Database, entries: Sequence[Written]) -> dict[str, str]:
+    """Return the records that entries vouch for, by their hash."""
+    names = [each.entry.event.record_sha256 for each in entries]
+    wanted = select(RECORDS).where(RECORDS.c.sha256.in_([n for n in names if n]))
+    with database.reading() as connection:
+        return {row.sha256: row.text for row in connection.execute(wanted)}
+
+
+def entry_of_result(database: Database, chain: str, place: str) -> Written | None:
+    """Return the entry of the result file at a place, if there is one."""
+    wanted = select(ENTRIES.c.number, ENTRIES.c.text).where(
+        ENTRIES.c.chain == chain, ENTRIES.c.result == searchable(place)
+    )
+    with database.reading() as connection:
+        row = connection.execute(wanted).one_or_none()
+    return None if row is None else read_row(database, row.number, row.text)
+
+
+def entered_places(database: Database, chain: str) -> frozenset[str]:
+    """Return the places of the result files and swings that a chain tells of.
+
+    A swing whose result was taken back is not among them: it may still be set aside.
+    """
+    wanted = (
+        select(ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
+        .where(ENTRIES.c.chain == chain)
+        .order_by(ENTRIES.c.number)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(wanted).all()
+    last = {row.swing: row.kind for row in rows}
+    swings = {swing for swing, kind in last.items() if kind != Kind.TAKEN_BACK.value}
+    return frozenset(swings | {row.result for row in rows})
+
+
+def columns_of(entry: Written) -> dict[str, Any]:
+    """Return the row of an entry."""
+    event, names = entry.entry.event, entry.entry.event.names
+    return {
+        "chain": entry.entry.chain,
+        "number": entry.entry.number,
+        "sha256": entry.sha256,
+        "since_us": since_us(entry.entry.since),
+        "kind": event.kind.value,
+        "station": searchable(names.station),
+        "pen": searchable(names.pen),
+        "tip": searchable(names.tip),
+        "is_simulated": event.is_simulated,
+        "swing": searchable(event.swing),
+        "result": "" if event.result is None else searchable(event.result.place),
+        "concerns": event.concerns or "",
+        "record_sha256": event.record_sha256 or "",
+        "text": entry.text,
+    }
+
+
+def sound_entry(row: Row[Any]) -> Written | None:
+    """Return the entry in a row, unless anything in the row was changed.
+
+    Parameters
+    ----------
+    row : Row
+        With all columns; others may follow them.
+    """
+    columns = {column.name: row._mapping[column] for column in ENTRIES.c}
+    if not isinstance(columns["text"], str):
+        return None
+    try:
+        entry = read_entry(columns["text"])
+    except DamagedError:
+        return None
+    return entry if columns_of(entry) == columns else None
+
+
+def since_us(moment: datetime) -> int:
+    """Return a moment as the column has it."""
+    return (moment - EPOCH) // timedelta(microseconds=1)
+
+
+def searchable(text: str) -> str:
+    """Return a text as every database can hold it."""
+    return text.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
+
+
+def _head(connection: Connection, chain: str) -> Head:
+    """Return the last entry of a chain as the entries have it."""
+    last = (
+        select(ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.since_us)
+        .where(ENTRIES.c.chain == chain)
+        .order_by(ENTRIES.c.number.desc())
+        .limit(1)
+    )
+    row = connection.execute(last).one_or_none()
+    if row is None:
+        return Head(chain)
+    since = EPOCH + timedelta(microseconds=row.since_us)
+    return Head(chain, row.number, row.sha256, since)
+
+
+def _is_entered(connection: Connection, chain: str, event: Event) -> bool:
+    if event.result is not None:
+        same = ENTRIES.c.result == searchable(event.result.place)
+    elif event.kind in SET_ASIDE:
+        kinds = [kind.value for kind in SET_ASIDE]
+        same = (ENTRIES.c.swing == searchable(event.swing)) & ENTRIES.c.kind.in_(kinds)
+    else:
+        return False
+    wanted = select(ENTRIES.c.number).where(ENTRIES.c.chain == chain, same).limit(1)
+    return connection.execute(wanted).one_or_none() is not None
+
+
+def _is_known(connection: Connection, chain: str) -> bool:
+    wanted = select(CHAINS.c.chain).where(CHAINS.c.chain == chain)
+    return connection.execute(wanted).one_or_none() is not None
+
+
+def _begin(connection: Connection, chain: str, *, is_own: bool) -> None:
+    connection.execute(
+        insert(CHAINS).values(
+            chain=chain, is_own=is_own, number=0, sha256=NOTHING_BEFORE
+        )
+    )
+
+
+def _put(connection: Connection, chain: str, entries: Sequence[Written]) -> None:
+    if not entries:
+        return
+    connection.execute(insert(ENTRIES), list(map(columns_of, entries)))
+    last = entries[-1]
+    connection.execute(
+        update(CHAINS)
+        .where(CHAINS.c.chain == chain)
+        .values(number=last.entry.number, sha256=last.sha256)
+    )
+
+
+def _keep_records(connection: Connection, records: Mapping[str, str]) -> None:
+    """Keep records that are not there yet."""
+    wanted = select(RECORDS.c.sha256).where(RECORDS.c.sha256.in_(list(records)))
+    known = set(connection.execute(wanted).scalars())
+    new = [{"sha256": n, "text": t} for n, t in records.items() if n not in known]
+    if new:
+        connection.execute(insert(RECORDS), new)
+
+
+def _parted(
+    entries: Iterable[Written], number: int
+) -> tuple[list[Written], list[Written]]:
+    """Return the entries up to a number, and the others."""
+    known: list[Written] = []
+    new: list[Written] = []
+    for each in entries:
+        (known if each.entry.number <= number else new).append(each)
+    return known, new
+
+
+def _require_same(connection: Connection, chain: str, known: list[Written]) -> None:
+    numbers = [each.entry.number for each in known]
+    wanted = select(ENTRIES.c.number, ENTRIES.c.sha256).where(
+        ENTRIES.c.chain == chain, ENTRIES.c.number.in_(numbers)
+    )
+    there = {row.number: row.sha256 for row in connection.execute(wanted)}
+    for each in known:
+        if there.get(each.entry.number) != each.sha256:
+            raise ArchiveError(_forked(each))
+
+
+def _require_next(head: Head, new: list[Written]) -> None:
+    number, sha256 = head.number, head.sha256
+    for each in new:
+        if (each.entry.number, each.entry.previous) != (number + 1, sha256):
+            raise ArchiveError(_forked(each))
+        number, sha256 = each.entry.number, each.sha256
+
+
+def _named(entries: Sequence[Written], records: Mapping[str, str]) -> dict[str, str]:
+    """Return the records that entries vouch for, having looked at each."""
+    named = {}
+    for each in entries:
+        wanted = each.entry.event.record_sha256
+        if wanted is None:
+            continue
+        text = records.get(wanted)
+        if text is None or text_sha256(text) != wanted:
+            raise ArchiveError(
+                sentence(
+                    "archive.record-missing",
+                    "The record of entry {number} of station {station} is missing or "
+                    "was changed. Get the entries from their station again.",
+                    number=each.entry.number,
+                    station=each.entry.event.names.station,
+                )
+            )
+        named[wanted] = text
+    return named
+
+
+def _forked(entry: Written) -> Sentence:
+    return sentence(
+        "archive.forked",
+        "Entry {number} of station {station} is not the one that follows here. A data "
+        "folder was copied and both copies were gone on with, or entries were "
+        "changed. Check both archives.",
+        number=entry.entry.number,
+        station=entry.entry.event.names.station,
+    )
+
+
+def read_row(database: Database, number: int, text: str) -> Written:
+    """Return the entry in a row, by its number and its text.
+
+    Raises
+    ------
+    ArchiveError
+        It is damaged.
+    """
+    try:
+        return read_entry(text)
+    except DamagedError as error:
+        raise ArchiveError(
+            sentence(
+                "archive.entry-damaged",
+                "Entry {number} of the archive {archive} is damaged. Restore the "
+                "archive from a copy.",
+                number=number,
+                archive=database.name,
+            )
+        ) from error

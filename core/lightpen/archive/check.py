@@ -1,0 +1,266 @@
+"""Whether all of an archive is as it was entered: its rows, chains and records."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Row, exists, select, text
+
+from lightpen.archive.chains import chain_at_home, heads, records_of, sound_entry
+from lightpen.archive.database import Database
+from lightpen.archive.entries import NOTHING_BEFORE, Head, text_sha256
+from lightpen.archive.files_check import FilesCheck
+from lightpen.archive.seal import is_sealed_otherwise
+from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
+from lightpen.errors import LightpenError
+from lightpen.sentences import Sentence, sentence
+
+BATCH = 200  # rows that are read at one time
+SOUND = "ok"  # SQLite's word for a file without damage
+SHORT = 8  # characters by which a chain is named
+
+Report = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check came to.
+
+    Attributes
+    ----------
+    n_files : int
+        That entries vouch for and that were read, images among them.
+    findings : tuple of Sentence
+        What is not as it was entered; empty where all is.
+    """
+
+    n_entries: int
+    n_files: int
+    findings: tuple[Sentence, ...]
+
+
+def check_archive(
+    database: Database,
+    data: Path | None = None,
+    report: Report = lambda fraction: None,
+) -> Checked:
+    """Look at every entry, every record and every file that an archive vouches for.
+
+    Parameters
+    ----------
+    data : Path, optional
+        Data folder, whose files are looked at, too.
+    report : callable
+        Called with the fraction done, 0 to 1; what it raises ends the check.
+
+    Raises
+    ------
+    ArchiveError
+        It cannot be read at all.
+    """
+    ends, home = heads(database), chain_at_home(database)
+    n_all = max(1, sum(head.number for head in ends))
+    files = FilesCheck(data)
+    stages = [_damage(database), _broken_seal(database, ends)]
+    n_before = 0
+    for head in ends:
+        start, share = n_before / n_all, head.number / n_all
+
+        def part(fraction: float, start: float = start, share: float = share) -> None:
+            report(start + share * fraction)
+
+        own = files if head.chain == home else None
+        stages.append(_walked(database, head, own, part))
+        n_before += head.number
+    stages += [_strays(database), _changed_records(database), _lost_records(database)]
+    findings = tuple(each for stage in stages for each in _told(stage))
+    return Checked(n_before, files.n_files, findings)
+
+
+def _told(stage: Iterator[Sentence]) -> Iterator[Sentence]:
+    """Yield what a stage finds, and why it cannot go on."""
+    try:
+        yield from stage
+    except LightpenError as error:
+        yield error.sentence
+
+
+def _damage(database: Database) -> Iterator[Sentence]:
+    """Yield what SQLite itself finds in its file."""
+    if database.file is None:
+        return
+    with database.reading() as connection:
+        found = connection.execute(text("PRAGMA integrity_check(10)")).scalars().all()
+    for each in found:
+        if each != SOUND:
+            yield sentence(
+                "archive.file-damaged",
+                "The file {file} is damaged: {what}.",
+                file=database.name,
+                what=str(each),
+            )
+
+
+def _broken_seal(database: Database, ends: tuple[Head, ...]) -> Iterator[Sentence]:
+    if database.file is not None and is_sealed_otherwise(database.file, ends):
+        yield sentence(
+            "archive.seal-broken",
+            "The file {file} was changed since it was closed.",
+            file=database.name,
+        )
+
+
+def _walked(
+    database: Database, head: Head, files: FilesCheck | None, report: Report
+) -> Iterator[Sentence]:
+    """Yield what is not right from the first entry of a chain to its last."""
+    number, previous = 0, NOTHING_BEFORE
+    while rows := _rows_after(database, head.chain, number):
+        sound = []
+        for row in rows:
+            if not isinstance(row.number, int):  # SQLite keeps a text there, too
+                yield _changed(head.chain, number + 1)
+                return
+            if row.number > number + 1:
+                yield _missing(head.chain, number + 1, row.number - 1)
+                previous = ""
+            entry = sound_entry(row)
+            if entry is None:
+                yield _changed(head.chain, row.number)
+            elif previous not in ("", entry.entry.previous):
+                yield _unchained(head.chain, row.number)
+            else:
+                sound.append(entry)
+            number, previous = row.number, row.sha256
+        if files is not None:
+            yield from files.findings(sound, records_of(database, sound))
+        report(min(1.0, number / max(1, head.number)))
+    if number < head.number:
+        yield _missing(head.chain, number + 1, head.number)
+    elif (number, previous) != (head.number, head.sha256) and previous:
+        yield sentence(
+            "archive.head-changed",
+            "The chain {chain} does not end with the entry that was entered last.",
+            chain=head.chain[:SHORT],
+        )
+
+
+def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:
+    rows = (
+        select(ENTRIES)
+        .where(ENTRIES.c.chain == chain, ENTRIES.c.number > number)
+        .order_by(ENTRIES.c.number)
+        .limit(BATCH)
+    )
+    with database.reading() as connection:
+        return list(connection.execute(rows))
+
+
+def _strays(database: Database) -> Iterator[Sentence]:
+    """Yield the entries that are of no chain."""
+    known = select(CHAINS.c.chain)
+    strays = select(ENTRIES.c.chain).where(ENTRIES.c.chain.not_in(known)).distinct()
+    with database.reading() as connection:
+        found = connection.execute(strays).scalars().all()
+    for chain in found:
+        yield sentence(
+            "archive.no-such-chain",
+            "There are entries of the chain {chain}, which the archive does not know.",
+            chain=str(chain)[:SHORT],
+        )
+
+
+def _changed_records(database: Database) -> Iterator[Sentence]:
+    last = ""
+    while True:
+        rows = (
+            select(RECORDS)
+            .where(RECORDS.c.sha256 > last)
+            .order_by(RECORDS.c.sha256)
+            .limit(BATCH)
+        )
+        with database.reading() as connection:
+            found = connection.execute(rows).all()
+        for row in found:
+            if not isinstance(row.text, str) or text_sha256(row.text) != row.sha256:
+                yield sentence(
+                    "archive.record-changed",
+                    "The record {record} of {entries} was changed in the archive.",
+                    record=row.sha256[:SHORT],
+                    entries=_entries_of(database, row.sha256),
+                )
+        if len(found) < BATCH:
+            return
+        last = found[-1].sha256
+
+
+def _lost_records(database: Database) -> Iterator[Sentence]:
+    """Yield the entries whose record is missing."""
+    is_there = exists().where(RECORDS.c.sha256 == ENTRIES.c.record_sha256)
+    lost = select(ENTRIES.c.chain, ENTRIES.c.number).where(
+        ENTRIES.c.record_sha256 != "", ~is_there
+    )
+    with database.reading() as connection:
+        rows = connection.execute(lost).all()
+    for row in rows:
+        yield sentence(
+            "archive.record-lost",
+            "The record of {entry} is missing.",
+            entry=_named(row.chain, row.number),
+        )
+
+
+def _entries_of(database: Database, record: str) -> tuple[Sentence, ...]:
+    vouching = select(ENTRIES.c.chain, ENTRIES.c.number).where(
+        ENTRIES.c.record_sha256 == record
+    )
+    with database.reading() as connection:
+        rows = connection.execute(vouching).all()
+    found = tuple(_named(row.chain, row.number) for row in rows)
+    return found or (sentence("archive.no-entry", "no entry"),)
+
+
+def _named(chain: str, number: int) -> Sentence:
+    return sentence(
+        "archive.entry",
+        "entry {number} of the chain {chain}",
+        number=number,
+        chain=chain[:SHORT],
+    )
+
+
+def _changed(chain: str, number: int) -> Sentence:
+    return sentence(
+        "archive.entry-changed",
+        "Entry {number} of the chain {chain} was changed.",
+        number=number,
+        chain=chain[:SHORT],
+    )
+
+
+def _unchained(chain: str, number: int) -> Sentence:
+    return sentence(
+        "archive.entry-unchained",
+        "Entry {number} of the chain {chain} does not follow the one before it: one of "
+        "the two was replaced.",
+        number=number,
+        chain=chain[:SHORT],
+    )
+
+
+def _missing(chain: str, first: int, last: int) -> Sentence:
+    if first == last:
+        return sentence(
+            "archive.entry-missing",
+            "Entry {number} of the chain {chain} is missing.",
+            number=first,
+            chain=chain[:SHORT],
+        )
+    return sentence(
+        "archive.entries-missing",
+        "Entries {first} to {last} of the chain {chain} are missing.",
+        first=first,
+        last=last,
+        chain=chain[:SHORT],
+    )

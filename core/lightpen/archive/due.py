@@ -1,0 +1,100 @@
+"""When the tips in force are due to be calibrated again."""
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import select
+
+from lightpen.archive.chains import searchable, since_us
+from lightpen.archive.database import Database
+from lightpen.archive.entries import Kind, Written
+from lightpen.archive.history import known_names
+from lightpen.archive.queries import last_accepted, of_chain
+from lightpen.archive.tables import ENTRIES
+from lightpen.record.due_rule import DueRule
+
+SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
+
+
+@dataclass(frozen=True)
+class DueTip:
+    """A tip in force.
+
+    Attributes
+    ----------
+    entry : Written
+        That put it in force.
+    due : datetime
+        By its age.
+    n_swings : int
+        Of its pen since.
+    n_left : int or None
+        Swings until it is due by their count; None if any number may be made.
+    """
+
+    entry: Written
+    due: datetime
+    n_swings: int
+    n_left: int | None
+
+    def is_due(self, now: datetime) -> bool:
+        """Return whether it is to be calibrated before it measures."""
+        return now > self.due or (self.n_left is not None and self.n_left <= 0)
+
+
+def due_tips(database: Database, chain: str, rule: DueRule) -> tuple[DueTip, ...]:
+    """Return the tips of real pens in force at a station, the due ones first.
+
+    Parameters
+    ----------
+    chain : str
+        That is at home where they are in force.
+    """
+    found = (
+        last_accepted(database, pen, tip, chain=chain)
+        for pen, tip in known_names(database).tips
+    )
+    entries = [entry for entry in found if entry is not None]
+    if not entries:
+        return ()
+    swings = _swings(database, chain, min(each.entry.since for each in entries))
+    return tuple(
+        sorted((_due_tip(each, swings, rule) for each in entries), key=_urgency)
+    )
+
+
+def _urgency(tip: DueTip) -> tuple[bool, datetime]:
+    return tip.n_left is None or tip.n_left > 0, tip.due
+
+
+def _due_tip(entry: Written, swings: Mapping[str, list[int]], rule: DueRule) -> DueTip:
+    of_pen = swings.get(searchable(entry.entry.event.names.pen), [])
+    n_swings = len(of_pen) - bisect_right(of_pen, since_us(entry.entry.since))
+    return DueTip(
+        entry,
+        rule.due(entry.entry.event.at),
+        n_swings,
+        rule.max_swings - n_swings if rule.max_swings else None,
+    )
+
+
+def _swings(database: Database, chain: str, since: datetime) -> dict[str, list[int]]:
+    """Return when each real pen was swung since, in order, as the column has it."""
+    found = (
+        select(ENTRIES.c.pen, ENTRIES.c.since_us)
+        .where(
+            ENTRIES.c.since_us > since_us(since),
+            ENTRIES.c.kind.in_([kind.value for kind in SWINGS]),
+            ~ENTRIES.c.is_simulated,
+            of_chain(chain),
+        )
+        .order_by(ENTRIES.c.since_us)
+    )
+    swings = defaultdict[str, list[int]](list)
+    with database.reading() as connection:
+        for row in connection.execute(found):
+            swings[row.pen].append(row.since_us)
+    return swings

@@ -1,0 +1,212 @@
+"""An entry of the archive, its one way of being written, and the chain of all.
+
+An archive holds chains, one for each data folder that was ever entered in it. A chain
+grows only where its data folder is; everywhere else it is a copy of what was entered
+there. Each entry carries the hash of the one before it, so that none can be changed,
+left out or put in between without all that follow telling of it.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from hashlib import sha256
+from importlib.metadata import version
+from typing import Annotated, TypeAlias
+
+from msgspec import Meta, Struct, to_builtins
+
+from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, require_usual
+from lightpen.model.origin import Origin
+from lightpen.record.assumed import Plain
+from lightpen.record.names import Names
+from lightpen.record.results import Why
+
+NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
+TICK = timedelta(microseconds=1)
+
+Chain: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{32}$")]
+
+
+class Kind(StrEnum):
+    """What an entry tells of."""
+
+    ACCEPTED = "accepted"
+    RESTORED = "restored"
+    REFUSED = "refused"
+    ABANDONED = "abandoned"
+    TAKEN_BACK = "taken back"
+    NOTE = "note"
+
+
+IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
+
+
+class FileHash(Struct, frozen=True):
+    """A file that an entry vouches for.
+
+    Attributes
+    ----------
+    place : str
+        From the data folder, or absolute where it is outside of it.
+    n_bytes : int or None
+        From its start, that the hash is of; of all of it if None.
+    """
+
+    place: str
+    sha256: Digest
+    n_bytes: Annotated[int, Meta(ge=0)] | None = None
+
+
+class Event(Struct, frozen=True):
+    """Something that happened, as it is entered.
+
+    Attributes
+    ----------
+    at : datetime
+        By the clock of its station.
+    program : str
+        Name and version.
+    grade : str
+        Verdict on a calibration; empty of anything else, and where there was none.
+    why : Why or None
+        What the grade is for.
+    reason : str
+        In the words of the operator; of a note its text.
+    swing : str
+        Folder of the swing that it is of, as `FileHash.place`; may be empty.
+    settings : mapping
+        What the swing was captured with, and what was required of it.
+    result : FileHash or None
+        The file that put a tip in force, or took it back.
+    files : tuple of FileHash
+        The record of the swing, without its images.
+    record_sha256 : str or None
+        Of the record as JSON, which names the images with their hashes.
+    concerns : str or None
+        Hash of the entry that it restores, takes back, or is a note on.
+    """
+
+    kind: Kind
+    at: Moment
+    names: Names
+    program: str
+    origin: Origin | None = None
+    grade: str = ""
+    why: Why | None = None
+    reason: str = ""
+    tip_pen_mm: Vector | None = None
+    expanded_uncertainty_mm: Vector | None = None
+    swing: str = ""
+    settings: Mapping[str, Plain] = {}
+    result: FileHash | None = None
+    files: tuple[FileHash, ...] = ()
+    record_sha256: Digest | None = None
+    concerns: Digest | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether it is of no real pen."""
+        return self.origin is Origin.SIMULATED
+
+
+class Entry(Struct, frozen=True):
+    """An event in its place.
+
+    Attributes
+    ----------
+    chain : str
+        Of which data folder.
+    number : int
+        In the chain, from 1.
+    previous : str
+        Hash of the entry before.
+    since : datetime
+        When it was, but never before the entry before it, whatever a clock says: by it
+        the entries of several stations stand in one order.
+    """
+
+    chain: Chain
+    number: Annotated[int, Meta(ge=1)]
+    previous: Digest
+    since: Moment
+    event: Event
+
+
+@dataclass(frozen=True)
+class Written:
+    """An entry as it is kept.
+
+    Attributes
+    ----------
+    text : str
+        Canonical JSON: names sorted, no blanks, ASCII.
+    sha256 : str
+        Of the text.
+    """
+
+    entry: Entry
+    text: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Head:
+    """How far a chain has come.
+
+    Attributes
+    ----------
+    number : int
+        Of the last entry; 0 of an empty chain.
+    sha256 : str
+        Of the last entry.
+    since : datetime or None
+        Of the last entry.
+    """
+
+    chain: str
+    number: int = 0
+    sha256: str = NOTHING_BEFORE
+    since: datetime | None = None
+
+
+def chained(head: Head, event: Event) -> Written:
+    """Return the next entry of a chain."""
+    since = event.at.astimezone(UTC)
+    if head.since is not None:
+        since = max(since, head.since + TICK)
+    return written(Entry(head.chain, head.number + 1, head.sha256, since, event))
+
+
+def written(entry: Entry) -> Written:
+    """Return an entry with its text and hash."""
+    text = json.dumps(
+        to_builtins(entry), sort_keys=True, separators=(",", ":"), allow_nan=False
+    )
+    return Written(entry, text, text_sha256(text))
+
+
+def read_entry(text: str) -> Written:
+    """Return the entry that a text holds.
+
+    Raises
+    ------
+    DamagedError
+        It holds none, or was not written so.
+    """
+    data = text.encode("utf-8", "surrogateescape")
+    return Written(parse_json(data, Entry), text, text_sha256(text))
+
+
+def text_sha256(text: str) -> str:
+    """Return the SHA-256 digest of a text in UTF-8, in hexadecimal digits."""
+    return sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def this_program() -> str:
+    """Return what an entry says of the program that makes it."""
+    return f"lightpen {version('lightpen')}"

@@ -1,0 +1,174 @@
+"""Entries that travel: to a server, and by a file from one station to another.
+
+Whichever way they go, they are copied chain by chain in their order, and what is there
+already is passed over: a copy that was cut off is simply made again.
+
+An exported archive is text. Its first line names the format, the last says how many
+entries there are, and each line between holds one entry with its record.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from itertools import groupby, islice
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.archive.chains import (
+    BATCH,
+    Copied,
+    batch_of,
+    copy_entries,
+    entries_of,
+    heads,
+    records_of,
+)
+from lightpen.archive.database import Database
+from lightpen.archive.entries import Written, read_entry
+from lightpen.errors import FileError, NameTakenError
+from lightpen.formats.files import MEGABYTE, opened, printable, strerror
+from lightpen.formats.own_json import DamagedError, parse_json
+from lightpen.sentences import sentence
+
+FORMAT = 1
+WHAT = sentence("file.exported-archive", "exported archive")
+LIMIT = 10**6 * MEGABYTE  # it is read line by line
+
+
+class _Head(Struct):
+    lightpen_archive: int
+
+
+class _Line(Struct):
+    entry: str
+    record: str | None = None
+
+
+class _End(Struct):
+    n_entries: int
+
+
+def deliver(database: Database, chain: str, server: Database) -> Copied:
+    """Copy what a server does not have of a chain yet.
+
+    Raises
+    ------
+    ArchiveError
+        It does not answer, or holds other entries of this chain.
+    """
+    known = next((h.number for h in heads(server) if h.chain == chain), 0)
+    n_new, last = 0, max(0, known - 1)  # the last that it has is compared
+    while batch := batch_of(database, chain, last):
+        n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new
+        last = batch[-1].entry.number
+    return Copied(n_new, known)
+
+
+def export_entries(database: Database, path: Path) -> int:
+    """Write all entries of an archive into a new file, and return how many there are.
+
+    Raises
+    ------
+    NameTakenError
+        The file exists.
+    FileError
+        It cannot be written.
+    """
+    n_entries = 0
+    try:
+        with path.open("xb") as stream:
+            stream.write(_line({"lightpen_archive": FORMAT}))
+            for line in _lines(database):
+                stream.write(_line(line))
+                n_entries += 1
+            stream.write(_line({"n_entries": n_entries}))
+            stream.flush()
+            os.fsync(stream.fileno())
+    except FileExistsError as error:
+        raise NameTakenError(
+            sentence(
+                "archive.export-exists",
+                "There is a file {file} already. Give the export another name.",
+                file=printable(str(path)),
+            )
+        ) from error
+    except OSError as error:
+        raise FileError(
+            sentence(
+                "archive.not-exported",
+                "The archive cannot be exported to {file}: {reason}. Free some space, "
+                "or choose another folder.",
+                file=printable(str(path)),
+                reason=strerror(error),
+            )
+        ) from error
+    return n_entries
+
+
+def import_entries(database: Database, path: Path) -> Copied:
+    """Copy the entries of an exported archive into another; known ones are passed.
+
+    Raises
+    ------
+    FileError
+        The file is no exported archive, or not whole.
+    ArchiveError
+        The archive holds other entries of one of the chains.
+    """
+    for _ in _read(path):  # all of it, before any of it is kept
+        pass
+    n_new = n_known = 0
+    for chain, found in groupby(_read(path), lambda each: each[0].entry.chain):
+        while batch := list(islice(found, BATCH)):
+            records = {
+                entry.entry.event.record_sha256 or "": record or ""
+                for entry, record in batch
+            }
+            entries = [entry for entry, _ in batch]
+            copied = copy_entries(database, chain, entries, records)
+            n_new, n_known = n_new + copied.n_new, n_known + copied.n_known
+    return Copied(n_new, n_known)
+
+
+def _lines(database: Database) -> Iterator[dict[str, str | None]]:
+    for head in heads(database):
+        for entry in entries_of(database, head.chain):
+            name = entry.entry.event.record_sha256
+            records = records_of(database, [entry])
+            yield {
+                "entry": entry.text,
+                "record": None if name is None else records.get(name),
+            }
+
+
+def _line(content: object) -> bytes:
+    return json.dumps(content).encode() + b"\n"
+
+
+def _read(path: Path) -> Iterator[tuple[Written, str | None]]:
+    """Yield the entries of an exported archive, each with its record."""
+    n_read = 0
+    with opened(path, WHAT, LIMIT) as stream:
+        try:
+            if parse_json(stream.readline(), _Head).lightpen_archive != FORMAT:
+                raise DamagedError("It is of a later version.")
+            for line in stream:
+                if line.startswith(b'{"n_entries"'):
+                    if parse_json(line, _End).n_entries != n_read:
+                        raise DamagedError("Lines are missing.")
+                    return
+                found = parse_json(line, _Line)
+                yield read_entry(found.entry), found.record
+                n_read += 1
+            raise DamagedError("Its end is missing.")
+        except DamagedError as error:
+            raise FileError(
+                sentence(
+                    "archive.no-export",
+                    "{file} is no exported archive, or not as it was exported: line "
+                    "{line}. Export it again, with this version of the program.",
+                    file=printable(str(path)),
+                    line=n_read + 2,
+                )
+            ) from error

@@ -1,0 +1,142 @@
+"""The history that an archive tells: its entries as lines, and what followed each."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from sqlalchemy import Row, select
+
+from lightpen.archive.chains import read_row, sound_entry
+from lightpen.archive.database import Database
+from lightpen.archive.entries import IN_FORCE_BY, Written
+from lightpen.archive.queries import (
+    IN_ORDER,
+    Wanted,
+    condition_of,
+    replaced,
+    taken_back,
+)
+from lightpen.archive.tables import ENTRIES
+
+
+class TipState(StrEnum):
+    """What became of a tip that was put in force; nothing of other entries."""
+
+    NONE = ""
+    IN_FORCE = "in force"
+    REPLACED = "replaced"
+    TAKEN_BACK = "taken back"
+
+
+@dataclass(frozen=True)
+class Line:
+    """An entry, and what became of it.
+
+    Attributes
+    ----------
+    number : int
+        In its chain.
+    entry : Written or None
+        None if it was changed since it was entered.
+    """
+
+    chain: str
+    number: int
+    entry: Written | None
+    state: TipState = TipState.NONE
+
+
+@dataclass(frozen=True)
+class KnownNames:
+    """By which names entries can be looked for.
+
+    Attributes
+    ----------
+    tips : tuple of pairs
+        Pen and tip.
+    """
+
+    tips: tuple[tuple[str, str], ...] = ()
+    stations: tuple[str, ...] = ()
+
+    @property
+    def pens(self) -> tuple[str, ...]:
+        """The pens, each once."""
+        return tuple(dict.fromkeys(pen for pen, _ in self.tips))
+
+    def tips_of(self, pen: str) -> tuple[str, ...]:
+        """Return the tips of a pen; of all if it is empty."""
+        tips = (tip for each, tip in self.tips if pen in ("", each))
+        return tuple(dict.fromkeys(tips))
+
+
+def lines(
+    database: Database, wanted: Wanted, first: int, n_lines: int
+) -> tuple[Line, ...]:
+    """Return so many of the entries looked for, the newest first.
+
+    Parameters
+    ----------
+    first : int
+        How many newer ones are left out.
+    """
+    newest_first = [column.desc() for column in IN_ORDER]
+    places = (
+        select(ENTRIES.c.chain, ENTRIES.c.number)
+        .where(condition_of(wanted))
+        .order_by(*newest_first)
+        .offset(first)
+        .limit(n_lines)
+        .subquery()
+    )
+    found = (
+        select(
+            ENTRIES,
+            taken_back(ENTRIES).label("is_taken_back"),
+            replaced(ENTRIES).label("is_replaced"),
+        )
+        .join(
+            places,
+            (ENTRIES.c.chain == places.c.chain) & (ENTRIES.c.number == places.c.number),
+        )
+        .order_by(*newest_first)
+    )
+    with database.reading() as connection:
+        return tuple(map(_line, connection.execute(found)))
+
+
+def remarks_on(database: Database, entry: Written) -> tuple[Written, ...]:
+    """Return what concerns an entry: notes, that it was taken back, or restored."""
+    found = (
+        select(ENTRIES.c.number, ENTRIES.c.text)
+        .where(ENTRIES.c.concerns == entry.sha256)
+        .order_by(*IN_ORDER)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(found).all()
+    return tuple(read_row(database, row.number, row.text) for row in rows)
+
+
+def known_names(database: Database) -> KnownNames:
+    """Return the pens, tips and stations of all entries, in alphabetical order."""
+    columns = (ENTRIES.c.pen, ENTRIES.c.tip)
+    with database.reading() as connection:
+        tips = connection.execute(select(*columns).distinct()).all()
+        stations = connection.execute(select(ENTRIES.c.station).distinct()).scalars()
+        return KnownNames(
+            tuple(sorted((row.pen, row.tip) for row in tips)), _sorted(stations)
+        )
+
+
+def _sorted(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(filter(None, names)))
+
+
+def _line(row: Row[Any]) -> Line:
+    entry = sound_entry(row)
+    state = TipState.NONE
+    if entry is not None and entry.entry.event.kind in IN_FORCE_BY:
+        state = TipState.REPLACED if row.is_replaced else TipState.IN_FORCE
+        state = TipState.TAKEN_BACK if row.is_taken_back else state
+    return Line(row.chain, row.number, entry, state)

@@ -1,0 +1,75 @@
+"""Entries for other programs: as a table, and as JSON."""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from lightpen.archive.database import Database
+from lightpen.archive.entries import Written
+from lightpen.archive.queries import Wanted, newest
+from lightpen.estimation.verdict import AXES
+from lightpen.formats.files import write_whole
+
+COLUMNS = (
+    *("since", "station", "operator", "kind", "grade", "pen", "tip", "cone"),
+    *(f"tip_{axis}_mm" for axis in AXES),
+    *(f"expanded_uncertainty_{axis}_mm" for axis in AXES),
+    *("reason", "chain", "number", "sha256"),
+)
+BATCH = 1000  # entries that are read at one time
+
+
+def save_entries(database: Database, wanted: Wanted, path: Path) -> int:
+    """Write the entries looked for, the newest first, and return how many there are.
+
+    Parameters
+    ----------
+    path : Path
+        ``.csv`` for a table, else JSON; what is there is replaced.
+
+    Raises
+    ------
+    ArchiveError, FileError
+        They cannot be read, or not be written.
+    """
+    entries = tuple(_all(database, wanted))
+    is_table = path.suffix.lower() == ".csv"
+    text = (entries_csv if is_table else entries_json)(entries)
+    write_whole(path, text.encode("utf-8", "backslashreplace"))
+    return len(entries)
+
+
+def entries_csv(entries: Iterable[Written]) -> str:
+    """Return entries as a table, one a line."""
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows(map(_row, entries))
+    return lines.getvalue()
+
+
+def entries_json(entries: Iterable[Written]) -> str:
+    """Return entries as they are kept, each with its hash."""
+    listed = [{"sha256": each.sha256, **json.loads(each.text)} for each in entries]
+    return json.dumps(listed, indent=1) + "\n"
+
+
+def _all(database: Database, wanted: Wanted) -> Iterator[Written]:
+    last = None
+    while batch := newest(database, wanted, BATCH, last):
+        yield from batch
+        last = batch[-1].entry
+
+
+def _row(entry: Written) -> list[object]:
+    event, nothing = entry.entry.event, ("", "", "")
+    names = event.names
+    return [
+        *(event.at.isoformat(), names.station, names.operator, event.kind.value),
+        *(event.grade, names.pen, names.tip, names.cone),
+        *(event.tip_pen_mm or nothing),
+        *(event.expanded_uncertainty_mm or nothing),
+        *(event.reason, entry.entry.chain, entry.entry.number, entry.sha256),
+    ]

@@ -1,0 +1,247 @@
+"""The logbook of a station: all that happens in a data folder is entered in its chain.
+
+One rule joins it to the files. A result file puts a tip in force, or takes it back, and
+the journal of a swing says that it was set aside: these files are the truth, written
+whole before anything else, and each is owed one entry. What is owed is entered as soon
+as it is written; where that failed, or the program was killed, or had no archive yet,
+with whatever is entered next, and at every start. So nothing is in force or set aside
+that the archive does not tell of from the next start on, and no entry is of nothing.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Lock
+
+from msgspec import structs
+
+from lightpen.archive.accounts import (
+    Account,
+    account_of_abandoned,
+    account_of_refused,
+    account_of_result,
+    account_of_unreadable,
+)
+from lightpen.archive.chains import (
+    append,
+    entered_places,
+    entry_of_result,
+    own_chain,
+    records_of,
+    searchable,
+)
+from lightpen.archive.courier import Courier
+from lightpen.archive.database import Database, open_file
+from lightpen.archive.entries import Event, Kind, Written, this_program
+from lightpen.archive.restoring import restored_result, with_change
+from lightpen.archive.seal import close_sealed
+from lightpen.errors import FileError
+from lightpen.formats.files import FOLDER, unreadable
+from lightpen.local_time import local_now
+from lightpen.record.assessment import Assessment
+from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.journal import JOURNAL, last_verdict
+from lightpen.record.names import Names
+from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.results import Result
+from lightpen.record.solving import Solution
+from lightpen.sentences import Sentence
+
+ARCHIVE = "archive.sqlite"
+LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
+
+
+class Logbook:
+    """Enters what happens in a data folder; any thread may ask it to.
+
+    Several programs may have one of the same folder.
+
+    Parameters
+    ----------
+    data : Path
+        Folder of the records, the results and the archive; it need not exist.
+    server : str
+        Address of the server that all is delivered to, as soon as it answers; none if
+        empty.
+
+    Raises
+    ------
+    ArchiveError
+        The archive is not of this program, or cannot be used.
+    """
+
+    def __init__(self, data: Path, server: str = "") -> None:
+        self._data = data
+        self._results = FolderArchive(data)
+        self._lock = Lock()
+        self.database: Database = open_file(data / ARCHIVE)
+        self.chain = own_chain(self.database)
+        self._courier = Courier(self.database, self.chain, server) if server else None
+
+    def enter_owed(
+        self, report: Callable[[float], None] = lambda fraction: None
+    ) -> tuple[Sentence, ...]:
+        """Enter what the files tell of and the archive does not yet.
+
+        Parameters
+        ----------
+        report : callable
+            Called with the fraction done, 0 to 1; what it raises ends the work, and the
+            rest stays owed.
+
+        Returns
+        -------
+        tuple of Sentence
+            Why some files cannot be entered; they stay owed.
+
+        Raises
+        ------
+        ArchiveError
+            Nothing can be entered.
+        """
+        with self._lock:
+            entered = entered_places(self.database, self.chain)
+            owed, troubles = tuple(self._owed(entered)), []
+            for n_done, path in enumerate(owed):
+                report(n_done / len(owed))
+                try:
+                    self._enter(self._account_of(path))
+                except FileError as error:
+                    troubles.append(error.sentence)
+        return tuple(troubles)
+
+    def enter_refused(
+        self, solution: Solution, assessment: Assessment, at: datetime
+    ) -> None:
+        """Enter that the tip of a swing that is set aside was not accepted.
+
+        Raises
+        ------
+        ArchiveError
+            It cannot be entered; its being set aside stays owed.
+        FileError
+            A file of the swing cannot be read.
+        """
+        with self._lock:
+            self._enter(account_of_refused(self._results, solution, assessment, at))
+
+    def enter_note(self, about: Written, text: str, operator: str) -> None:
+        """Enter what somebody has to say of an entry.
+
+        Raises
+        ------
+        ArchiveError
+            It cannot be entered.
+        """
+        of = about.entry.event
+        event = Event(
+            kind=Kind.NOTE,
+            at=local_now(),
+            names=replace(of.names, operator=operator),
+            program=this_program(),
+            origin=of.origin,
+            reason=text,
+            concerns=about.sha256,
+        )
+        with self._lock:
+            self._enter(Account(event))
+
+    def restore(self, entry: Written, by: Names, reason: str) -> Result:
+        """Put the tip of an entry in force again, and enter that.
+
+        Parameters
+        ----------
+        by : Names
+            Who restores it, and at which station.
+        reason : str
+            In their words.
+
+        Raises
+        ------
+        ArchiveError
+            The entry put no tip in force, or it cannot be entered; it stays owed then.
+        FileError
+            It cannot be put in force; what was in force stays so.
+        """
+        event, record = entry.entry.event, entry.entry.event.record_sha256 or ""
+        now = local_now()
+        with self._lock:
+            text = records_of(self.database, [entry]).get(record)
+            result = restored_result(entry, text, self._data, by, reason, now)
+            last = self._results.in_force(
+                event.names.pen, event.names.tip, is_simulated=event.is_simulated
+            )
+            result = with_change(result, last)
+            self._results.store(result)
+        self.enter_owed()
+        return result
+
+    def close(self) -> None:
+        """Let go of the archive, and seal its file if nobody else has it open.
+
+        Raises
+        ------
+        ArchiveError, FileError
+            It cannot be sealed.
+        """
+        with self._lock:
+            if self._courier is not None:
+                self._courier.close(LONGEST_FAREWELL_S)
+            close_sealed(self.database)
+
+    def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
+        """Yield the files of results, and then the swings, that have no entry."""
+        for file in self._results.all_files():
+            if not self._is_in(entered, file):
+                yield file
+        for folder in _set_aside(self._data / RECORDS):
+            if not self._is_in(entered, folder):
+                yield folder
+
+    def _is_in(self, entered: frozenset[str], path: Path) -> bool:
+        return searchable(self._results.place_of(path)) in entered
+
+    def _account_of(self, path: Path) -> Account:
+        if path.parent.name != RECORDS:
+            return account_of_result(self._results, path)
+        at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)
+        try:
+            record = open_record(path)
+        except FileError as error:
+            return account_of_unreadable(self._results, path, at, error.sentence)
+        return account_of_abandoned(self._results, record, at)
+
+    def _enter(self, account: Account) -> None:
+        event = account.event
+        if account.takes_back:
+            back = entry_of_result(self.database, self.chain, account.takes_back)
+            event = event if back is None else _taking_back(event, back)
+        append(self.database, self.chain, event, account.record)
+        if self._courier is not None:
+            self._courier.wake()
+
+
+def _taking_back(event: Event, back: Written) -> Event:
+    """Return the event of a taking back with what is known of the result."""
+    of, operator = back.entry.event, event.names.operator
+    return structs.replace(
+        event,
+        names=replace(of.names, operator=operator),
+        origin=of.origin,
+        swing=of.swing,
+        concerns=back.sha256,
+    )
+
+
+def _set_aside(records: Path) -> Iterator[Path]:
+    """Yield the folders of the swings that were set aside, the oldest first."""
+    try:
+        folders = sorted(records.iterdir()) if records.is_dir() else []
+    except OSError as error:
+        raise unreadable(records, FOLDER, error) from error
+    for folder in folders:
+        with suppress(OSError):  # it is no record
+            if last_verdict(folder) == DISCARDED:
+                yield folder

@@ -1,0 +1,160 @@
+"""What is looked for in an archive: the entries of a pen, a station or a time."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from sqlalchemy import (
+    ColumnElement,
+    Exists,
+    FromClause,
+    exists,
+    func,
+    select,
+    true,
+    tuple_,
+)
+
+from lightpen.archive.chains import read_row, searchable, since_us
+from lightpen.archive.database import Database
+from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, Written
+from lightpen.archive.tables import ENTRIES
+
+IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
+_KINDS_IN_FORCE = [kind.value for kind in IN_FORCE_BY]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which entries are looked for; what is empty or None leaves all.
+
+    Attributes
+    ----------
+    begin, end : datetime or None
+        Entries since the one, and before the other.
+    is_simulated : bool or None
+        Whether of simulated pens.
+    """
+
+    pen: str = ""
+    tip: str = ""
+    station: str = ""
+    kinds: tuple[Kind, ...] = ()
+    begin: datetime | None = None
+    end: datetime | None = None
+    is_simulated: bool | None = None
+
+
+def n_wanted(database: Database, wanted: Wanted) -> int:
+    """Return how many entries are looked for."""
+    count = select(func.count()).select_from(ENTRIES).where(condition_of(wanted))
+    with database.reading() as connection:
+        return connection.execute(count).scalar_one()
+
+
+def newest(
+    database: Database, wanted: Wanted, n_entries: int, before: Entry | None = None
+) -> tuple[Written, ...]:
+    """Return so many of the entries looked for, the newest first.
+
+    Parameters
+    ----------
+    before : Entry, optional
+        The last of those that were returned before.
+    """
+    condition = condition_of(wanted)
+    if before is not None:
+        place = (since_us(before.since), before.chain, before.number)
+        condition &= tuple_(*IN_ORDER) < place
+    found = (
+        select(ENTRIES.c.number, ENTRIES.c.text)
+        .where(condition)
+        .order_by(*(column.desc() for column in IN_ORDER))
+        .limit(n_entries)
+    )
+    with database.reading() as connection:
+        rows = connection.execute(found).all()
+    return tuple(read_row(database, row.number, row.text) for row in rows)
+
+
+def last_accepted(
+    database: Database,
+    pen: str,
+    tip: str,
+    *,
+    is_simulated: bool = False,
+    chain: str | None = None,
+) -> Written | None:
+    """Return the last acceptance of a pen and tip that was not taken back.
+
+    Parameters
+    ----------
+    chain : str, optional
+        At home in which data folder; of any station unless given. Which is in force at
+        one, its files of results say.
+    """
+    condition = (
+        (ENTRIES.c.pen == searchable(pen))
+        & (ENTRIES.c.tip == searchable(tip))
+        & (ENTRIES.c.is_simulated == is_simulated)
+        & ENTRIES.c.kind.in_(_KINDS_IN_FORCE)
+        & ~taken_back(ENTRIES)
+    )
+    if chain is not None:
+        condition &= of_chain(chain)
+    found = (
+        select(ENTRIES.c.number, ENTRIES.c.text)
+        .where(condition)
+        .order_by(ENTRIES.c.since_us.desc())
+        .limit(1)
+    )
+    with database.reading() as connection:
+        row = connection.execute(found).one_or_none()
+    return None if row is None else read_row(database, row.number, row.text)
+
+
+def of_chain(chain: str) -> ColumnElement[bool]:
+    """Return the condition that an entry is of a chain, for those few else found.
+
+    No index of chains is used for it: most entries are of one.
+    """
+    return func.coalesce(ENTRIES.c.chain, "") == chain
+
+
+def taken_back(entries: FromClause) -> Exists:
+    """Return the condition that an entry was taken back since."""
+    back = ENTRIES.alias()
+    return exists().where(
+        back.c.concerns == entries.c.sha256, back.c.kind == Kind.TAKEN_BACK.value
+    )
+
+
+def replaced(entries: FromClause) -> Exists:
+    """Return the condition that a later tip came into force in the same chain."""
+    later = ENTRIES.alias()
+    return exists().where(
+        later.c.pen == entries.c.pen,
+        later.c.tip == entries.c.tip,
+        later.c.is_simulated == entries.c.is_simulated,
+        later.c.kind.in_(_KINDS_IN_FORCE),
+        later.c.since_us > entries.c.since_us,
+        later.c.chain == entries.c.chain,
+        ~taken_back(later),
+    )
+
+
+def condition_of(wanted: Wanted) -> ColumnElement[bool]:
+    """Return the condition on entries that are looked for."""
+    condition: ColumnElement[bool] = true()
+    names = {"pen": wanted.pen, "tip": wanted.tip, "station": wanted.station}
+    for column, name in names.items():
+        if name:
+            condition &= ENTRIES.c[column] == searchable(name)
+    if wanted.kinds:
+        condition &= ENTRIES.c.kind.in_([kind.value for kind in wanted.kinds])
+    if wanted.is_simulated is not None:
+        condition &= ENTRIES.c.is_simulated == wanted.is_simulated
+    if wanted.begin is not None:
+        condition &= ENTRIES.c.since_us >= since_us(wanted.begin)
+    if wanted.end is not None:
+        condition &= ENTRIES.c.since_us < since_us(wanted.end)
+    return condition

@@ -1,0 +1,195 @@
+"""Which frames of two cameras are of the same moment, and how far apart they are.
+
+Cameras with clocks are paired by these. Where the clocks do not agree, each is set by
+the frame that reached this machine fastest: all others were held up on the way.
+Recordings are paired by the numbers of their images.
+"""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from lightpen.cameras.protocol import Frame
+from lightpen.sentences import Sentence, sentence
+
+WAITING = 6  # frames of one camera that wait for the other
+WINDOW = 64  # frames by which clocks and rates are told
+SAME_CLOCK_NS = 50_000_000  # apart at most; clocks of two cameras are hours apart
+NEAR = 0.6  # of the time between two frames; more than half, as times jitter
+MIN_TIMED, N_TIMED = 8, 32  # moments of which the lag is the median
+LEAST_LAG_MS = 1.0  # a pen moves 0.1 mm meanwhile
+PEN_SPEED = 100.0  # mm/s
+
+
+class FramePairs:
+    """Pairs the frames of two cameras, each of which come in their order."""
+
+    def __init__(self) -> None:
+        self._waiting: tuple[deque[Frame], deque[Frame]] = (deque(), deque())
+        self._times = (_Times(), _Times())
+        self._lags_ns: deque[float] = deque(maxlen=N_TIMED)
+        self._n_unpaired = 0
+
+    @property
+    def n_unpaired(self) -> int:
+        """Frames that found no partner."""
+        return self._n_unpaired
+
+    @property
+    def lag_ms(self) -> float | None:
+        """By how much the second camera is later; None until that is known.
+
+        It is half the time between two frames at most: a camera that is later than that
+        is early for the next.
+        """
+        if len(self._lags_ns) < MIN_TIMED:
+            return None
+        return float(np.median(self._lags_ns)) * 1e-6
+
+    @property
+    def wanted(self) -> int:
+        """The camera whose next frame is needed."""
+        first, second = self._waiting
+        return int(len(first) > len(second))
+
+    def note(self, c: int, frame: Frame) -> None:
+        """Learn the times of a frame of camera 0 or 1 that is not to be paired."""
+        own, other = self._times[c], self._times[1 - c]
+        own.note(frame)
+        period_ns = self._period_ns
+        if other.last is None or period_ns is None:
+            return
+        first, second = (frame, other.last) if c == 0 else (other.last, frame)
+        apart_ns = self._apart_ns(first, second)
+        self._lags_ns.append((apart_ns + period_ns / 2) % period_ns - period_ns / 2)
+
+    def add(self, c: int, frame: Frame, n_images: int | None = None) -> Frame | None:
+        """Take a frame of camera 0 or 1.
+
+        Parameters
+        ----------
+        n_images : int, optional
+            Of two recordings that are shown over and over.
+
+        Returns
+        -------
+        Frame or None
+            The first camera's of a moment that is complete now, with the other's.
+        """
+        self.note(c, frame)
+        own = self._waiting[c]
+        own.append(frame)
+        first, second = self._waiting
+        while first and second:
+            apart = self._apart(first[0], second[0], n_images)
+            if apart is None:  # not known yet
+                break
+            if abs(apart) <= NEAR:
+                return replace(first.popleft(), others=(second.popleft(),))
+            self._drop(0 if apart > 0 else 1)
+        if len(own) > WAITING:
+            self._drop(c)
+        return None
+
+    def forget(self) -> None:
+        """Let go of frames that wait; they count for nothing."""
+        for each in self._waiting:
+            each.clear()
+
+    @property
+    def _period_ns(self) -> float | None:
+        """Time between two frames of the faster camera; None until it is known."""
+        known = [each.period_ns for each in self._times if each.period_ns is not None]
+        return min(known, default=None)
+
+    def _drop(self, c: int) -> None:
+        self._waiting[c].popleft()
+        self._n_unpaired += 1
+
+    def _apart(self, first: Frame, second: Frame, n_images: int | None) -> float | None:
+        """Return how much later the second frame is, in times between two frames."""
+        if n_images is not None:
+            half = n_images // 2
+            return float((second.seq - first.seq + half) % n_images - half)
+        period_ns = self._period_ns
+        return None if period_ns is None else self._apart_ns(first, second) / period_ns
+
+    def _apart_ns(self, first: Frame, second: Frame) -> float:
+        one, other = self._times
+        if first.device_ts_ns is None or second.device_ts_ns is None:
+            return float(second.host_ts_ns - first.host_ts_ns)
+        offset = other.offset_ns - one.offset_ns
+        if abs(offset) < SAME_CLOCK_NS:
+            offset = 0
+        return float(second.device_ts_ns - first.device_ts_ns + offset)
+
+
+class _Times:
+    """When the frames of one camera were taken and came."""
+
+    def __init__(self) -> None:
+        self._last: Frame | None = None
+        self._offsets_ns: deque[int] = deque(maxlen=WINDOW)
+        self._gaps_ns: deque[float] = deque(maxlen=WINDOW)
+
+    @property
+    def last(self) -> Frame | None:
+        """The last frame."""
+        return self._last
+
+    @property
+    def offset_ns(self) -> int:
+        """What the clock of this machine is ahead of the camera's, at most."""
+        return min(self._offsets_ns)
+
+    @property
+    def period_ns(self) -> float | None:
+        """Time between two frames; None until it is known."""
+        return float(np.median(self._gaps_ns)) if self._gaps_ns else None
+
+    def note(self, frame: Frame) -> None:
+        """Take the times of a frame."""
+        last, self._last = self._last, frame
+        if frame.device_ts_ns is not None:
+            self._offsets_ns.append(frame.host_ts_ns - frame.device_ts_ns)
+        if last is None or frame.seq <= last.seq:
+            return
+        gap = _time_ns(frame) - _time_ns(last)
+        if gap > 0:  # else it was set back
+            self._gaps_ns.append(gap / (frame.seq - last.seq))
+
+
+def _time_ns(frame: Frame) -> int:
+    return frame.host_ts_ns if frame.device_ts_ns is None else frame.device_ts_ns
+
+
+def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Sentence | None:
+    """Return what a lag costs at the pen's speed; None of one that does not matter.
+
+    Parameters
+    ----------
+    px_per_mm : float or None
+        At the pen; None where that is not known.
+    """
+    if lag_ms is None or abs(lag_ms) < LEAST_LAG_MS:
+        return None
+    way = abs(lag_ms) * PEN_SPEED / 1000
+    if px_per_mm is None:
+        return sentence(
+            "pairing.late",
+            "The cameras are not synchronised: they take their images {lag:.1f} ms "
+            "apart. At 100 mm/s the pen moves {way:.2f} mm meanwhile. Trigger both "
+            "cameras by one signal.",
+            lag=abs(lag_ms),
+            way=way,
+        )
+    return sentence(
+        "pairing.late-in-px",
+        "The cameras are not synchronised: they take their images {lag:.1f} ms apart. "
+        "At 100 mm/s the pen moves {way:.2f} mm meanwhile, {px:.1f} px in the image. "
+        "Trigger both cameras by one signal.",
+        lag=abs(lag_ms),
+        way=way,
+        px=way * px_per_mm,
+    )

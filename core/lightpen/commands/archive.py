@@ -1,0 +1,77 @@
+"""``lightpen archive``: check what was entered, list it, send it, and take it up."""
+
+import argparse
+from collections.abc import Callable
+from datetime import date
+from pathlib import Path
+from typing import TypeAlias
+
+import platformdirs
+
+from lightpen.commands.arguments import whole_number
+
+USUAL_LENGTH = 50  # entries that are listed
+
+DataFolder: TypeAlias = Callable[[], Path]
+
+
+def usual_data_folder() -> Path:
+    """Return where records, results and the archive are kept unless chosen."""
+    return platformdirs.user_data_path("lightpen", appauthor=False)
+
+
+def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
+    """Add ``lightpen archive``."""
+    parser.set_defaults(run=_run)
+    actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
+    check = actions.add_parser(
+        "check", help="look at every entry, record, result and image"
+    )
+    listed = actions.add_parser("list", help="print the newest entries")
+    export = actions.add_parser("export", help="write all entries into a file")
+    taken = actions.add_parser("import", help="take up the entries in such a file")
+    delivered = actions.add_parser(
+        "deliver", help="bring the entries to the server that LIGHTPEN_ARCHIVE names"
+    )
+    for action in (check, listed, export, taken, delivered):
+        action.add_argument(
+            "--data",
+            type=Path,
+            metavar="FOLDER",
+            help="data folder; that of the program unless said",
+        )
+        action.set_defaults(data_folder=data_folder)
+    for action in (export, taken):
+        action.add_argument("file", type=Path, metavar="FILE")
+    for name in ("pen", "tip", "station"):
+        listed.add_argument(f"--{name}", default="", help="list its entries only")
+    listed.add_argument(
+        "--since", type=_date, metavar="YYYY-MM-DD", help="from this day on"
+    )
+    listed.add_argument("--until", type=_date, metavar="YYYY-MM-DD", help="to this day")
+    listed.add_argument(
+        "--most",
+        type=whole_number,
+        default=USUAL_LENGTH,
+        metavar="N",
+        help=f"entries, the newest first ({USUAL_LENGTH})",
+    )
+    listed.add_argument(
+        "--csv", action="store_true", help="as a table for other programs"
+    )
+
+
+def _date(text: str) -> date:
+    try:
+        return date.fromisoformat(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f"{text} is no date such as 2026-08-14."
+        ) from error
+
+
+def _run(options: argparse.Namespace) -> int:
+    # A fifth of a second, which the other commands need not take.
+    from lightpen.commands.archive_actions import ACTIONS
+
+    return ACTIONS[options.action](options)

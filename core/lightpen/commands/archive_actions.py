@@ -1,0 +1,132 @@
+"""What each ``lightpen archive ...`` does."""
+
+import argparse
+import os
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from datetime import date, datetime, time, timedelta
+from pathlib import Path
+
+from lightpen.archive.chains import own_chain
+from lightpen.archive.check import check_archive
+from lightpen.archive.database import Database, look_into, open_file, open_server
+from lightpen.archive.entries import Written
+from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.archive.late_logbook import SERVER
+from lightpen.archive.listing import entries_csv
+from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.queries import Wanted, newest
+from lightpen.archive.seal import close_sealed
+from lightpen.commands.console import Command, printing, progress, shown
+from lightpen.errors import UsageError
+from lightpen.local_time import local_time
+from lightpen.sentences import sentence
+
+CHANGED = 1  # exit status of a check that found something
+
+
+def _check(options: argparse.Namespace) -> int:
+    has_findings = False
+
+    @printing
+    def run(options: argparse.Namespace) -> None:
+        nonlocal has_findings
+        data = _data(options)
+        with _looked_into(data) as database, progress("Checking") as report:
+            checked = check_archive(database, data, report)
+        for finding in checked.findings:
+            print(shown(str(finding)))
+        has_findings = bool(checked.findings)
+        told = "No change was found" if not has_findings else "Something was changed"
+        print(f"{told}: {checked.n_entries} entries, {checked.n_files} files.")
+
+    return run(options) or (CHANGED if has_findings else 0)
+
+
+@printing
+def _list(options: argparse.Namespace) -> None:
+    wanted = Wanted(
+        pen=options.pen,
+        tip=options.tip,
+        station=options.station,
+        begin=_midnight(options.since),
+        end=_midnight(options.until and options.until + timedelta(days=1)),
+    )
+    with _looked_into(_data(options)) as database:
+        entries = newest(database, wanted, options.most)
+    told = entries_csv(entries) if options.csv else "\n".join(map(_line, entries))
+    print(shown(told.removesuffix("\n")))
+
+
+@printing
+def _export(options: argparse.Namespace) -> None:
+    with _looked_into(_data(options)) as database:
+        n_entries = export_entries(database, options.file)
+    print(shown(f"{n_entries} entries are in {options.file}."))
+
+
+@printing
+def _import(options: argparse.Namespace) -> None:
+    with _opened(_data(options)) as database:
+        copied = import_entries(database, options.file)
+    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
+
+
+@printing
+def _deliver(options: argparse.Namespace) -> None:
+    address = os.environ.get(SERVER, "")
+    if not address:
+        raise UsageError(
+            sentence(
+                "archive.no-server",
+                "No server is named. Set the variable {variable} to its address, "
+                "postgresql://user:password@host/database.",
+                variable=SERVER,
+            )
+        )
+    with _opened(_data(options)) as database, closing(open_server(address)) as server:
+        copied = deliver(database, own_chain(database), server)
+    print(f"{copied.n_new} entries are new, {copied.n_known} were there already.")
+
+
+ACTIONS: dict[str, Command] = {
+    "check": _check,
+    "list": _list,
+    "export": _export,
+    "import": _import,
+    "deliver": _deliver,
+}
+
+
+def _data(options: argparse.Namespace) -> Path:
+    folder: Path = options.data_folder() if options.data is None else options.data
+    return folder
+
+
+@contextmanager
+def _looked_into(data: Path) -> Iterator[Database]:
+    with closing(look_into(data / ARCHIVE)) as database:
+        yield database
+
+
+@contextmanager
+def _opened(data: Path) -> Iterator[Database]:
+    database = open_file(data / ARCHIVE)
+    try:
+        yield database
+    finally:
+        close_sealed(database)
+
+
+def _midnight(day: date | None) -> datetime | None:
+    return None if day is None else local_time(datetime.combine(day, time()))
+
+
+def _line(entry: Written) -> str:
+    event = entry.entry.event
+    names, tip = event.names, event.tip_pen_mm
+    when = f"{local_time(event.at):%Y-%m-%d %H:%M}"
+    words = [when, names.station, names.pen, names.tip, event.kind.value, event.grade]
+    if tip is not None:
+        words.append(" ".join(f"{value:.4f}" for value in tip))
+    return "  ".join(filter(None, words))

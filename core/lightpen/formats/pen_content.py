@@ -1,0 +1,162 @@
+"""What a pen file states, in whatever layout, and what it may."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError, UsageError
+from lightpen.model.pen import Pen
+from lightpen.sentences import Sentence, sentence
+
+UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "inch": 25.4}
+LARGEST_DIAMETER = 100.0  # mm
+NORMAL_TOLERANCE = 0.01  # of the length of a normal in the file
+_SPELLINGS = {
+    "mm": ("mm", "millimeter", "millimetre", "millimeters", "millimetres"),
+    "cm": ("cm",),
+    "m": ("m", "meter", "metre", "meters", "metres"),
+    "um": ("um", "μm", "micron", "microns"),
+    "inch": ("inch", "in", "inches"),
+}
+UNIT_NAMES = {name: unit for unit, names in _SPELLINGS.items() for name in names}
+LENGTHS = {"led_sigma", "diameter_sigma"}  # in the unit of the file
+# From above the first to the second: mm, relative, 1/K, degrees C.
+RANGES = {
+    "led_sigma": (0.0, 10.0),
+    "scale_sigma": (0.0, 0.01),
+    "diameter_sigma": (0.0, 10.0),
+    "expansion": (-1e-5, 1e-4),
+    "expansion_sigma": (0.0, 1e-4),
+    "temperature_c": (-50.0, 100.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PenContent:
+    """What a pen file states, in mm; None is what it leaves out."""
+
+    leds: FloatArray
+    normals: FloatArray | None
+    diameter: float | None
+    nominal_tip: FloatArray | None = None
+    name: str = ""
+    stated: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = None
+
+
+def agreed_unit(stated: str, given: str | None, name: str) -> str:
+    """Return the unit of a file's lengths.
+
+    Parameters
+    ----------
+    stated, given : str
+        By the file and by the user; empty where none is.
+    name : str
+        Of the file, as it is shown.
+
+    Raises
+    ------
+    UsageError
+        Neither says it, or they differ.
+    """
+    if stated and given and stated != given:
+        raise UsageError(
+            sentence(
+                "pen-file.contradicting-units",
+                "{name} states its lengths in {stated}, but the unit {given} is "
+                "given. Leave the unit away, or correct the file.",
+                name=name,
+                stated=stated,
+                given=given,
+            )
+        )
+    unit = stated or given
+    if not unit:
+        raise UsageError(
+            sentence(
+                "pen-file.no-units",
+                "{name} does not say which units its coordinates have. Name them, "
+                "or write them into the header: led,x_mm,y_mm,z_mm.",
+                name=name,
+            )
+        )
+    return unit
+
+
+def checked_number(what: str, number: float, name: str) -> float:
+    """Return what a file of that name states under a name of `RANGES`.
+
+    Raises
+    ------
+    FileError
+        It is out of its range.
+    """
+    least, most = RANGES[what]
+    if not least < number <= most:
+        raise FileError(
+            sentence(
+                "pen-file.number",
+                "{name} has the {what} {number:g}. A number above {least:g} and up to "
+                "{most:g} is needed; leave it away if it is not known.",
+                name=name,
+                what=what,
+                number=number,
+                least=least,
+                most=most,
+            )
+        )
+    return number
+
+
+def check_diameter(diameter: float, name: str) -> None:
+    """Refuse discs, mm, that no LED has.
+
+    Raises
+    ------
+    FileError
+        They are not wide at all, or too wide.
+    """
+    if not 0 < diameter <= LARGEST_DIAMETER:
+        raise FileError(
+            sentence(
+                "pen-file.diameter",
+                "{name} has LED discs {diameter:g} mm wide. A diameter of up to "
+                "{most:g} mm is needed; check its units.",
+                name=name,
+                diameter=diameter,
+                most=LARGEST_DIAMETER,
+            )
+        )
+
+
+def unit_normal(normal: FloatArray, place: str | Sentence) -> FloatArray:
+    """Return a normal (3,) of unit length, unchanged if it has it but for rounding.
+
+    Raises
+    ------
+    FileError
+        It is far from that length; the place says where.
+    """
+    squared = float(normal @ normal) if np.abs(normal).max() < 2 else np.inf
+    if abs(squared - 1) > 2 * NORMAL_TOLERANCE:
+        raise FileError(
+            sentence(
+                "pen-file.normal-length",
+                "{place}: the normal {normal} does not have the length 1. Correct "
+                "it, or leave the normals away if all discs face +z.",
+                place=place,
+                normal=" ".join(f"{c:g}" for c in normal),
+            )
+        )
+    return normal if abs(squared - 1) < 1e-9 else normal / np.sqrt(squared)
+
+
+def stated_numbers(pen: Pen) -> dict[str, float]:
+    """Return what is known of a pen under the names of `RANGES`."""
+    return {
+        what: float(number)
+        for what in RANGES
+        if (number := getattr(pen, what)) is not None
+    }

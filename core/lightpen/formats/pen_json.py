@@ -1,0 +1,206 @@
+"""A pen as JSON; see `lightpen.formats.pen_files`."""
+
+import json
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import FileError
+from lightpen.formats.documents import Tree
+from lightpen.formats.entries import Entries
+from lightpen.formats.files import printable, quoted
+from lightpen.formats.pen_content import (
+    LENGTHS,
+    RANGES,
+    UNIT_NAMES,
+    UNITS,
+    PenContent,
+    agreed_unit,
+    check_diameter,
+    checked_number,
+    stated_numbers,
+    unit_normal,
+)
+from lightpen.model.pen import Pen
+from lightpen.sentences import sentence
+
+_LED_KEYS = {"led", "x", "y", "z", "normal"}
+_FILE_KEYS = {
+    *("units", "leds", "diameter", "nominal_tip", "name", "comment"),
+    *("led_sigma", "scale_sigma", "diameter_sigma", "led_covariance"),
+    *("expansion", "expansion_sigma", "temperature_c"),
+    "parent_sha256",
+}
+ASYMMETRY = 1e-6  # of the largest variance
+
+
+def from_json(tree: Tree, units: str | None, name: str) -> PenContent:
+    """Return what a document states about a pen.
+
+    Parameters
+    ----------
+    units : str or None
+        Unit of its lengths, where it does not say.
+    name : str
+        Of the file, as it is shown.
+
+    Raises
+    ------
+    FileError
+        It is no complete pen.
+    UsageError
+        The units are neither stated nor given, or both and different.
+    """
+    if not isinstance(tree, dict):
+        raise FileError(
+            sentence(
+                "pen-file.list",
+                "{name} is a list; a pen file is a mapping with leds and units. "
+                "Write it so.",
+                name=name,
+            )
+        )
+    entries = Entries.of(tree, name)
+    entries.refuse_others(*_FILE_KEYS)
+    stated = entries.word("units").casefold()
+    if stated and stated not in UNIT_NAMES:
+        raise FileError(
+            sentence(
+                "pen-file.unknown-units-in-file",
+                "{name} has the units {unit}, which are not known here. Use one of "
+                "{known}.",
+                name=name,
+                unit=quoted(stated),
+                known=", ".join(UNITS),
+            )
+        )
+    unit = UNITS[agreed_unit(UNIT_NAMES.get(stated, ""), units, name)]
+    leds = _listed_leds(entries, name)
+    coordinates = [[led.counted(1, axis)[0] for axis in "xyz"] for led in leds]
+    diameter = None
+    if entries.has("diameter"):
+        diameter = float(entries.counted(1, "diameter")[0]) * unit
+        check_diameter(diameter, name)
+    nominal_tip = None
+    if entries.has("nominal_tip") and entries.value("nominal_tip") is not None:
+        nominal_tip = entries.counted(3, "nominal_tip") * unit
+    return PenContent(
+        leds=np.array(coordinates) * unit,
+        normals=_listed_normals(leds, name),
+        diameter=diameter,
+        nominal_tip=nominal_tip,
+        name=printable(entries.word("name")),
+        stated={
+            what: checked_number(
+                what,
+                float(entries.counted(1, what)[0]) * (unit if what in LENGTHS else 1.0),
+                name,
+            )
+            for what in RANGES
+            if entries.has(what)
+        },
+        covariance=_covariance(entries, len(leds), unit, name),
+    )
+
+
+def _covariance(
+    entries: Entries, n_leds: int, unit: float, name: str
+) -> FloatArray | None:
+    if not entries.has("led_covariance"):
+        return None
+    n = 3 * n_leds
+    matrix = entries.counted(n * n, "led_covariance").reshape(n, n) * unit**2
+    off = float(np.abs(matrix - matrix.T).max())
+    size = float(np.abs(np.diag(matrix)).max())
+    if off > ASYMMETRY * size or np.linalg.eigvalsh(matrix)[0] < -ASYMMETRY * size:
+        raise FileError(
+            sentence(
+                "pen-file.no-covariance",
+                "The led_covariance of {name} is none: it must be symmetric, and no "
+                "variance below 0. Leave it away, or give it as it was written.",
+                name=name,
+            )
+        )
+    return matrix
+
+
+def _listed_leds(entries: Entries, name: str) -> list[Entries]:
+    listed = entries.value("leds")
+    if not isinstance(listed, list) or not listed:
+        raise FileError(
+            sentence(
+                "pen-file.no-led-list",
+                "leds in {name} is no list of LEDs. Write it as "
+                '[{{"led": 1, "x": 0, "y": 0, "z": -30}}, ...].',
+                name=name,
+            )
+        )
+    leds = []
+    for number, tree in enumerate(listed, 1):
+        place = sentence("pen-file.led", "LED {led} of {name}", led=number, name=name)
+        if not isinstance(tree, dict):
+            raise FileError(
+                sentence(
+                    "pen-file.led-no-mapping",
+                    "{place} is no mapping. Write it as "
+                    '{{"led": 1, "x": 0, "y": 0, "z": -30}}.',
+                    place=place,
+                )
+            )
+        led = Entries.of(tree, place)
+        led.refuse_others(*_LED_KEYS)
+        if led.counted(1, "led")[0] != number:
+            raise FileError(
+                sentence(
+                    "pen-file.entry-out-of-order",
+                    "Entry {number} of leds in {name} is LED {led:g}. List the LEDs "
+                    "from 1 in ascending order, each once.",
+                    number=number,
+                    name=name,
+                    led=led.counted(1, "led")[0],
+                )
+            )
+        leds.append(led)
+    return leds
+
+
+def _listed_normals(leds: list[Entries], name: str) -> FloatArray | None:
+    given = [led.has("normal") for led in leds]
+    if not any(given):
+        return None
+    if not all(given):
+        raise FileError(
+            sentence(
+                "pen-file.some-normals",
+                "LED {led} of {name} has no normal, but others have. Give the "
+                "normals of all LEDs or of none.",
+                led=given.index(False) + 1,
+                name=name,
+            )
+        )
+    return np.array([unit_normal(led.counted(3, "normal"), led.name) for led in leds])
+
+
+def json_text(pen: Pen, parent_sha256: str) -> str:
+    """Return a pen as JSON, with the hash of the file it was made better from."""
+    leds = [
+        {"led": number, "x": led[0], "y": led[1], "z": led[2], "normal": normal}
+        for number, (led, normal) in enumerate(
+            zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
+        )
+    ]
+    rows = ",\n    ".join(json.dumps(led, allow_nan=False) for led in leds)
+    tip = None if pen.nominal_tip is None else pen.nominal_tip.tolist()
+    entries = [
+        f'"name": {json.dumps(pen.name)}',
+        '"units": "mm"',
+        f'"diameter": {json.dumps(float(pen.diameter), allow_nan=False)}',
+        *(f'"{what}": {number!r}' for what, number in stated_numbers(pen).items()),
+        f'"nominal_tip": {json.dumps(tip, allow_nan=False)}',
+        *([f'"parent_sha256": "{parent_sha256}"'] if parent_sha256 else []),
+        f'"leds": [\n    {rows}\n  ]',
+    ]
+    if pen.led_covariance is not None:
+        of_leds = ",\n    ".join(map(json.dumps, pen.led_covariance.tolist()))
+        entries.append(f'"led_covariance": [\n    {of_leds}\n  ]')
+    return "{\n  " + ",\n  ".join(entries) + "\n}\n"

@@ -1,0 +1,170 @@
+"""A pen as a table; see `lightpen.formats.pen_files`."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+
+from lightpen.errors import FileError
+from lightpen.formats.pen_content import (
+    LENGTHS,
+    RANGES,
+    UNIT_NAMES,
+    UNITS,
+    PenContent,
+    agreed_unit,
+    check_diameter,
+    checked_number,
+    stated_numbers,
+    unit_normal,
+)
+from lightpen.formats.tables import Table
+from lightpen.model.pen import Pen
+from lightpen.sentences import sentence
+
+_LED_NAMES = ("led", "no", "no.", "nr", "nr.", "number", "id", "point")
+_COORDINATES = (("x",), ("y",), ("z",))
+_NORMALS = (("nx",), ("ny",), ("nz",))
+_COLUMN = (
+    r"(nx|ny|nz|x|y|z|diameter_sigma|diameter|led_sigma|scale_sigma)"
+    r"(?:[\s_/]*(?:[\[(]\s*)?([a-zμ]+)\s*[\])]?)?"
+)
+
+
+def from_table(table: Table, units: str | None) -> PenContent:
+    """Return what a table states about a pen.
+
+    Parameters
+    ----------
+    units : str or None
+        Unit of its lengths, where it does not say.
+
+    Raises
+    ------
+    FileError
+        It is no complete pen.
+    UsageError
+        The units are neither stated nor given, or both and different.
+    """
+    named = [_name_and_unit(column) for column in table.header]
+    stated = {unit for name, unit in named if unit and name in ("x", "y", "z")}
+    if len(stated) > 1:
+        one, other = sorted(stated)[:2]
+        raise FileError(
+            sentence(
+                "pen-file.mixed-units",
+                "{name} has coordinates in {one} and in {other}. Give all of them "
+                "in one unit.",
+                name=table.name,
+                one=one,
+                other=other,
+            )
+        )
+    unit = agreed_unit(stated.pop() if stated else "", units, table.name)
+    bare = replace(table, header=tuple(name for name, _ in named))
+    with_normals = "nx" in bare.header or (not bare.header and bare.n_columns == 7)
+    wanted = [_LED_NAMES, *_COORDINATES, *(_NORMALS if with_normals else ())]
+    columns = bare.columns(wanted, sentence("table.of-leds", "the LEDs of a pen"))
+    _check_numbering(table, columns[0])
+    numbers = table.numbers(columns[1:])
+    diameter = None
+    if "diameter" in bare.header:
+        place = bare.header.index("diameter")
+        diameter = _common(table, place, bare) * UNITS[named[place][1] or unit]
+        check_diameter(diameter, table.name)
+    further = {}
+    for what in RANGES:
+        if what in bare.header:
+            place = bare.header.index(what)
+            size = UNITS[named[place][1] or unit] if what in LENGTHS else 1.0
+            number = _common(table, place, bare) * size
+            further[what] = checked_number(what, number, table.name)
+    normals = None
+    if with_normals:
+        normals = np.empty((len(numbers), 3))
+        for i, line in enumerate(table.lines):
+            where = sentence(
+                "pen-file.line", "Line {line} of {name}", line=line, name=table.name
+            )
+            normals[i] = unit_normal(numbers[i, 3:], where)
+    return PenContent(numbers[:, :3] * UNITS[unit], normals, diameter, stated=further)
+
+
+def _name_and_unit(column: str) -> tuple[str, str]:
+    """Return the name of a column without its unit, and the unit or an empty string."""
+    match = re.fullmatch(_COLUMN, column)
+    if not match:
+        return column, ""
+    unit = UNIT_NAMES.get(match[2] or "", "")
+    return (match[1], unit) if unit or not match[2] else (column, "")
+
+
+def _check_numbering(table: Table, column: int) -> None:
+    """Refuse LEDs that are not numbered 1, 2, 3 and so on from row to row."""
+    numbers = table.whole_numbers(column)
+    wrong = numbers != np.arange(1, len(numbers) + 1)
+    if not np.any(wrong):
+        return
+    row = int(np.argmax(wrong))
+    found, needed = int(numbers[row]), row + 1
+    earlier = np.flatnonzero(numbers[:row] == found)
+    if len(earlier):
+        flaw = sentence(
+            "pen-file.listed-twice",
+            "LED {led} is listed already on line {line}.",
+            led=found,
+            line=table.lines[earlier[0]],
+        )
+    elif needed in numbers:
+        flaw = sentence(
+            "pen-file.out-of-order",
+            "LED {led} stands where LED {needed} is needed. List the LEDs from 1 to "
+            "{n_leds} in ascending order.",
+            led=found,
+            needed=needed,
+            n_leds=len(numbers),
+        )
+    else:
+        flaw = sentence(
+            "pen-file.gap",
+            "LED {led} stands where LED {needed} is needed, and no line has LED "
+            "{needed}. Number the LEDs from 1 without gaps.",
+            led=found,
+            needed=needed,
+        )
+    raise table.error(row, flaw)
+
+
+def _common(table: Table, column: int, bare: Table) -> float:
+    """Return the number that all rows of a column share."""
+    numbers = table.numbers([column])[:, 0]
+    other = numbers != numbers[0]
+    if np.any(other):
+        raise table.error(
+            int(np.argmax(other)),
+            sentence(
+                "pen-file.column-differs",
+                "the {what} is {value:g} where the first LED has {first:g}. It must be "
+                "the same for all LEDs of a pen.",
+                what=bare.header[column],
+                value=numbers[other][0],
+                first=numbers[0],
+            ),
+        )
+    return float(numbers[0])
+
+
+def csv_text(pen: Pen) -> str:
+    """Return the LEDs of a pen as a table."""
+    stated = stated_numbers(pen)
+    header = "led,x_mm,y_mm,z_mm,nx,ny,nz,diameter_mm"
+    header += "".join(
+        f",{what}_mm" if what in LENGTHS else f",{what}" for what in stated
+    )
+    lines = [header]
+    for number, (led, normal) in enumerate(
+        zip(pen.leds.tolist(), pen.normals.tolist(), strict=True), 1
+    ):
+        cells = [number, *led, *normal, float(pen.diameter), *stated.values()]
+        lines.append(",".join(map(repr, cells)))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,76 @@
+"""A folder of JSON files that are written once, each named by its number in order.
+
+A file's number is one higher than that of any before, an order that no clock that was
+set back can turn round. Of two programs that take the same number one gets it, and the
+other the next.
+"""
+
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+
+from lightpen.errors import FileError, NameTakenError
+from lightpen.formats.files import (
+    FOLDER,
+    create_whole,
+    printable,
+    strerror,
+    sync_folder,
+    unreadable,
+)
+from lightpen.sentences import sentence
+
+
+def add_numbered(folder: Path, data: bytes) -> Path:
+    """Add a file, the newest of all, and return it.
+
+    When this returns, it is kept whatever happens next; when it raises, or is killed,
+    it is kept whole or not at all.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        sync_folder(folder.parent)
+    except OSError as error:
+        raise FileError(
+            sentence(
+                "results.no-folder",
+                "The folder {folder} cannot be made: {reason}. Make sure that it "
+                "is yours to write.",
+                folder=printable(str(folder)),
+                reason=strerror(error),
+            )
+        ) from error
+    newest = numbered_files(folder)[:1]
+    for free in count(1 + (_number(newest[0]) if newest else 0)):
+        file = folder / f"{free:06d}.json"
+        with suppress(NameTakenError):  # by another program, just now
+            create_whole(file, data)
+            break
+    return file
+
+
+def numbered_files(folder: Path) -> list[Path]:
+    """Return the files, the newest first; others are left alone.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be read.
+    """
+    try:
+        paths = list(folder.iterdir()) if folder.is_dir() else []
+    except OSError as error:
+        raise unreadable(folder, FOLDER, error) from error
+    files = [path for path in paths if path.suffix == ".json" and _number(path)]
+    return sorted(files, key=lambda file: (_number(file), file.name), reverse=True)
+
+
+def _number(file: Path) -> int:
+    """Return the place of a file in the order; 0 for a foreign file."""
+    digits = file.stem.partition("_")[0]  # what follows were date and time of format 2
+    return int(digits) if digits.isdecimal() else 0

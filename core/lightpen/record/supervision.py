@@ -1,0 +1,264 @@
+"""Who may change the limits of a station, and every change that was made.
+
+Each change is a file of its own in the data folder, numbered in their order and never
+changed: the newest password counts, and of each station the newest limits. A password
+is kept as Argon2 makes it [1]_: what is on the disk tells nobody what it is.
+
+References
+----------
+.. [1] RFC 9106, "Argon2 Memory-Hard Function for Password Hashing and Proof-of-Work
+   Applications", 2021.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+from msgspec import Struct, to_builtins
+
+from lightpen.errors import AcceptanceError, FileError
+from lightpen.estimation.report import record_bytes
+from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.own_json import (
+    DamagedError,
+    Moment,
+    has_checksum,
+    parse_json,
+    require_usual,
+)
+from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
+from lightpen.record.numbered_files import add_numbered, numbered_files
+from lightpen.sentences import sentence
+
+LIMITS = "limits"
+FORMAT = 1
+WHAT = sentence("file.limits", "file of limits")
+LEAST_PASSWORD = 8  # characters
+
+
+@dataclass(frozen=True)
+class Signature:
+    """Who signs as a supervisor, by name and password."""
+
+    name: str
+    password: str = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Supervision:
+    """What the supervisors of a data folder have laid down.
+
+    Attributes
+    ----------
+    password_hash : str
+        Empty where there is no password: then anybody may change limits.
+    limits : mapping of str to StationLimits
+        By the name of the station.
+    """
+
+    password_hash: str = ""
+    limits: Mapping[str, StationLimits] = field(default_factory=dict)
+
+    @property
+    def is_guarded(self) -> bool:
+        """Whether it takes a supervisor to change limits and to go beyond them."""
+        return bool(self.password_hash)
+
+
+class _SwingLimits(Struct):
+    max_uncertainty_mm: float
+    min_images: int
+    max_images: int
+
+
+class _Limits(Struct):
+    swing: _SwingLimits
+    verification_mm: VerificationLimits
+
+
+class _Change(Struct):
+    format: int
+    at: Moment
+    supervisor: str
+    station: str = ""
+    password: str = ""
+    limits: _Limits | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.at)
+        if self.limits is not None:
+            _limits_of(self.limits)
+
+
+def read_supervision(data: Path) -> Supervision:
+    """Return what is laid down in a data folder.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or was changed: an older limit must not count again in
+        silence.
+    """
+    password, limits = "", dict[str, StationLimits]()
+    for file in reversed(numbered_files(data / LIMITS)):
+        change = _read(file)
+        password = change.password or password
+        if change.limits is not None:
+            limits[change.station] = _limits_of(change.limits)
+    return Supervision(password, limits)
+
+
+def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
+    """Lay down a supervisor's password; where there is one, by that one only.
+
+    Raises
+    ------
+    AcceptanceError
+        The present password is another one, the name is missing, or the new one is too
+        short.
+    FileError
+        It cannot be kept.
+    """
+    from argon2 import PasswordHasher  # 20 ms that a start of the program need not take
+
+    supervision = read_supervision(data)
+    if supervision.is_guarded:
+        require_supervisor(supervision, signature)
+    else:
+        _require_name(signature)
+    if len(new) < LEAST_PASSWORD:
+        raise AcceptanceError(
+            sentence(
+                "supervisor.short-password",
+                "The password has {length} characters, at least {needed} are needed.",
+                length=len(new),
+                needed=LEAST_PASSWORD,
+            )
+        )
+    _add(
+        data, _Change(FORMAT, now, signature.name, password=PasswordHasher().hash(new))
+    )
+
+
+def set_limits(
+    data: Path, station: str, limits: StationLimits, signature: Signature, now: datetime
+) -> None:
+    """Lay down the limits of a station.
+
+    Raises
+    ------
+    AcceptanceError
+        It is not signed by a supervisor.
+    FileError
+        It cannot be kept.
+    """
+    require_supervisor(read_supervision(data), signature)
+    swing = limits.swing
+    entry = _Limits(
+        _SwingLimits(swing.max_uncertainty, swing.min_images, swing.max_images),
+        limits.verification,
+    )
+    _add(data, _Change(FORMAT, now, signature.name, station=station, limits=entry))
+
+
+def lay_down(
+    data: Path,
+    station: str,
+    limits: StationLimits,
+    signature: Signature,
+    new_password: str,
+    now: datetime,
+) -> Supervision:
+    """Lay down limits, and a password where there is none or a new one is given.
+
+    Returns
+    -------
+    Supervision
+        What is laid down now.
+
+    Raises
+    ------
+    AcceptanceError
+        It is not signed by a supervisor, or the password is too short.
+    FileError
+        It cannot be kept.
+    """
+    if not read_supervision(data).is_guarded:
+        set_password(data, signature, signature.password, now)
+    if new_password:
+        set_password(data, signature, new_password, now)
+        signature = replace(signature, password=new_password)
+    set_limits(data, station, limits, signature, now)
+    return read_supervision(data)
+
+
+def require_supervisor(supervision: Supervision, signature: Signature) -> None:
+    """Refuse who is no supervisor.
+
+    Raises
+    ------
+    AcceptanceError
+        There is no password yet, it is another one, or the name is missing.
+    """
+    from argon2 import PasswordHasher  # as above
+    from argon2.exceptions import InvalidHashError, VerifyMismatchError
+
+    _require_name(signature)
+    if not supervision.is_guarded:
+        raise AcceptanceError(
+            sentence(
+                "supervisor.no-password",
+                "There is no supervisor's password yet. Lay one down with the limits.",
+            )
+        )
+    try:
+        PasswordHasher().verify(supervision.password_hash, signature.password)
+    except (VerifyMismatchError, InvalidHashError) as error:
+        raise AcceptanceError(
+            sentence(
+                "supervisor.wrong-password",
+                "The supervisor's password is another one. Type it again.",
+            )
+        ) from error
+
+
+def _require_name(signature: Signature) -> None:
+    if not signature.name.strip():
+        raise AcceptanceError(
+            sentence("supervisor.no-name", "Enter the name of the supervisor.")
+        )
+
+
+def _add(data: Path, change: _Change) -> None:
+    entries = {
+        name: entry
+        for name, entry in to_builtins(change).items()
+        if entry not in ("", None)
+    }
+    add_numbered(data / LIMITS, record_bytes(entries))
+
+
+def _read(file: Path) -> _Change:
+    text = read_bytes(file, WHAT, MEGABYTE)
+    try:
+        if not has_checksum(text):
+            raise DamagedError("There is no checksum.")
+        return parse_json(text, _Change)
+    except DamagedError as error:
+        raise FileError(
+            sentence(
+                "limits.damaged",
+                "The limits in {file} are not as they were laid down: they were "
+                "changed or damaged since. Restore the file from a copy.",
+                file=printable(str(file)),
+            )
+        ) from error
+
+
+def _limits_of(entry: _Limits) -> StationLimits:
+    swing = entry.swing
+    return StationLimits(
+        SwingLimits(swing.max_uncertainty_mm, swing.min_images, swing.max_images),
+        entry.verification_mm,
+    )

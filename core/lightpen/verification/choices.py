@@ -1,0 +1,86 @@
+"""What a station verifies, with which artefacts, and by which limits."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.fixed_point import USUAL_TOUCHES
+from lightpen.verification.touching import FAST
+
+
+class TaskKind(StrEnum):
+    """What is touched."""
+
+    FIXED_POINT = "fixed point"
+    CIRCLE = "circle"
+    LENGTH = "length"
+
+
+class Surface(StrEnum):
+    """What of a ring the ball touches."""
+
+    GROOVE = "groove"  # in which the centre of the ball runs
+    BORE = "bore"
+    BOSS = "boss"
+
+
+class Wanting(StrEnum):
+    """What keeps a verification from being begun."""
+
+    TASK = "task"
+    RADIUS = "radius"
+    LENGTH = "length"
+    BALL = "ball"
+
+
+@dataclass(frozen=True)
+class VerificationChoices:
+    """What is verified, and how.
+
+    Attributes
+    ----------
+    kinds : tuple of TaskKind
+        In the order of `TaskKind`.
+    n_touches : int
+        Of the fixed point.
+    radius, radius_uncertainty : float
+        Certified radius of the ring, 0 where it is not known, and its U (k = 2), mm.
+    n_runs : int
+        Round the ring.
+    length, length_uncertainty : float
+        As those of the radius.
+    n_places : int
+        At which the length is touched.
+    n_frames : int
+        Images of a touch.
+    """
+
+    kinds: tuple[TaskKind, ...] = (TaskKind.FIXED_POINT,)
+    n_touches: int = USUAL_TOUCHES
+    radius: float = 0.0
+    radius_uncertainty: float = 0.0
+    surface: Surface = Surface.GROOVE
+    n_runs: int = 1
+    length: float = 0.0
+    length_uncertainty: float = 0.0
+    n_places: int = 1
+    n_frames: int = FAST
+    limits: VerificationLimits = field(default_factory=VerificationLimits)
+
+    def wanting(self, ball_diameter: float | None) -> tuple[Wanting, ...]:
+        """Return what is missing, with a ball of this diameter, mm."""
+        wants_ring = TaskKind.CIRCLE in self.kinds
+        is_offset = wants_ring and self.surface is not Surface.GROOVE
+        wanting = {
+            Wanting.TASK: not self.kinds,
+            Wanting.RADIUS: wants_ring and not self.radius,
+            Wanting.BALL: is_offset and not ball_diameter,
+            Wanting.LENGTH: TaskKind.LENGTH in self.kinds and not self.length,
+        }
+        return tuple(each for each, is_wanting in wanting.items() if is_wanting)
+
+
+def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
+    """Return what is to be added to the radius of a circle of tip centres, mm."""
+    sign = {Surface.GROOVE: 0.0, Surface.BORE: 1.0, Surface.BOSS: -1.0}[surface]
+    return sign * (ball_diameter or 0.0) / 2

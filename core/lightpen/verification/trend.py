@@ -1,0 +1,140 @@
+"""How a tip developed: its calibrations in their order, beside their limits."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.archive.database import Database
+from lightpen.archive.entries import IN_FORCE_BY, Written
+from lightpen.archive.history import TipState, lines
+from lightpen.archive.queries import Wanted
+from lightpen.estimation.verdict import Change, change_since
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.repeatability import (
+    MIN_TIPS,
+    ControlLimits,
+    Repeatability,
+    TipEstimate,
+    measure_repeatability,
+)
+
+LONGEST = 1000  # calibrations, the newest
+LIMIT = "max_uncertainty_mm"  # among the settings of an entry
+
+
+@dataclass(frozen=True, eq=False)
+class Trend:
+    """The calibrations of a tip that were accepted and not taken back.
+
+    Attributes
+    ----------
+    pen, tip : str
+        Empty where there is none.
+    entries : tuple of Written
+        The oldest first.
+    max_uncertainty : float or None
+        Limit of U (k = 2) at the newest, mm.
+    """
+
+    pen: str = ""
+    tip: str = ""
+    entries: tuple[Written, ...] = ()
+    tips: tuple[TipEstimate, ...] = ()
+    control: ControlLimits | None = None
+    max_uncertainty: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Two calibrations side by side.
+
+    Attributes
+    ----------
+    change : Change
+        From the earlier to the later.
+    is_same_tip : bool
+        Whether both are of the same pen and tip.
+    """
+
+    earlier: Written
+    later: Written
+    change: Change
+    is_same_tip: bool
+
+
+def trend_of(database: Database, wanted: Wanted) -> Trend:
+    """Return the trend of a pen and tip, of the newest calibrations if they are many.
+
+    Parameters
+    ----------
+    wanted : Wanted
+        With a pen and a tip; entries of all kinds but calibrations are left out.
+    """
+    newest = lines(database, replace(wanted, kinds=IN_FORCE_BY), 0, LONGEST)
+    entries = tuple(
+        each.entry
+        for each in reversed(newest)
+        if each.entry is not None
+        and has_tip(each.entry)
+        and each.state is not TipState.TAKEN_BACK
+    )
+    tips = tuple(map(tip_of, entries))
+    return Trend(
+        pen=wanted.pen,
+        tip=wanted.tip,
+        entries=entries,
+        tips=tips,
+        control=_control(tips),
+        max_uncertainty=_limit(entries[-1]) if entries else None,
+    )
+
+
+def has_tip(entry: Written) -> bool:
+    """Return whether an entry tells of a tip, with its uncertainty."""
+    event = entry.entry.event
+    return None not in (event.tip_pen_mm, event.expanded_uncertainty_mm)
+
+
+def tip_of(entry: Written) -> TipEstimate:
+    """Return the tip of an entry that tells of one."""
+    event = entry.entry.event
+    return TipEstimate(
+        f"{entry.entry.number}",
+        np.array(event.tip_pen_mm, dtype=np.float64),
+        np.array(event.expanded_uncertainty_mm, dtype=np.float64),
+        event.at,
+    )
+
+
+def compare(one: Written, other: Written) -> Comparison:
+    """Compare two entries that tell of tips, in whatever order."""
+    earlier, later = sorted((one, other), key=lambda each: each.entry.since)
+    now, then = tip_of(later), tip_of(earlier)
+    change = change_since(now.tip_pen, now.uncertainty, then.tip_pen, then.uncertainty)
+    return Comparison(earlier, later, change, _subject(one) == _subject(other))
+
+
+def repeatability_of(
+    entries: tuple[Written, ...], limits: VerificationLimits
+) -> Repeatability | None:
+    """Return how well tips repeat; None if they are fewer than two, or of several."""
+    if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
+        return None
+    in_order = sorted(entries, key=lambda each: each.entry.since)
+    return measure_repeatability([tip_of(each) for each in in_order], limits)
+
+
+def _subject(entry: Written) -> tuple[str, str, bool]:
+    event = entry.entry.event
+    return event.names.pen, event.names.tip, event.is_simulated
+
+
+def _control(tips: tuple[TipEstimate, ...]) -> ControlLimits | None:
+    if len(tips) < MIN_TIPS:
+        return None
+    return measure_repeatability(tips, VerificationLimits()).control
+
+
+def _limit(entry: Written) -> float | None:
+    limit = entry.entry.event.settings.get(LIMIT)
+    return limit if isinstance(limit, float) else None

@@ -1,0 +1,159 @@
+"""Fixed lamps in view, as witness that the camera stands still while a tip is verified.
+
+A camera that turns by an angle shifts all that it sees alike, so that a point at the
+distance w seems to move by ``w / f`` times the shift of a lamp. The images of all
+touches are parted into blocks in the order of time: what the lamps moved by from the
+first block to any other is told beside what the noise of their centres makes of it.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.fixed_lamps import fixed_lamps
+from lightpen.detection.sighting import Sighting
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.limits import VerificationLimits
+from lightpen.sentences import sentence
+from lightpen.verification.assessment import (
+    VERIFY_AGAIN,
+    Conformity,
+    accepted,
+    check,
+)
+
+BLOCK = 8  # images
+MIN_BLOCKS = 3  # before, during and after
+
+
+@dataclass(frozen=True, eq=False)
+class LampImages:
+    """What the images of the touches show of lamps, in the order of time.
+
+    Attributes
+    ----------
+    masked : tuple of array
+        Lights in masked circles, (M, 2) each, px; NaN where an image shows none.
+    """
+
+    sightings: tuple[Sighting, ...] = ()
+    masked: tuple[FloatArray, ...] = ()
+
+    def with_image(self, sighting: Sighting, masked: FloatArray) -> "LampImages":
+        """Return them with one more image."""
+        return LampImages((*self.sightings, sighting), (*self.masked, masked))
+
+
+@dataclass(frozen=True, eq=False)
+class LampWitness:
+    """How far fixed lamps moved while a tip was verified.
+
+    Attributes
+    ----------
+    lamps : (K, 2) array
+        Where they are in the image, px.
+    moves : (B, 2) array
+        Of each block of images since the first, along u and v where the pen was, mm.
+    uncertainty : float
+        U (k = 2) of one of them, mm.
+    """
+
+    lamps: FloatArray
+    moves: FloatArray
+    uncertainty: float
+    assessment: Conformity = field(repr=False)
+
+    @property
+    def moved(self) -> float:
+        """The farthest move, mm."""
+        return float(np.linalg.norm(self.moves, axis=1).max())
+
+
+def witnessed(
+    images: LampImages, focal_length: float, limits: VerificationLimits
+) -> LampWitness | None:
+    """Return what fixed lamps tell; None without one, or of too few images.
+
+    Parameters
+    ----------
+    focal_length : float
+        px.
+    """
+    if len(images.sightings) < MIN_BLOCKS * BLOCK:
+        return None
+    lamps = fixed_lamps(np.array(images.masked), images.sightings)
+    distances = [each.translation[2] for each in images.sightings]
+    scale = float(np.median(distances)) / focal_length
+    return witnessed_by(lamps, scale, limits)
+
+
+def witnessed_by(
+    lamps: FloatArray, scale: float, limits: VerificationLimits
+) -> LampWitness | None:
+    """Return what lamps (N, K, 2), px, tell; NaN where an image does not show one.
+
+    Parameters
+    ----------
+    scale : float
+        mm where the pen is for a pixel.
+    """
+    lamps = lamps[np.isfinite(lamps[..., 0]).any(axis=1)]
+    n_images, n_lamps = lamps.shape[:2]
+    n_blocks = n_images // BLOCK
+    if not n_lamps or n_blocks < MIN_BLOCKS:
+        return None
+    places = np.nanmean(lamps, axis=0)
+    shifts = np.nanmean(lamps - places, axis=1)  # alike for all lamps
+    blocks = np.array_split(shifts, n_blocks)
+    means = np.array([np.nanmean(part, axis=0) for part in blocks])
+    noise = np.concatenate(
+        [part - mean for part, mean in zip(blocks, means, strict=True)]
+    )
+    spread = float(np.sqrt(np.nanmean(noise**2) * BLOCK / (BLOCK - 1)))
+    uncertainty = COVERAGE_FACTOR * scale * spread * float(np.sqrt(2 / BLOCK))
+    moves = scale * (means - means[0])
+    return LampWitness(places, moves, uncertainty, _judged(moves, uncertainty, limits))
+
+
+def witness_entries(witness: LampWitness | None) -> dict[str, Any] | None:
+    """Return what lamps tell, as an entry of a record."""
+    if witness is None:
+        return None
+    return {
+        "lamps_px": witness.lamps,
+        "moves_mm": witness.moves,
+        "moved_mm": witness.moved,
+        "expanded_uncertainty_mm": witness.uncertainty,
+        "grade": witness.assessment.grade.value,
+    }
+
+
+def _judged(
+    moves: FloatArray, uncertainty: float, limits: VerificationLimits
+) -> Conformity:
+    moved = float(np.linalg.norm(moves, axis=1).max())
+    if moved > limits.drift:
+        return check(
+            sentence(
+                "witness.moved",
+                "The camera moved: fixed lamps in view shift by {moved:.4f} mm where "
+                "the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was "
+                "touched is off by as much.",
+                moved=moved,
+                uncertainty=uncertainty,
+                limit=limits.drift,
+            ),
+            VERIFY_AGAIN,
+        )
+    return accepted(
+        sentence(
+            "witness.still",
+            "The camera stands still: fixed lamps in view shift by {moved:.4f} mm "
+            "where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm).",
+            moved=moved,
+            uncertainty=uncertainty,
+            limit=limits.drift,
+        )
+    )

@@ -1,0 +1,127 @@
+"""A tip in force that no images were needed for, and what is seen of it touching."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting, sight_centers, unseen
+from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.report import calibration_record
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.hashes import Inputs, hashed
+from lightpen.formats.observation_files import Centers
+from lightpen.formats.pen_files import read_pen
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.model.pen import Pen
+from lightpen.model.posture import rotations_of
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.results import Result
+from lightpen.simulator.swings import (
+    PAPER_CONE,
+    PAPER_TIP,
+    simulate_centers,
+    swing_poses,
+)
+from lightpen.swing.preparation import Preparation
+
+N_IMAGES = 40
+SIGMA = 0.01  # px
+ACCEPTED = datetime(2031, 4, 30, 12, tzinfo=UTC)
+
+
+def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
+    """Put a tip in force by a simulated swing; return the file of its result."""
+    camera, pen = preparation.camera_file, preparation.pen_file
+    assert camera is not None
+    assert pen is not None
+    found = _calibrated(camera.path, pen.path, seed)
+    origin = preparation.origin
+    inputs = Inputs(hashed(camera.path), hashed(pen.path), (), None, origin=origin)
+    archive, names = FolderArchive(data), preparation.names
+    archive.store(
+        Result(
+            names=names,
+            accepted=ACCEPTED,
+            grade="pass",
+            record=data / "records" / "swing",
+            images=(),
+            calibration=calibration_record(found, inputs, "joint", preparation.limits),
+            origin=origin,
+        )
+    )
+    file = archive.file_in_force(
+        names.pen, names.tip, is_simulated=origin is Origin.SIMULATED
+    )
+    assert file is not None
+    return file
+
+
+@cache
+def _calibrated(camera_file: Path, pen_file: Path, seed: int) -> Calibration:
+    camera, pen = read_camera(camera_file), read_pen(pen_file)
+    rng = np.random.default_rng(seed)
+    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
+    poses = swing.rotations, swing.translations
+    pixels = simulate_centers(camera, pen, *poses, SIGMA, rng)
+    centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("swing.csv"))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """A tip held at a place from the bottom of the cone, mm, leant so, rad."""
+
+    place: Sequence[float] = (0.0, 0.0, 0.0)
+    tilt: float = 0.3
+    direction: float = 0.0
+
+
+class Holder:
+    """Shows the pen as it is held, without an image.
+
+    Parameters
+    ----------
+    tip_pen : (3,) array
+        Where the tip really is, mm.
+    """
+
+    def __init__(
+        self, camera: Camera, pen: Pen, tip_pen: FloatArray = PAPER_TIP
+    ) -> None:
+        self.camera, self.pen, self._tip_pen = camera, pen, tip_pen
+        self._rng = np.random.default_rng(7)
+
+    def still(self, hold: Hold, n_images: int = 10) -> Iterator[Sighting]:
+        """Yield what is seen of a pen that is held still."""
+        R = rotations_of(
+            *(self.pen, np.array([hold.tilt])),
+            *(np.array([hold.direction]), np.zeros(1)),
+        )
+        t = PAPER_CONE + np.array(hold.place) - R @ self._tip_pen
+        for _ in range(n_images):
+            (pixels,) = simulate_centers(self.camera, self.pen, R, t, SIGMA, self._rng)
+            yield sight_centers(self.camera, self.pen, pixels, R[0], t[0])
+
+    def away(self, n_images: int = 8) -> Iterator[Sighting]:
+        """Yield what is seen while the pen is out of the image."""
+        for _ in range(n_images):
+            yield unseen(self.pen, Reason.EMPTY)
+
+
+def leant(n: int, place: Sequence[float] = (0.0, 0.0, 0.0)) -> list[Hold]:
+    """Return n postures at one place, each leant another way."""
+    return [Hold(place, direction=2 * np.pi * i / n) for i in range(n)]
+
+
+def round_a_ring(n: int, radius: float, degrees: float = 360.0) -> list[Hold]:
+    """Return n places on a ring above the cone."""
+    angles = np.radians(degrees) * np.arange(n) / n
+    return [Hold((radius * np.cos(a), -40.0 + radius * np.sin(a), 0.0)) for a in angles]

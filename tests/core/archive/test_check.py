@@ -1,0 +1,182 @@
+"""Whatever is changed in an archive is found, and named."""
+
+import random
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from tests.core.archive.conftest import Station
+
+from lightpen.archive.chains import copy_entries, records_of
+from lightpen.archive.check import check_archive
+from lightpen.archive.database import look_into
+from lightpen.archive.seal import close_sealed, seal_of
+from lightpen.errors import ArchiveError
+
+N_FLIPS = 60
+
+
+@pytest.fixture
+def archive(station: Station) -> Path:
+    """The file of an archive of five entries, closed and sealed."""
+    station.enter(5)
+    close_sealed(station.database)
+    assert station.database.file is not None
+    return station.database.file
+
+
+def findings(archive: Path) -> list[str]:
+    """Return what a check finds, or why it cannot look."""
+    try:
+        with closing(look_into(archive)) as database:
+            return [str(each) for each in check_archive(database).findings]
+    except ArchiveError as error:
+        return [str(error.sentence)]
+
+
+def change(archive: Path, *statements: str) -> None:
+    """Change an archive with tools that know SQL, and hide it from its seal."""
+    with closing(sqlite3.connect(archive)) as connection, connection:
+        for statement in statements:
+            assert connection.execute(statement).rowcount > 0
+    seal_of(archive).unlink()
+
+
+def test_an_archive_as_it_was_entered_passes(archive: Path) -> None:
+    with closing(look_into(archive)) as database:
+        checked = check_archive(database)
+
+    assert (checked.n_entries, checked.findings) == (5, ())
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("text", "replace(text, 'Ann', 'Bob')"),
+        ("text", "CAST(text AS BLOB)"),
+        ("station", "'Hall 9'"),
+        ("since_us", "since_us + 1"),
+        ("sha256", f"'{'0' * 64}'"),
+        ("kind", "'refused'"),
+        ("number", "'three'"),
+    ],
+)
+def test_a_changed_row_is_named(archive: Path, column: str, value: str) -> None:
+    change(archive, f"UPDATE archive_entries SET {column} = {value} WHERE number = 3")
+
+    assert any("Entry 3 of the chain" in each for each in findings(archive))
+
+
+def test_a_row_that_was_taken_out_is_named(archive: Path) -> None:
+    change(archive, "DELETE FROM archive_entries WHERE number = 2")
+
+    assert any(
+        each.startswith("Entry 2 ") and "missing" in each for each in findings(archive)
+    )
+
+
+def test_last_rows_that_were_taken_out_are_named(archive: Path) -> None:
+    change(archive, "DELETE FROM archive_entries WHERE number > 3")
+
+    assert any(each.startswith("Entries 4 to 5 ") for each in findings(archive))
+
+
+def test_a_row_rewritten_with_a_right_hash_breaks_the_chain(
+    archive: Path, make_station: Callable[[str], Station]
+) -> None:
+    other = make_station("Hall 3")
+    entries = other.enter(3)
+    with closing(sqlite3.connect(archive)) as connection, connection:
+        (chain,) = connection.execute("SELECT chain FROM archive_chains").fetchone()
+        text = entries[2].text.replace(other.chain, chain)
+        from lightpen.archive.entries import text_sha256
+
+        connection.execute(
+            "UPDATE archive_entries SET text = ?, sha256 = ?, station = 'Hall 3',"
+            " since_us = (SELECT since_us FROM archive_entries WHERE number = 3)"
+            " WHERE number = 3",
+            (text, text_sha256(text)),
+        )
+    seal_of(archive).unlink()
+
+    assert any(
+        "Entry 3 " in each and "does not follow" in each for each in findings(archive)
+    )
+
+
+def test_a_changed_record_is_named_by_its_entry(archive: Path) -> None:
+    change(
+        archive,
+        "UPDATE archive_records SET text = replace(text, '3', '4')"
+        " WHERE text LIKE '%\"n\": 3%'",
+    )
+
+    assert any(
+        "entry 4 of the chain" in each and "changed" in each
+        for each in findings(archive)
+    )
+
+
+def test_a_record_that_was_taken_out_is_named_by_its_entry(archive: Path) -> None:
+    change(archive, "DELETE FROM archive_records WHERE text LIKE '%\"n\": 3%'")
+
+    assert any("The record of entry 4" in each for each in findings(archive))
+
+
+def test_a_chain_that_the_archive_does_not_know_is_named(archive: Path) -> None:
+    change(archive, "DELETE FROM archive_chains")
+
+    assert any("does not know" in each for each in findings(archive))
+
+
+def test_a_byte_changed_anywhere_in_the_file_is_found(
+    archive: Path, tmp_path: Path
+) -> None:
+    shutil.copy(seal_of(archive), tmp_path)
+    data = archive.read_bytes()
+    rng = random.Random(1)
+    for _ in range(N_FLIPS):
+        place = rng.randrange(len(data))
+        changed = bytearray(data)
+        changed[place] ^= rng.randrange(1, 256)
+        (tmp_path / archive.name).write_bytes(changed)
+        assert findings(tmp_path / archive.name), f"byte {place}"
+
+
+def test_a_damaged_seal_is_named(archive: Path) -> None:
+    seal = seal_of(archive)
+    seal.write_bytes(seal.read_bytes().replace(b"a", b"b"))
+
+    assert any("The seal" in each for each in findings(archive))
+
+
+def test_what_is_entered_after_a_seal_is_no_change(
+    archive: Path, make_station: Callable[[str], Station]
+) -> None:
+    station = make_station(archive.parent.name)
+    station.enter(2, first=5)
+    station.database.close()
+
+    assert findings(archive) == []
+
+
+def test_copies_of_other_chains_are_checked_too(
+    archive: Path, make_station: Callable[[str], Station]
+) -> None:
+    other, station = make_station("Hall 3"), make_station(archive.parent.name)
+    entries = other.enter(2)
+    copy_entries(
+        *(station.database, other.chain, entries),
+        records_of(other.database, entries),
+    )
+    station.database.close()
+    with closing(sqlite3.connect(archive)) as connection, connection:
+        connection.execute(
+            "DELETE FROM archive_entries WHERE chain = ? AND number = 2", (other.chain,)
+        )
+
+    (found,) = findings(archive)[:1]
+    assert found == f"Entry 2 of the chain {other.chain[:8]} is missing."

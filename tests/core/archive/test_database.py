@@ -1,0 +1,115 @@
+"""A database is looked at before it is written to, and said to be what it is."""
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from tests.core.archive.conftest import PASSWORD, Postgres, Station
+
+from lightpen.archive.database import (
+    MIGRATIONS,
+    VERSION,
+    VERSION_TABLE,
+    look_into,
+    open_file,
+    open_server,
+)
+from lightpen.archive.tables import METADATA
+from lightpen.errors import ArchiveError
+
+
+def test_the_migrations_lead_to_the_tables_that_are_used(station: Station) -> None:
+    assert ScriptDirectory(str(MIGRATIONS)).get_current_head() == VERSION
+    options = {"version_table": VERSION_TABLE}
+    with station.database.reading() as connection:
+        context = MigrationContext.configure(connection, opts=options)
+        assert compare_metadata(context, METADATA) == []
+
+
+def test_an_archive_is_safe_against_a_power_cut(station: Station) -> None:
+    with station.database.reading() as connection:
+        mode = connection.exec_driver_sql("PRAGMA journal_mode").scalar_one()
+        synchronous = connection.exec_driver_sql("PRAGMA synchronous").scalar_one()
+
+    assert (mode, synchronous) == ("wal", 2)  # 2 is FULL
+
+
+def test_an_archive_of_a_later_version_is_refused_and_untouched(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    open_file(file).close()
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute(f"UPDATE {VERSION_TABLE} SET version_num = '99'")
+    before = file.read_bytes()
+
+    for opening in (open_file, look_into):
+        with pytest.raises(ArchiveError, match="by a later version of the program"):
+            opening(file)
+    assert file.read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def test_a_database_of_another_program_is_refused_and_untouched(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute("CREATE TABLE songs (name TEXT)")
+    before = file.read_bytes()
+
+    with pytest.raises(ArchiveError, match="holds the tables of another program"):
+        open_file(file)
+    assert file.read_bytes() == before
+
+
+def test_a_file_that_is_no_database_is_refused_and_untouched(tmp_path: Path) -> None:
+    file = tmp_path / "archive.sqlite"
+    file.write_bytes(b"Dear archive, " * 100)
+
+    with pytest.raises(ArchiveError, match="file is not a database"):
+        open_file(file)
+    assert file.read_bytes() == b"Dear archive, " * 100
+
+
+def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> None:
+    with pytest.raises(ArchiveError, match="There is no archive"):
+        look_into(tmp_path / "archive.sqlite")
+
+
+@pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])
+def test_an_address_that_is_none_is_refused(address: str) -> None:
+    with pytest.raises(ArchiveError, match="It has the form postgresql://"):
+        open_server(address)
+
+
+def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> None:
+    wrong = f"not-{PASSWORD}"
+    with pytest.raises(ArchiveError) as caught:
+        open_server(postgres.address("postgres", wrong))
+
+    told = str(caught.value.sentence)
+    assert "password authentication failed" in told
+    assert PASSWORD not in told
+
+
+def test_a_server_that_is_no_postgresql_is_said_to_be_unusable(gopher: int) -> None:
+    with pytest.raises(ArchiveError, match="cannot be used"):
+        open_server(f"postgresql://plant:{PASSWORD}@127.0.0.1:{gopher}/plant")
+
+
+def test_tables_of_another_program_on_a_server_are_left_alone(
+    postgres: Postgres,
+) -> None:
+    import psycopg
+
+    address = postgres.new_database()
+    with psycopg.connect(address) as connection:
+        connection.execute("CREATE TABLE songs (name TEXT)")
+
+    with pytest.raises(ArchiveError, match="holds the tables of another program"):
+        open_server(address)

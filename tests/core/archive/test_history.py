@@ -1,0 +1,179 @@
+"""The history tells what became of each tip, and what of it was changed."""
+
+import csv
+import io
+import json
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from msgspec import structs
+from sqlalchemy import text
+from tests.core.archive.conftest import NOON, Station, accepted
+
+from lightpen.archive.chains import append
+from lightpen.archive.due import due_tips
+from lightpen.archive.entries import Event, Kind, Written
+from lightpen.archive.exchange import export_entries, import_entries
+from lightpen.archive.history import TipState, known_names, lines, remarks_on
+from lightpen.archive.listing import COLUMNS, save_entries
+from lightpen.archive.queries import Wanted, n_wanted
+from lightpen.model.origin import Origin
+from lightpen.record.due_rule import DueRule
+
+ALL = Wanted()
+IN_FORCE, REPLACED = TipState.IN_FORCE, TipState.REPLACED
+TAKEN_BACK = TipState.TAKEN_BACK
+
+
+def enter(station: Station, event: Event) -> Written:
+    entry = append(station.database, station.chain, event)
+    assert entry is not None
+    return entry
+
+
+def about(entry: Written, kind: Kind, n: int) -> Event:
+    """Return an event that concerns an entry."""
+    return Event(
+        kind=kind,
+        at=NOON + timedelta(minutes=n),
+        names=entry.entry.event.names,
+        program="lightpen 1",
+        reason="Dropped.",
+        concerns=entry.sha256,
+    )
+
+
+def states(station: Station, wanted: Wanted = ALL) -> list[TipState]:
+    found = lines(station.database, wanted, 0, 100)
+    return [line.state for line in found if line.state is not TipState.NONE]
+
+
+def test_the_newest_tip_that_was_not_taken_back_is_in_force(station: Station) -> None:
+    *_, last = station.enter(3)
+    assert states(station) == [IN_FORCE, REPLACED, REPLACED]
+
+    enter(station, about(last, Kind.TAKEN_BACK, 10))
+    assert states(station) == [TAKEN_BACK, IN_FORCE, REPLACED]
+
+
+def test_a_simulated_or_another_tip_replaces_none(station: Station) -> None:
+    station.enter(1)
+    enter(station, accepted(1, tip="T-11")[0])
+    practice = structs.replace(accepted(2)[0], origin=Origin.SIMULATED)
+    enter(station, practice)
+
+    assert states(station) == [IN_FORCE] * 3
+    assert states(station, Wanted(is_simulated=True)) == [IN_FORCE]
+
+
+def test_an_entry_from_another_station_replaces_no_tip_here(
+    make_station: Callable[[str], Station], tmp_path: Path
+) -> None:
+    here, there = make_station("Hall 2"), make_station("Hall 3")
+    here.enter(1)
+    there.enter(1, first=5)
+    export_entries(there.database, tmp_path / "hall-3.jsonl")
+    import_entries(here.database, tmp_path / "hall-3.jsonl")
+
+    assert states(here) == [IN_FORCE, IN_FORCE]
+    assert known_names(here.database).stations == ("Hall 2", "Hall 3")
+    assert states(here, Wanted(station="Hall 3")) == [IN_FORCE]
+
+
+def test_every_block_of_lines_follows_the_one_before(station: Station) -> None:
+    station.enter(7)
+    blocks = [lines(station.database, ALL, first, 3) for first in (0, 3, 6, 9)]
+
+    assert [[line.number for line in block] for block in blocks] == [
+        *([7, 6, 5], [4, 3, 2], [1], []),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "n_found"),
+    [
+        (Wanted(pen="LP-04"), 4),
+        (Wanted(pen="LP-04", tip="T-11"), 1),
+        (Wanted(tip="T-12"), 0),
+        (Wanted(begin=NOON + timedelta(minutes=2)), 2),
+        (Wanted(end=NOON + timedelta(minutes=2)), 2),
+        (Wanted(station="Hall 3"), 0),
+    ],
+)
+def test_only_what_is_looked_for_is_shown(
+    station: Station, wanted: Wanted, n_found: int
+) -> None:
+    station.enter(3)
+    enter(station, accepted(3, tip="T-11")[0])
+
+    assert n_wanted(station.database, wanted) == n_found
+    assert len(lines(station.database, wanted, 0, 100)) == n_found
+    assert known_names(station.database).tips_of("LP-04") == ("T-10", "T-11")
+
+
+def test_a_changed_entry_is_told_of_and_nothing_it_says_is_shown(
+    station: Station,
+) -> None:
+    station.enter(3)
+    with station.database.writing() as connection:
+        statement = "UPDATE archive_entries SET text = replace(text, 'Ann', 'Bob')"
+        connection.execute(text(f"{statement} WHERE number = 2"))
+
+    found = lines(station.database, ALL, 0, 100)
+    assert [(line.number, line.entry is None) for line in found] == [
+        *((3, False), (2, True), (1, False)),
+    ]
+
+
+def test_what_concerns_an_entry_is_found_in_its_order(station: Station) -> None:
+    first, second = station.enter(2)
+    for kind in (Kind.NOTE, Kind.TAKEN_BACK):
+        enter(station, about(first, kind, 10))
+
+    kinds = [each.entry.event.kind for each in remarks_on(station.database, first)]
+    assert kinds == [Kind.NOTE, Kind.TAKEN_BACK]
+    assert remarks_on(station.database, second) == ()
+
+
+def test_a_tip_is_due_by_its_age_or_by_the_swings_of_its_pen(station: Station) -> None:
+    station.enter(1)
+    for n in range(1, 4):
+        swing = accepted(n, tip="T-11")[0]
+        other = structs.replace(swing, kind=Kind.REFUSED, swing=f"swing-{n}")
+        enter(station, other)
+    (tip,) = due_tips(station.database, station.chain, DueRule(30, 4))
+    assert (tip.n_swings, tip.n_left) == (3, 1)
+    assert tip.due == NOON + timedelta(days=30)
+    assert not tip.is_due(tip.due)
+    assert tip.is_due(tip.due + timedelta(seconds=1))
+
+    (worn,) = due_tips(station.database, station.chain, DueRule(30, 3))
+    assert worn.is_due(NOON)
+    (lasting,) = due_tips(station.database, station.chain, DueRule(30, 0))
+    assert lasting.n_left is None
+
+
+def test_a_tip_that_is_due_is_listed_before_one_that_is_not(station: Station) -> None:
+    station.enter(1)
+    enter(station, accepted(9, tip="T-11")[0])
+    swing = structs.replace(accepted(10, tip="T-9")[0], kind=Kind.ABANDONED)
+    enter(station, swing)
+
+    listed = due_tips(station.database, station.chain, DueRule(30, 2))
+    assert [tip.entry.entry.event.names.tip for tip in listed] == ["T-10", "T-11"]
+
+
+def test_entries_are_saved_as_a_table_and_as_they_are_kept(
+    station: Station, tmp_path: Path
+) -> None:
+    entries = station.enter(3)
+    for name in ("all.csv", "all.json"):
+        assert save_entries(station.database, ALL, tmp_path / name) == 3
+
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "all.csv").read_text("utf-8"))))
+    assert tuple(rows[0]) == COLUMNS
+    assert [row["tip_x_mm"] for row in rows] == ["2.0", "1.0", "0.0"]
+    listed = json.loads((tmp_path / "all.json").read_text("utf-8"))
+    assert [each["sha256"] for each in reversed(listed)] == [e.sha256 for e in entries]

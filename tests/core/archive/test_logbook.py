@@ -1,0 +1,272 @@
+"""Whatever becomes of a swing is entered once, also what a crash left out."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from tests.core.archive.conftest import NOON
+
+from lightpen.archive.chains import entries_of, records_of
+from lightpen.archive.check import Checked, check_archive
+from lightpen.archive.database import look_into
+from lightpen.archive.entries import Entry, Kind
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.errors import ArchiveError
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.names import Names
+from lightpen.record.reading import open_record
+from lightpen.record.results import Result
+from lightpen.record.unfinished import discard_damaged, discard_swing
+
+NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+
+
+@pytest.fixture
+def data(tmp_path: Path, swung: Callable[..., Path]) -> Path:
+    """A data folder with an interrupted swing, and nothing in force."""
+    shutil.copytree(swung(), tmp_path / "data" / RECORDS / "swing")
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def logbook(data: Path) -> Iterator[Logbook]:
+    book = Logbook(data)
+    yield book
+    book.database.close()
+
+
+def result(data: Path, n: int = 0, **changes: object) -> Result:
+    """Return an accepted tip of the swing, whose images it names."""
+    record = open_record(data / RECORDS / "swing")
+    images = [{"file": i.file.name, "sha256": i.sha256} for i in record.images]
+    calibration = {
+        "program": {"name": "lightpen", "version": "0.0.1"},
+        "tip_pen_mm": [float(n), 2.0, 3.0],
+        "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
+        "cone_cam_mm": [1.0, 2.0, 3.0],
+        "covariance": [[0.25] * 6] * 6,
+        "inputs": {"observations": images},
+    }
+    whole = Result(
+        names=NAMES,
+        accepted=NOON + timedelta(hours=n),
+        grade="pass",
+        record=record.folder,
+        images=tuple(record.numbers.tolist()),
+        calibration=calibration,
+        origin=Origin.LIVE,
+    )
+    return replace(whole, **changes)  # type: ignore[arg-type]
+
+
+def entered(logbook: Logbook) -> list[Entry]:
+    return [each.entry for each in entries_of(logbook.database, logbook.chain)]
+
+
+def checked(data: Path) -> Checked:
+    with closing(look_into(data / ARCHIVE)) as database:
+        return check_archive(database, data)
+
+
+def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
+    data: Path, logbook: Logbook
+) -> None:
+    FolderArchive(data).store(result(data))
+    assert logbook.enter_owed() == ()
+
+    (entry,) = entered(logbook)
+    event = entry.event
+    assert (event.kind, event.names, event.grade) == (Kind.ACCEPTED, NAMES, "pass")
+    assert (event.at, event.program) == (NOON, "lightpen 0.0.1")
+    assert (event.swing, event.origin) == ("records/swing", Origin.LIVE)
+    assert event.result is not None
+    assert event.result.place == "results/000001.json"
+    assert [Path(file.place).name for file in event.files] == [
+        *("header.json", "journal.jsonl", "camera.yaml", "pen.json"),
+    ]
+    assert event.settings["min_images"] == 20
+    (written,) = entries_of(logbook.database, logbook.chain)
+    (record,) = records_of(logbook.database, [written]).values()
+    assert '"observations": [{"file": "000001.png"' in record
+
+
+def test_results_of_earlier_versions_are_taken_over_once_and_stay(data: Path) -> None:
+    archive = FolderArchive(data)
+    for n in range(3):
+        archive.store(result(data, n))
+    archive.store(result(data, 3, origin=Origin.SIMULATED))
+    before = [file.read_bytes() for file in archive.all_files()]
+
+    for _ in range(2):
+        with closing(Logbook(data)) as logbook:
+            logbook.enter_owed()
+            tips = [each.event.tip_pen_mm for each in entered(logbook)]
+
+    assert [tip and tip[0] for tip in tips] == [0.0, 1.0, 2.0, 3.0]
+    assert [file.read_bytes() for file in archive.all_files()] == before
+
+
+def test_what_is_taken_back_names_the_entry_of_its_result(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    archive.store(result(data))
+    archive.take_back(result(data), "Ben", NOON + timedelta(days=1))
+    logbook.enter_owed()
+
+    accepted, back = entries_of(logbook.database, logbook.chain)
+    event = back.entry.event
+    assert (event.kind, event.concerns) == (Kind.TAKEN_BACK, accepted.sha256)
+    assert event.names == replace(NAMES, operator="Ben")
+    assert event.at == NOON + timedelta(days=1)
+
+
+def test_a_swing_is_entered_that_was_set_aside_after_its_result_was_taken_back(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    archive.store(result(data))
+    archive.take_back(result(data), "Ben", NOON)
+    logbook.enter_owed()
+    discard_swing(data / RECORDS / "swing")
+    for _ in range(2):
+        logbook.enter_owed()
+
+    assert [entry.event.kind for entry in entered(logbook)] == [
+        *(Kind.ACCEPTED, Kind.TAKEN_BACK, Kind.ABANDONED),
+    ]
+
+
+def test_a_swing_that_was_set_aside_is_entered_with_its_images(
+    data: Path, logbook: Logbook
+) -> None:
+    logbook.enter_owed()
+    assert entered(logbook) == []  # it can be gone on with
+
+    discard_swing(data / RECORDS / "swing")
+    for _ in range(2):
+        logbook.enter_owed()
+
+    (entry,) = entered(logbook)
+    assert (entry.event.kind, entry.event.swing) == (Kind.ABANDONED, "records/swing")
+    assert entry.event.names.pen == "LP-04"
+    assert checked(data).n_files == 4 + 20
+
+
+def test_a_swing_that_cannot_be_read_is_entered_with_the_reason(
+    data: Path, logbook: Logbook
+) -> None:
+    folder = data / RECORDS / "swing"
+    (folder / "header.json").write_bytes(b"{}")
+    discard_damaged(folder)
+    logbook.enter_owed()
+
+    (entry,) = entered(logbook)
+    assert entry.event.kind is Kind.ABANDONED
+    assert entry.event.why is not None
+    assert "header.json is damaged" in entry.event.why.text
+
+
+def test_a_damaged_result_stays_owed_and_the_others_are_entered(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    for n in range(2):
+        archive.store(result(data, n))
+    first = archive.all_files()[0]
+    whole = first.read_bytes()
+    first.write_bytes(whole[:-50])
+
+    (trouble,) = logbook.enter_owed()
+    assert "000001.json is damaged" in str(trouble)
+    first.write_bytes(whole)
+    assert logbook.enter_owed() == ()
+    assert [each.event.tip_pen_mm[0] for each in entered(logbook)] == [1.0, 0.0]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "results/000001.json",
+        "records/swing/header.json",
+        "records/swing/journal.jsonl",
+        "records/swing/camera.yaml",
+        "records/swing/images/000007.png",
+    ],
+)
+def test_a_file_that_was_changed_is_named(data: Path, name: str) -> None:
+    FolderArchive(data).store(result(data))
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    assert checked(data).findings == ()
+
+    file = data / name
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    assert any(f"The file {name}" in str(each) for each in checked(data).findings)
+    file.unlink()
+    findings = [str(each) for each in checked(data).findings]
+    assert f"The file {name} of entry 1 is missing." in findings
+
+
+def test_images_that_were_swapped_are_named(data: Path) -> None:
+    FolderArchive(data).store(result(data))
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    images = data / RECORDS / "swing" / "images"
+    (images / "000003.png").rename(images / "kept.png")
+    (images / "000004.png").rename(images / "000003.png")
+    (images / "kept.png").rename(images / "000004.png")
+
+    assert len(checked(data).findings) == 2
+
+
+def test_a_swing_that_goes_on_after_its_entry_is_no_change(data: Path) -> None:
+    FolderArchive(data).store(result(data))
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    discard_swing(data / RECORDS / "swing")  # a line more
+
+    assert checked(data).findings == ()
+
+
+def test_a_full_disk_leaves_an_entry_owed_and_the_archive_whole(
+    data: Path, logbook: Logbook
+) -> None:
+    archive = FolderArchive(data)
+    archive.store(result(data, 0))
+    logbook.enter_owed()
+    archive.store(result(data, 1))
+    with logbook.database.reading() as connection:
+        n_pages = connection.exec_driver_sql("PRAGMA page_count").scalar_one()
+        connection.exec_driver_sql(f"PRAGMA max_page_count = {n_pages}")
+
+    for n in range(2, 12):
+        archive.store(result(data, n))
+    with pytest.raises(ArchiveError, match="disk is full"):
+        logbook.enter_owed()
+    with logbook.database.reading() as connection:
+        connection.exec_driver_sql("PRAGMA max_page_count = 1000000")
+    logbook.enter_owed()
+
+    assert len(entered(logbook)) == len(archive.all_files())
+    assert checked(data).findings == ()
+
+
+def test_a_data_folder_that_was_moved_is_whole(data: Path, tmp_path: Path) -> None:
+    FolderArchive(data).store(result(data))
+    with closing(Logbook(data)) as logbook:
+        logbook.enter_owed()
+    moved = tmp_path / "moved"
+    data.rename(moved)
+    with closing(Logbook(moved)) as logbook:
+        logbook.enter_owed()
+
+    assert checked(moved).findings == ()
+    assert checked(moved).n_entries == 1

@@ -1,0 +1,42 @@
+"""The program's own JSON is read by several threads at once."""
+
+import subprocess
+import sys
+
+# A crash of the interpreter would end the tests with it.
+READERS = """
+import sys
+from dataclasses import make_dataclass
+from threading import Barrier, Thread
+from lightpen.formats.own_json import in_shape
+
+sys.setswitchinterval(1e-6)
+names = [f"n{i}" for i in range(6)]
+tree = {name: dict.fromkeys(names, 1.0) for name in names}
+for _ in range(60):
+    inner = [make_dataclass("Inner", [(n, float) for n in names]) for _ in names]
+    shape = make_dataclass("Shape", list(zip(names, inner)))
+    together = Barrier(4)
+
+    def read():
+        together.wait()
+        in_shape(tree, shape)
+
+    threads = [Thread(target=read) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+print("done")
+"""
+
+
+def test_a_shape_that_was_never_read_is_read_by_many_threads_at_once() -> None:
+    outcome = subprocess.run(
+        [sys.executable, "-c", READERS],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+
+    assert outcome.stdout == "done\n", outcome.stderr

@@ -1,0 +1,196 @@
+"""Two cameras looked at as one: each in its thread, their images by moments."""
+
+import shutil
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
+
+from lightpen.arrays import Image
+from lightpen.cameras.aravis import AravisDevice
+from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.device_camera import DeviceCamera
+from lightpen.cameras.protocol import CameraSettings, ImageCamera, Region
+from lightpen.cameras.replay import ReplayCamera
+from lightpen.cameras.worker import (
+    Connection,
+    ConnectionChanged,
+    Failed,
+    WorkerEvent,
+)
+from lightpen.formats.decoding import encode_png
+from lightpen.live.looking import Live, LiveImage
+from lightpen.model.camera import Camera
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.sample_rigs import beside
+from lightpen.simulator.scenes import Scene
+
+if TYPE_CHECKING:
+    from tests.core.conftest import Station
+
+TIMEOUT = 60.0  # s until a test gives up
+TINY = Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43)
+SETTINGS = CameraSettings(frame_rate=25.0, region=Region(0, 0, 160, 120))
+
+
+class Screen:
+    """Takes what is shown of both cameras, and lets a test wait."""
+
+    def __init__(self) -> None:
+        self.images: tuple[list[LiveImage], list[LiveImage]] = ([], [])
+        self.connections: tuple[list[Connection], list[Connection]] = ([], [])
+        self.failures: list[str] = []
+        self._changed = threading.Condition()
+
+    def on_image(self, image: LiveImage) -> None:
+        with self._changed:
+            self.images[image.camera].append(image)
+            self._changed.notify_all()
+
+    def on_camera(self, event: WorkerEvent, camera: int) -> None:
+        with self._changed:
+            if isinstance(event, ConnectionChanged):
+                self.connections[camera].append(event.connection)
+            if isinstance(event, Failed):
+                self.failures.append(str(event.error))
+            self._changed.notify_all()
+
+    def wait_until(self, is_so: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(is_so, TIMEOUT)
+
+    def wait_for_moments(self, n_moments: int) -> None:
+        """Wait until so many more images of the second camera were shown."""
+        wanted = len(self.images[1]) + n_moments
+        self.wait_until(lambda: len(self.images[1]) >= wanted)
+
+    def moments(self) -> list[tuple[LiveImage, LiveImage]]:
+        return list(zip(*self.images, strict=True))
+
+
+@pytest.fixture
+def screen() -> Screen:
+    return Screen()
+
+
+MakeLive = Callable[[Sequence[ImageCamera]], Live]
+
+
+@pytest.fixture
+def make_live(
+    station: "Station", screen: Screen, swung: Callable[..., Path]
+) -> Iterator[MakeLive]:
+    """Return a function that looks at two cameras while a swing is captured.
+
+    Their images are too small for it, so that looking at them takes no time.
+    """
+    folder = station.records / "interrupted"
+    shutil.copytree(swung(14, by_two=True), folder)
+    lives: list[Live] = []
+
+    def make(cameras: Sequence[ImageCamera]) -> Live:
+        station.go_on(folder)
+        live = Live(cameras, SETTINGS, screen, station.runner)
+        lives.append(live)
+        live.start()
+        return live
+
+    yield make
+    for live in lives:
+        live.stop()
+
+
+@pytest.fixture
+def simulated() -> tuple[SimulatedCamera, SimulatedCamera]:
+    scene, clock = Scene(camera=TINY), MachineClock()
+    first = SimulatedCamera(scene, clock)
+    rig = beside(scene.camera, scene.cone_cam)
+    return first, SimulatedCamera(scene, clock, first.operator, rig=rig)
+
+
+def test_images_of_two_simulated_cameras_come_by_moments(
+    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    make_live: MakeLive,
+    screen: Screen,
+) -> None:
+    live = make_live(simulated)
+    screen.wait_for_moments(15)
+    assert live.lag_ms == pytest.approx(0.0, abs=0.01)  # as one signal triggers both
+    for one, other in screen.moments():
+        assert one.frame.others[0] is other.frame
+        assert one.frame.device_ts_ns is not None
+        assert other.frame.device_ts_ns is not None
+        assert abs(other.frame.device_ts_ns - one.frame.device_ts_ns) < 1000
+
+
+def test_a_lost_image_costs_its_moment_and_is_counted(
+    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    make_live: MakeLive,
+    screen: Screen,
+) -> None:
+    live = make_live(simulated)
+    screen.wait_for_moments(3)
+    before = live.stats.unpaired
+    simulated[1].faults.stall(0.3)
+    screen.wait_until(lambda: live.stats.unpaired >= before + 4)
+    screen.wait_for_moments(3)
+    assert live.stats.delivered == sum(
+        live.worker(camera).stats.delivered for camera in (0, 1)
+    )
+
+
+def test_two_recordings_of_other_moments_are_refused_once(
+    make_live: MakeLive, screen: Screen, tmp_path: Path
+) -> None:
+    for name, n_images in (("one", 3), ("two", 4)):
+        (tmp_path / name).mkdir()
+        for i in range(n_images):
+            image = encode_png(np.zeros((20, 30), np.uint8))
+            (tmp_path / name / f"{i}.png").write_bytes(image)
+    places = (str(tmp_path / name) for name in ("one", "two"))
+    make_live([ReplayCamera(place, loops=True) for place in places])
+    screen.wait_until(lambda: len(screen.failures) == 1)
+
+    assert "another number of images" in screen.failures[0]
+
+
+@pytest.fixture
+def gige_pair(
+    gige: GigeSimulator, second_loopback: str
+) -> Iterator[tuple[GigeSimulator, GigeSimulator]]:
+    """Two simulated cameras on the loopback."""
+    second = GigeSimulator("LP02", second_loopback)
+    for simulator, level in ((gige, 10), (second, 20)):
+        image: Image = np.full((120, 160), level, np.uint8)
+        simulator.serve(lambda exposure_us, gain, image=image: image)  # type: ignore[misc]
+    yield gige, second
+    second.unplug()
+
+
+def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
+    gige_pair: tuple[GigeSimulator, GigeSimulator],
+    make_live: MakeLive,
+    screen: Screen,
+) -> None:
+    places = (ADDRESS, SECOND_ADDRESS)
+    live = make_live([DeviceCamera(AravisDevice(place)) for place in places])
+    screen.wait_for_moments(12)
+    for one, other in screen.moments():
+        assert one.frame.image[0, 0] == 10
+        assert other.frame.image[0, 0] == 20
+    assert [live.worker(camera).serial for camera in (0, 1)] == ["LP01", "LP02"]
+    assert live.lag_ms is not None  # nothing triggers them together
+    assert abs(live.lag_ms) <= 20.5
+
+    n_before = len(screen.images[0])
+    gige_pair[1].unplug()
+    screen.wait_until(lambda: Connection.LOST in screen.connections[1])
+    assert Connection.LOST not in screen.connections[0]
+    assert live.stats.unpaired > 0
+    gige_pair[1].plug_in()
+    screen.wait_for_moments(3)
+    assert len(screen.images[0]) > n_before

@@ -1,0 +1,410 @@
+"""A verification from the tip in force to its verdict, and what is kept of it."""
+
+import json
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.accepted_tip import (
+    Hold,
+    Holder,
+    accept_tip,
+    leant,
+    round_a_ring,
+)
+
+from lightpen.cameras.protocol import Frame, sealed
+from lightpen.commands.verifications import read_fixed_point, read_scale
+from lightpen.detection.aim import Aim
+from lightpen.detection.sighting import Sighting
+from lightpen.formats.decoding import encode_png
+from lightpen.formats.opened_files import PenFile
+from lightpen.formats.pen_files import write_pen
+from lightpen.record.folder_archive import SIMULATED, FolderArchive
+from lightpen.record.supervision import Signature, set_password
+from lightpen.sentences import Sentence
+from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import PAPER_TIP
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
+from lightpen.verification.keeping import VERIFICATIONS
+from lightpen.verification.runner import VerificationRunner
+from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
+
+EVE = Signature("Eve", "correct horse")
+TIMEOUT = 60.0  # s until a test gives up
+NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
+CHOICES = VerificationChoices(
+    tuple(TaskKind), n_touches=4, radius=31.751, length=150.0, n_frames=3
+)
+FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
+BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
+
+
+class Ear:
+    """Hears what a runner tells, and lets a test wait for it."""
+
+    def __init__(self) -> None:
+        self.events: list[SessionHappening] = []
+        self.troubles: list[str] = []
+        self.reliefs: list[str] = []
+        self.n_read = 0  # times that the tip in force was read
+        self._reading = Reading.NOTHING
+        self._changed = threading.Condition()
+
+    def on_verification(
+        self, status: VerificationStatus, events: tuple[SessionHappening, ...]
+    ) -> None:
+        if (self._reading, status.reading) == (Reading.TIP, Reading.NOTHING):
+            self.n_read += 1
+        self._reading = status.reading
+        self._note(lambda: self.events.extend(events))
+
+    def on_progress(self, fraction: float) -> None:
+        """Nothing is shown."""
+
+    def on_trouble(self, sentence: Sentence) -> None:
+        self._note(lambda: self.troubles.append(sentence.code))
+
+    def on_relief(self, sentence: Sentence) -> None:
+        self._note(lambda: self.reliefs.append(sentence.code))
+
+    def wait_until(self, is_so: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(is_so, TIMEOUT)
+
+    def _note(self, note: Callable[[], None]) -> None:
+        with self._changed:
+            note()
+            self._changed.notify_all()
+
+
+class Verifier:
+    """A runner, and a pen that is held before its camera."""
+
+    def __init__(self, folder: Path, prepared: Preparation) -> None:
+        self.folder, self.preparation = folder, prepared
+        self.ear = Ear()
+        self.runner = VerificationRunner(
+            FolderArchive(folder), folder, self.ear, lambda: NOON
+        )
+        assert prepared.camera is not None
+        assert prepared.pen is not None
+        self.holder = Holder(prepared.camera, prepared.pen)
+
+    @property
+    def status(self) -> VerificationStatus:
+        return self.runner.status
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        files = sorted((self.folder / SIMULATED / VERIFICATIONS).glob("*.json"))
+        return [json.loads(file.read_bytes()) for file in files]
+
+    def come(self, choices: VerificationChoices = CHOICES) -> None:
+        """Be at it, and wait until the tip is read."""
+        n_read = self.ear.n_read
+        self.runner.choose(self.preparation, choices)
+        self.runner.come()
+        self.ear.wait_until(lambda: self.ear.n_read > n_read)
+
+    def refusal(self) -> str:
+        assert self.status.refusal is not None
+        return self.status.refusal.code
+
+    def see(self, sightings: Iterable[Sighting], aim: Aim | None = None) -> None:
+        for sighting in sightings:
+            wanted = aim or self.status.aim
+            assert wanted is not None
+            self.runner.take(FRAME, sighting, wanted)
+
+    def touch(self, *holds: Hold) -> None:
+        for hold in holds:
+            self.see(self.holder.still(hold))
+
+    def read(self, task: TaskKind, place: Path) -> None:
+        """Read recorded images, and wait until that has ended."""
+        n_events, n_troubles = len(self.ear.events), len(self.ear.troubles)
+        self.runner.read(task, str(place), is_still=False)
+        self.ear.wait_until(
+            lambda: (
+                len(self.ear.events) > n_events or len(self.ear.troubles) > n_troubles
+            )
+        )
+
+
+@pytest.fixture
+def verifier(tmp_path: Path, prepared: Preparation) -> Iterator[Verifier]:
+    verifier = Verifier(tmp_path, prepared)
+    yield verifier
+    verifier.runner.shut_down()
+    assert verifier.runner.await_end(TIMEOUT)
+
+
+@pytest.fixture
+def at_it(verifier: Verifier) -> Verifier:
+    """A tip is in force, and somebody is there to verify it."""
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.come()
+    return verifier
+
+
+def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+
+    assert at_it.status.is_done
+    assert at_it.ear.events.count(SessionHappening.FINISHED) == 2
+    assert at_it.ear.events[-1] is SessionHappening.DONE
+    assert at_it.ear.troubles == []
+    point, circle, length = at_it.records
+    assert [each["verification"] for each in at_it.records] == list(TaskKind)
+    assert {each["session"] for each in at_it.records} == {NOON.isoformat()}
+    for record in at_it.records:
+        assert record["verdict"]["grade"] == "pass"
+        assert (record["operator"], record["origin"]) == ("Ann", "simulated")
+        assert record["inputs"]["tip"]["file"] == "000001.json"
+    assert point["verdict"]["limits_mm"] == {"across": 0.01, "along": 0.03}
+    assert abs(circle["mean_error_mm"]) < 0.01
+    assert abs(length["runs"][0]["error_mm"]) < 0.02
+
+
+def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+    point, _, length = at_it.status.files
+
+    assert read_fixed_point(point).shape == (4, 3)
+    assert read_scale(length).factor == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_is_found_is_kept_before_the_next_task_begins(at_it: Verifier) -> None:
+    at_it.touch(*leant(4))
+
+    assert not at_it.status.is_done
+    assert [each["verification"] for each in at_it.records] == ["fixed point"]
+
+
+def test_what_cannot_be_kept_is_told_and_kept_later(at_it: Verifier) -> None:
+    in_the_way = at_it.folder / SIMULATED / VERIFICATIONS
+    in_the_way.write_text("A file where the folder should be.")
+    at_it.touch(*leant(4))
+    assert at_it.ear.troubles == ["results.no-folder"]
+    assert at_it.status.state is not None
+    assert at_it.status.state.fixed_point is not None
+
+    in_the_way.unlink()
+    at_it.runner.come()
+    at_it.ear.wait_until(lambda: at_it.ear.reliefs == ["results.no-folder"])
+    assert len(at_it.records) == 1
+
+
+def test_nothing_is_taken_while_nobody_is_there(at_it: Verifier) -> None:
+    aim = at_it.status.aim
+    at_it.touch(leant(4)[0])
+    at_it.runner.leave()
+    for hold in leant(4)[1:]:
+        at_it.see(at_it.holder.still(hold), aim)
+    assert at_it.status.state is not None
+    assert len(at_it.status.state.touches) == 1
+
+    at_it.come()
+    assert len(at_it.status.state.touches) == 1
+    at_it.touch(*leant(4)[1:])
+    assert at_it.status.state.fixed_point is not None
+
+
+def test_nothing_is_taken_while_it_is_paused(at_it: Verifier) -> None:
+    at_it.runner.pause()
+    at_it.touch(leant(4)[0])
+    assert at_it.status.state is not None
+    assert not at_it.status.state.touches
+    at_it.runner.resume()
+    at_it.touch(leant(4)[0])
+    assert len(at_it.status.state.touches) == 1
+
+
+def test_images_looked_at_for_something_else_are_not_taken(at_it: Verifier) -> None:
+    at_it.see(at_it.holder.still(leant(4)[0]), Aim())
+    assert at_it.status.state is not None
+    assert not at_it.status.state.touches
+
+
+def test_without_a_tip_in_force_it_says_what_to_do(verifier: Verifier) -> None:
+    verifier.come()
+    assert verifier.refusal() == "verification.no-tip"
+    assert not verifier.status.is_touching
+
+
+def test_a_result_that_was_changed_is_refused(verifier: Verifier) -> None:
+    file = accept_tip(verifier.folder, verifier.preparation)
+    file.write_bytes(
+        file.read_bytes().replace(b'"tip_pen_mm": [-1.3', b'"tip_pen_mm": [-1.4')
+    )
+    verifier.come()
+
+    assert verifier.refusal() == "results.damaged"
+
+
+def test_a_tip_of_another_pen_is_refused(verifier: Verifier) -> None:
+    accept_tip(verifier.folder, verifier.preparation)
+    pen = verifier.preparation.pen
+    assert pen is not None
+    other = verifier.folder / "other.json"
+    write_pen(replace(pen, leds=pen.leds + 0.01), other)
+    verifier.preparation = replace(verifier.preparation, pen_file=PenFile.read(other))
+    verifier.come()
+
+    assert verifier.refusal() == "verification.another-pen"
+
+
+@pytest.mark.parametrize(
+    ("choices", "code"),
+    [
+        (VerificationChoices(()), "verification.no-task"),
+        (VerificationChoices((TaskKind.CIRCLE,)), "verification.no-radius"),
+        (VerificationChoices((TaskKind.LENGTH,)), "verification.no-length"),
+        (
+            VerificationChoices((TaskKind.CIRCLE,), radius=30.0, surface=Surface.BORE),
+            "verification.no-ball",
+        ),
+    ],
+)
+def test_what_is_not_known_is_asked_for(
+    verifier: Verifier, choices: VerificationChoices, code: str
+) -> None:
+    names = replace(verifier.preparation.names, ball_diameter=None)
+    verifier.preparation = replace(verifier.preparation, names=names)
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.come(choices)
+
+    assert verifier.refusal() == code
+
+
+def test_another_artefact_forgets_what_was_found_of_the_one_before(
+    at_it: Verifier,
+) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
+    assert at_it.status.task is TaskKind.LENGTH
+    at_it.runner.choose(at_it.preparation, replace(CHOICES, radius=20.0))
+    at_it.ear.wait_until(lambda: at_it.status.task is TaskKind.CIRCLE)
+
+    assert at_it.status.state is not None
+    assert at_it.status.state.fixed_point is not None
+
+
+def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(
+    at_it: Verifier,
+) -> None:
+    at_it.touch(*leant(4))
+    at_it.runner.leave()
+    accept_tip(at_it.folder, at_it.preparation, seed=4)
+    at_it.come()
+
+    assert at_it.status.task is TaskKind.FIXED_POINT
+    assert at_it.status.files == ()
+    assert len(at_it.records) == 1
+
+
+def test_recorded_images_do_a_task(
+    at_it: Verifier, prepared: Preparation, tmp_path: Path
+) -> None:
+    assert prepared.camera is not None
+    scene = Scene(n_images=5, camera=prepared.camera)
+    folder = tmp_path / "touches"
+    folder.mkdir()
+    for plan in plan_scene(scene).image_plans:
+        image = render_plan(scene, plan)
+        (folder / f"{plan.index}.png").write_bytes(encode_png(image))
+    at_it.read(TaskKind.FIXED_POINT, folder)
+
+    assert at_it.status.state is not None
+    assert at_it.status.state.fixed_point is not None
+    (record,) = at_it.records
+    assert len(record["inputs"]["images"]) == 5
+    assert len(record["touches"]) == 5
+
+
+def test_a_folder_without_images_is_told(at_it: Verifier, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    at_it.read(TaskKind.FIXED_POINT, empty)
+
+    assert at_it.ear.troubles == ["images.empty-folder"]
+    assert at_it.status.is_touching
+
+
+def test_a_bug_pauses_it_and_loses_nothing(
+    at_it: Verifier, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    crashes: SimpleQueue[type[BaseException]] = SimpleQueue()
+    at_it.touch(leant(4)[0])
+    monkeypatch.setattr("threading.excepthook", lambda args: crashes.put(args.exc_type))
+    at_it.see(["no sighting"])  # type: ignore[list-item]
+    at_it.ear.wait_until(lambda: at_it.ear.troubles == ["verification.bug"])
+
+    assert crashes.get(timeout=TIMEOUT) is AttributeError
+    assert at_it.status.is_paused
+    assert at_it.status.state is not None
+    assert len(at_it.status.state.touches) == 1
+
+
+# What was found against a tip
+
+
+@pytest.fixture
+def doubted(verifier: Verifier) -> Verifier:
+    """A verification that the tip has failed, as it was bent."""
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.holder = Holder(
+        *(verifier.holder.camera, verifier.holder.pen),
+        PAPER_TIP + np.array([0.3, 0.0, 0.0]),
+    )
+    verifier.come(replace(CHOICES, kinds=(TaskKind.FIXED_POINT,)))
+    verifier.touch(*leant(4))
+    assert verifier.ear.events[-1] is SessionHappening.FAILED
+    return verifier
+
+
+def test_beyond_the_limits_a_tip_is_accepted_by_no_operator(doubted: Verifier) -> None:
+    doubted.runner.accept("It will do.")
+    doubted.ear.wait_until(
+        lambda: doubted.ear.troubles == ["verification.no-supervisor"]
+    )
+    doubted.runner.accept("It will do.", EVE)
+    doubted.ear.wait_until(lambda: len(doubted.ear.troubles) == 2)
+
+    assert doubted.ear.troubles[-1] == "supervisor.no-password"
+    assert doubted.status.accepted_by == ""
+    assert len(doubted.records) == 1
+
+
+def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(
+    doubted: Verifier,
+) -> None:
+    set_password(doubted.folder, EVE, EVE.password, NOON)
+    doubted.runner.accept("Only roughing today.", EVE)
+    doubted.ear.wait_until(lambda: doubted.status.accepted_by == "Eve")
+    point, acceptance = doubted.records
+
+    assert point["verdict"]["grade"] == "repeat"
+    assert acceptance["verification"] == "acceptance"
+    assert acceptance["supervisor"] == "Eve"
+    assert acceptance["reason"] == "Only roughing today."
+    assert acceptance["operator"] == "Ann"
+    assert acceptance["accepts"][0]["file"] == "000001.json"
+    assert EVE.password not in json.dumps(doubted.records)
+
+
+def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:
+    set_password(doubted.folder, EVE, EVE.password, NOON)
+    doubted.runner.accept("It will do.", replace(EVE, password="wrong horse"))
+    doubted.ear.wait_until(
+        lambda: doubted.ear.troubles == ["supervisor.wrong-password"]
+    )
+    assert len(doubted.records) == 1

@@ -1,0 +1,101 @@
+"""The trend of a tip, two of its calibrations compared, and how well they repeat."""
+
+from collections.abc import Iterator
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lightpen.archive.chains import append, own_chain
+from lightpen.archive.database import Database, open_file
+from lightpen.archive.entries import Event, Kind, Written
+from lightpen.archive.queries import Wanted
+from lightpen.model.limits import VerificationLimits
+from lightpen.record.names import Names
+from lightpen.verification.trend import compare, repeatability_of, trend_of
+
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+WANTED = Wanted(pen="LP-04", tip="T-10")
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    with closing(open_file(tmp_path / "archive.sqlite")) as opened:
+        yield opened
+
+
+def enter(
+    database: Database, x: float, kind: Kind = Kind.ACCEPTED, tip: str = "T-10"
+) -> Written:
+    """Enter a tip at x, with U 0.003, 0.004 and 0.006 mm."""
+    chain = own_chain(database)
+    event = Event(
+        kind=kind,
+        at=NOON + timedelta(hours=1),
+        names=Names(pen="LP-04", tip=tip),
+        program="lightpen 1",
+        tip_pen_mm=(x, 0.0, -1.5),
+        expanded_uncertainty_mm=(0.003, 0.004, 0.006),
+        settings={"max_uncertainty_mm": 0.012},
+    )
+    entry = append(database, chain, event)
+    assert entry is not None
+    return entry
+
+
+def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
+    database: Database,
+) -> None:
+    values = (1.0, 1.1, 1.0, 1.2)
+    for x in values:
+        enter(database, x)
+    enter(database, 9.0, Kind.REFUSED)
+    enter(database, 9.0, tip="T-11")
+    trend = trend_of(database, WANTED)
+
+    assert [tip.tip_pen[0] for tip in trend.tips] == list(values)
+    assert trend.max_uncertainty == 0.012
+    assert trend.control is not None
+    # Individual values: the mean, and three mean moving ranges over 1.128 about it.
+    assert trend.control.center[0] == pytest.approx(1.075)
+    reach = 3 * np.mean([0.1, 0.1, 0.2]) / 1.128
+    assert trend.control.upper[0] == pytest.approx(1.075 + reach)
+
+
+def test_a_tip_that_was_taken_back_is_not_in_the_trend(database: Database) -> None:
+    entry = enter(database, 1.0)
+    back = Event(
+        kind=Kind.TAKEN_BACK,
+        at=NOON,
+        names=entry.entry.event.names,
+        program="lightpen 1",
+        concerns=entry.sha256,
+    )
+    append(database, own_chain(database), back)
+
+    assert trend_of(database, WANTED).entries == ()
+
+
+def test_the_change_of_two_is_from_the_earlier_to_the_later(database: Database) -> None:
+    earlier, later = enter(database, 1.0), enter(database, 1.02)
+    found = compare(later, earlier)
+
+    assert (found.earlier, found.later) == (earlier, later)
+    assert found.change.difference[0] == pytest.approx(0.02)
+    assert found.change.expanded_uncertainty[0] == pytest.approx(0.003 * np.sqrt(2))
+    assert found.change.is_unexplained
+    assert found.is_same_tip
+    assert not compare(earlier, enter(database, 1.0, tip="T-11")).is_same_tip
+
+
+def test_repeatability_needs_two_calibrations_of_one_tip(database: Database) -> None:
+    one, other = enter(database, 1.0), enter(database, 1.02)
+    limits = VerificationLimits()
+    found = repeatability_of((other, one), limits)
+
+    assert found is not None
+    assert found.scatter.deviation[0] == pytest.approx(0.02 / np.sqrt(2))
+    assert repeatability_of((one,), limits) is None
+    assert repeatability_of((one, enter(database, 1.0, tip="T-11")), limits) is None

@@ -1,0 +1,66 @@
+"""Tests of `lightpen.verification.witness`."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.witness import BLOCK, LampImages, witnessed, witnessed_by
+
+SCALE = 0.2  # mm a pixel
+NOISE = 0.02  # px
+LIMITS = VerificationLimits()
+
+
+def lamps(
+    n_blocks: int = 6, n_lamps: int = 2, shift: float = 0.0, seed: int = 1
+) -> FloatArray:
+    """Two lamps, of which the images shift in the last half."""
+    rng = np.random.default_rng(seed)
+    n = n_blocks * BLOCK
+    places = rng.uniform(100, 900, (n_lamps, 2))
+    seen = places + NOISE * rng.standard_normal((n, n_lamps, 2))
+    seen[n // 2 :, :, 0] += shift
+    return seen
+
+
+def test_lamps_that_stay_show_that_the_camera_stands_still() -> None:
+    found = witnessed_by(lamps(), SCALE, LIMITS)
+
+    assert found is not None
+    assert found.assessment.grade is Grade.PASS
+    assert found.moved < 2 * found.uncertainty
+
+
+def test_a_camera_that_moved_is_told_by_how_much() -> None:
+    found = witnessed_by(lamps(shift=0.5), SCALE, LIMITS)
+
+    assert found is not None
+    assert found.moved == pytest.approx(0.1, abs=2 * found.uncertainty)
+    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.reason.code == "witness.moved"
+
+
+def test_an_image_that_does_not_show_a_lamp_takes_no_part() -> None:
+    seen = lamps()
+    seen[3, 0] = seen[7] = np.nan
+    found = witnessed_by(seen, SCALE, LIMITS)
+
+    assert found is not None
+    assert np.isfinite(found.moves).all()
+
+
+def test_the_uncertainty_agrees_with_the_scatter_of_lamps_that_stay() -> None:
+    found = [witnessed_by(lamps(seed=seed), SCALE, LIMITS) for seed in range(50)]
+    moves = np.concatenate([each.moves[1:] for each in found if each is not None])
+    told = np.mean([each.uncertainty for each in found if each is not None])
+
+    # U is two standard deviations; 500 moves tell theirs to 3 %, and share the first.
+    assert 2 * moves.std() == pytest.approx(told, rel=0.15)
+
+
+def test_without_a_lamp_or_with_few_images_nothing_is_told() -> None:
+    assert witnessed_by(lamps(n_lamps=0), SCALE, LIMITS) is None
+    assert witnessed_by(lamps(n_blocks=2), SCALE, LIMITS) is None
+    assert witnessed(LampImages(), 4638.0, LIMITS) is None

@@ -1,0 +1,109 @@
+"""What ``lightpen archive`` prints, and the exit status it ends with."""
+
+import csv
+import io
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+from tests.core.archive.conftest import accepted
+
+from lightpen.archive.chains import append, own_chain
+from lightpen.archive.database import open_file
+from lightpen.archive.late_logbook import SERVER
+from lightpen.archive.logbook import ARCHIVE
+from lightpen.archive.seal import close_sealed
+
+Run = Callable[..., CompletedProcess[str]]
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A data folder with three entries."""
+    folder = tmp_path / "data"
+    database = open_file(folder / ARCHIVE)
+    chain = own_chain(database)
+    for n in range(3):
+        append(database, chain, *accepted(n))
+    close_sealed(database)
+    return folder
+
+
+def test_check_says_that_nothing_was_changed(lightpen: Run, data: Path) -> None:
+    result = lightpen("archive", "check", "--data", data)
+
+    assert result.stdout == "No change was found: 3 entries, 0 files.\n"
+    assert result.returncode == 0
+
+
+def test_check_names_what_was_changed_and_ends_with_status_1(
+    lightpen: Run, data: Path
+) -> None:
+    with closing(sqlite3.connect(data / ARCHIVE)) as connection, connection:
+        connection.execute("DELETE FROM archive_entries WHERE number = 2")
+
+    result = lightpen("archive", "check", "--data", data)
+    assert "Entry 2 of the chain" in result.stdout
+    assert result.stdout.endswith("Something was changed: 3 entries, 0 files.\n")
+    assert result.returncode == 1
+
+
+def test_check_of_a_folder_without_an_archive_is_refused(
+    lightpen: Run, tmp_path: Path
+) -> None:
+    result = lightpen("archive", "check", "--data", tmp_path)
+
+    assert result.returncode == 2
+    assert "There is no archive" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_newest_entries_are_listed_first(lightpen: Run, data: Path) -> None:
+    result = lightpen("archive", "list", "--most", "2", "--data", data)
+
+    first, second = result.stdout.splitlines()
+    assert "Hall 2  LP-04  T-10  accepted  pass  2.0000 0.0000 -1.5000" in first
+    assert " 1.0000 0.0000 -1.5000" in second
+
+
+def test_entries_are_listed_as_a_table(lightpen: Run, data: Path) -> None:
+    words = ("--csv", "--since", "2026-01-01", "--until", "2026-01-31", "--data", data)
+    result = lightpen("archive", "list", "--pen", "LP-04", *words)
+
+    rows = list(csv.DictReader(io.StringIO(result.stdout)))
+    assert [row["tip_x_mm"] for row in rows] == ["2.0", "1.0", "0.0"]
+    assert {row["operator"] for row in rows} == {"Ann"}
+
+
+def test_entries_of_other_days_and_pens_are_left_out(lightpen: Run, data: Path) -> None:
+    later = lightpen("archive", "list", "--since", "2026-02-01", "--data", data)
+    other = lightpen("archive", "list", "--pen", "LP-05", "--data", data)
+
+    assert later.stdout.strip() == other.stdout.strip() == ""
+
+
+def test_entries_go_to_another_station_once(
+    lightpen: Run, data: Path, tmp_path: Path
+) -> None:
+    file, there = tmp_path / "all.jsonl", tmp_path / "there"
+    exported = lightpen("archive", "export", file, "--data", data)
+    first = lightpen("archive", "import", file, "--data", there)
+    again = lightpen("archive", "import", file, "--data", there)
+
+    assert exported.stdout == f"3 entries are in {file}.\n"
+    assert first.stdout == "3 entries are new, 0 were there already.\n"
+    assert again.stdout == "0 entries are new, 3 were there already.\n"
+    assert lightpen("archive", "check", "--data", there).returncode == 0
+
+
+def test_delivering_needs_a_server(
+    lightpen: Run, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(SERVER, raising=False)
+
+    result = lightpen("archive", "deliver", "--data", data)
+    assert result.returncode == 2
+    assert f"Set the variable {SERVER}" in result.stderr

@@ -1,0 +1,38 @@
+"""`lightpen export` writes the tip for who reads it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import pytest
+
+Run = Callable[..., CompletedProcess[str]]
+
+
+@pytest.fixture
+def record(swung: Callable[..., Path], lightpen: Run, tmp_path: Path) -> Path:
+    """The record of a swing as JSON."""
+    file = tmp_path / "tip.json"
+    assert lightpen("calibrate", swung(), "--json", file).returncode == 0
+    return file
+
+
+def test_the_tip_of_a_record_is_written(
+    lightpen: Run, record: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "tip.txt"
+    outcome = lightpen("export", record, out, "--for", "text")
+
+    assert outcome.stdout == f"The tip is in {out}.\n"
+    tip = json.loads(record.read_bytes())["tip_pen_mm"]
+    assert list(map(float, out.read_text().split())) == tip
+
+
+def test_a_record_is_not_replaced_by_its_tip(lightpen: Run, record: Path) -> None:
+    before = record.read_bytes()
+    outcome = lightpen("export", record, record, "--for", "csv")
+
+    assert outcome.returncode == 2
+    assert "would replace the result" in outcome.stderr
+    assert record.read_bytes() == before

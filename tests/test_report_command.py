@@ -1,0 +1,46 @@
+"""``lightpen report`` as a user runs it."""
+
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+
+from lightpen.commands.desktop import LANGUAGES
+from lightpen.errors import FileError
+from lightpen.estimation.report import record_bytes
+from lightpen_app.look.languages import Language
+from lightpen_app.reporting import write_paper
+
+UNSEEN = {"QT_QPA_PLATFORM": "", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+
+
+def test_a_record_is_put_on_paper_without_a_display(
+    script: Callable[..., CompletedProcess[str]], stated: dict[str, Any], tmp_path: Path
+) -> None:
+    record, out = tmp_path / "tip.json", tmp_path / "tip.pdf"
+    record.write_bytes(record_bytes(stated))
+
+    words = ("report", record, "--out", out, "--language", "zh_CN")
+    outcome = script(*words, environment=UNSEEN)
+
+    assert (outcome.returncode, outcome.stderr) == (0, "")
+    assert "tip.pdf" in outcome.stdout
+    assert out.read_bytes().startswith(b"%PDF-1.4")
+
+
+def test_a_tampered_record_is_not_put_on_paper(
+    stated: dict[str, Any], tmp_path: Path
+) -> None:
+    record, out = tmp_path / "tip.json", tmp_path / "tip.pdf"
+    record.write_bytes(record_bytes(stated).replace(b'"recorded"', b'"live camera"'))
+
+    with pytest.raises(FileError, match="is not as it was written"):
+        write_paper(record, out, "en")
+
+    assert not out.exists()
+
+
+def test_what_stands_for_a_language_is_one_of_the_program() -> None:
+    assert list(LANGUAGES) == [language.value for language in Language]
