@@ -9,6 +9,7 @@ seeds and without a running camera, so that they come out the same each time.
 import gc
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager
@@ -16,8 +17,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Event
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -28,6 +28,8 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
 
+from lightpen.archive.chains import append
+from lightpen.archive.entries import Event, Kind
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, FrameTimeout, sealed
 from lightpen.detection.sighting import look, sight_centers
@@ -43,25 +45,33 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.image_plans import plan_scene, render_plan
+from lightpen.simulator.motion import lean_vectors, postures_of
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers
+from lightpen.simulator.toucher import Artefacts
 from lightpen.swing.preparation import (
     Preparation,
 )
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import advance
 from lightpen.swing.state import SwingSetup, SwingState, start_swing
+from lightpen.verification.choices import TaskKind, VerificationChoices
+from lightpen.verification.session import SessionSetup, SessionState
+from lightpen.verification.session import advance as advance_session
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.languages import Language
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.theme import GRID, Appearance
+from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.settings import Preferences, Settings
 
+Seen = TypeVar("Seen")
+
 FOLDER = Path(__file__).resolve().parent / "screens"
 DATA = Path("lightpen")  # below the present folder
-STEPS = ("start", "camera", "leds", "swing", "review")
+STEPS = ("start", "camera", "leds", "swing", "review", "verify", "history")
 SIZES = (QSize(1280, 800), QSize(1920, 1080))
 NAMES = Names("Hall 2", "A. Weber", "LP-04", "T-10-80", "C-1", 10.0)
 NOW = datetime.fromisoformat("2026-09-30T10:00:00+02:00")
@@ -70,6 +80,13 @@ PERIOD = 0.05  # s
 N_KEPT = 60  # when the swing is drawn
 N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
+ARTEFACTS = Artefacts()
+CHOICES = VerificationChoices(
+    tuple(TaskKind), radius=ARTEFACTS.ring_radius, length=ARTEFACTS.length
+)
+N_ON_RING = 7  # touches when the verification is drawn
+N_HELD = 10  # images through which the pen is held still
+N_EARLIER = 24  # calibrations in the history
 REFRESH_MS = 200  # of the plots
 COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
 PAUSE = 0.01  # s between two looks at what is waited for
@@ -102,7 +119,7 @@ class StillCamera(SimulatedCamera):
 
     @override
     def read(self, timeout_s: float) -> NoReturn:
-        Event().wait(timeout_s / 20)
+        threading.Event().wait(timeout_s / 20)
         raise FrameTimeout(sentence("screens.no-image", "No image was asked for."))
 
 
@@ -131,7 +148,7 @@ class Stage:
             )
         )
         workbench.live.open(
-            StillCamera(self._scene, around.clock), CameraSettings(), around.clock
+            [StillCamera(self._scene, around.clock)], CameraSettings(), around.clock
         )
         self.wizard.window.show()
 
@@ -166,10 +183,14 @@ class Stage:
 
     def picture(self) -> QImage:
         """Return the window as it is, as soon as nothing moves in it any more."""
-        before, now = QImage(), self._grabbed()
+        return self.still(self._grabbed)
+
+    def still(self, look: Callable[[], Seen]) -> Seen:
+        """Return what a look shows, as soon as it shows the same twice."""
+        before, now = None, look()
         while now != before:
             self._settle()
-            before, now = now, self._grabbed()
+            before, now = now, look()
         return now
 
     def _grabbed(self) -> QImage:
@@ -204,6 +225,38 @@ class Stage:
 
     def _fill_review(self) -> None:
         QThreadPool.globalInstance().waitForDone()
+
+    def _fill_verify(self) -> None:
+        run, verification = self._workbench.run, self._workbench.verification
+        run.runner.accept("The station is being set up.")
+        self._wait_until(lambda: run.status.result is not None)
+        self._workbench.set_choices(CHOICES)
+        verification.runner.start_over()
+        self._wait_until(lambda: verification.status.is_touching)
+        verification.runner.leave()
+        self._wait_until(lambda: not verification.status.is_here)
+        status = verification.status
+        assert status.setup is not None
+        touched = _touched(status.setup, self._scene)
+        verification.on_verification(replace(status, state=touched), ())
+        for index in range(N_SHOWN):
+            self._show_image(index)
+        shown = QDeadlineTimer(REFRESH_MS)
+        self._wait_until(shown.hasExpired)
+
+    def _fill_history(self) -> None:
+        logbook = self._workbench.run.logbook.opened()
+        for n in range(N_EARLIER):
+            append(logbook.database, logbook.chain, _earlier_calibration(n))
+        self.wizard.window.page().entered()
+        self._wait_until(lambda: self._n_shown() >= N_EARLIER)
+        QThreadPool.globalInstance().waitForDone()
+        self._settle()
+        QThreadPool.globalInstance().waitForDone()  # of the trend, which follows
+
+    def _n_shown(self) -> int:
+        table = self.wizard.window.page().findChild(HistoryTable)
+        return table.n_lines() if isinstance(table, HistoryTable) else 0
 
     def solve(self) -> None:
         """Record a swing and solve it, so that the review opens."""
@@ -242,16 +295,22 @@ class Stage:
         self._application.processEvents()
 
 
-def draw_all(stage: Stage) -> Iterator[tuple[str, QImage]]:
-    """Yield the name and the picture of every step in every look."""
+def walk(stage: Stage) -> Iterator[str]:
+    """Go through the steps, and yield each."""
     for step in STEPS:
+        stage.set_look(LOOKS[-1])  # what comes first is laid out by what was before
         if step == "review":
             stage.solve()
         stage.go_to(step)
-        stage.set_look(LOOKS[-1])  # what comes first is laid out by what was before
-        for each in LOOKS:
-            stage.set_look(each)
-            yield each.file_name(step), stage.picture()
+        yield step
+
+
+def draw(stage: Stage, step: str) -> Iterator[tuple[str, QImage]]:
+    """Yield the name and the picture of the step that is shown in every look."""
+    stage.set_look(LOOKS[-1])
+    for each in LOOKS:
+        stage.set_look(each)
+        yield each.file_name(step), stage.picture()
 
 
 def _earlier_result() -> Result:
@@ -268,6 +327,24 @@ def _earlier_result() -> Result:
             "covariance": np.diag(6 * [0.001**2]).tolist(),
         },
         origin=Origin.SIMULATED,
+    )
+
+
+def _earlier_calibration(n: int) -> Event:
+    """Return an entry of a tip that was calibrated twice a month."""
+    rng = np.random.default_rng(n)
+    uncertainty = rng.uniform(0.004, 0.009)
+    tip = np.array([-1.3179, -90.4102, -23.8551]) + rng.normal(0.0, 0.002, 3)
+    return Event(
+        kind=Kind.ACCEPTED,
+        at=NOW - timedelta(days=15 * (N_EARLIER - n)),
+        names=NAMES,
+        program="lightpen",
+        origin=Origin.LIVE,
+        grade="pass",
+        tip_pen_mm=tuple(tip.tolist()),
+        expanded_uncertainty_mm=(0.7 * uncertainty, 0.8 * uncertainty, uncertainty),
+        settings={"max_uncertainty_mm": 0.012},
     )
 
 
@@ -288,6 +365,25 @@ def _swing(setup: SwingSetup, scene: Scene) -> SwingState:
         sighting = sight_centers(scene.camera, scene.pen, pixels[0], R[0], t[0])
         state = advance(setup, state, sighting, now).state
         follower.follow(state)
+    return state
+
+
+def _touched(setup: SessionSetup, scene: Scene) -> SessionState:
+    """Return a verification in the middle of its ring."""
+    rng = np.random.default_rng(scene.seed)
+    n_touches = setup.choices.n_touches
+    leans = [(0.2 + 0.2 * (i % 2), 2 * np.pi * i / n_touches) for i in range(n_touches)]
+    points = [np.zeros(3)] * n_touches
+    points += [ARTEFACTS.on_ring(i) for i in range(N_ON_RING)]
+    leans += [(0.1, 0.0)] * N_ON_RING
+    state = SessionState()
+    for point, (tilt, direction) in zip(points, leans, strict=True):
+        R = postures_of(lean_vectors(tilt, direction, 0.0)[None]).rotations
+        t = scene.cone_cam + point - R @ scene.tip_pen
+        for _ in range(N_HELD):
+            (pixels,) = simulate_centers(scene.camera, scene.pen, R, t, SIGMA, rng)
+            sighting = sight_centers(scene.camera, scene.pen, pixels, R[0], t[0])
+            state = advance_session(setup, state, "image", sighting).state
     return state
 
 
@@ -326,8 +422,9 @@ def main() -> None:
     application = make_application(sys.argv[:1])
     with anywhere():
         stage = Stage(application)
-        for name, picture in draw_all(stage):
-            picture.save(str(FOLDER / name))
+        for step in walk(stage):
+            for name, picture in draw(stage, step):
+                picture.save(str(FOLDER / name))
         stage.close()
 
 

@@ -49,6 +49,18 @@ class Starts:
 
         return remove_entry()
 
+    def data_folder(self) -> Path:
+        """Return where records, results and the archive are, as chosen."""
+        from lightpen_app.work.settings import Settings, data_folder, settings_file
+
+        return data_folder(Settings(settings_file()).preferences())
+
+    def write_paper(self, result: Path, out: Path | None, language: str) -> Path:
+        """Write the record on paper of a calibration as PDF; return where it is."""
+        from lightpen_app.reporting import write_paper
+
+        return write_paper(result, out, language)
+
 
 def main() -> int:
     """Run the program and return the exit status."""

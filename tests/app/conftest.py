@@ -113,13 +113,10 @@ def look(dressed: QApplication) -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True)
-def frame_rate(monkeypatch: pytest.MonkeyPatch) -> float:
-    """Simulated cameras send fewer images than usual: looking at them takes long.
-
-    In 1/s.
-    """
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Images come, and plots are drawn, less often than usual: each takes long."""
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
-    return 7.0
+    monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 300)
 
 
 @pytest.fixture
@@ -190,7 +187,7 @@ def choose_samples(workbench: Workbench, folder: Path) -> None:
 
 # The whole wizard, used as an operator uses it
 
-LOOK_MS = 50  # between two looks at what the window shows
+LOOK_MS = 150  # between two looks at what the window shows
 LONGEST_ROUND = 200  # presses of the Tab key
 LEFT = Qt.MouseButton.LeftButton
 NONE = Qt.KeyboardModifier.NoModifier

@@ -159,7 +159,7 @@ def swing_before(workbench: Workbench, stuck: Stuck) -> None:
         around.scene, around.clock, Operator(around.clock, seated=True)
     )
     camera.stuck = stuck
-    workbench.live.open(camera, CameraSettings(), around.clock)
+    workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)
 
 
@@ -242,7 +242,7 @@ def test_closing_while_the_disk_does_not_answer_keeps_what_was_acknowledged(
     camera = SimulatedCamera(
         around.scene, around.clock, Operator(around.clock, seated=True)
     )
-    workbench.live.open(camera, CameraSettings(), around.clock)
+    workbench.live.open([camera], CameraSettings(), around.clock)
     workbench.live.set_following(True)
     workbench.run.runner.go_on(read_resumable(interrupted))
     qtbot.waitUntil(lambda: n_kept(workbench) >= N_IMAGES + 2)

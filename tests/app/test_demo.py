@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Run = Callable[..., CompletedProcess[str]]
 NO_SCREEN = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "QT_QPA_PLATFORM": ""}
+NO_LOCALE = {"LC_ALL": "C", "LANG": "C", "LANGUAGE": ""}
 MOST_MEMORY = 1_500_000 * 1024  # bytes of addresses, as `ulimit -v 1500000` leaves
 LONGEST_S = 400  # on a machine that does other things besides
 JOINT = re.compile(r"^ *joint +(\S+) +(\S+) +(\S+)$", re.MULTILINE)
@@ -33,7 +34,7 @@ def newcomer(script: Run, tmp_path: Path) -> Run:
     def run(
         *arguments: str, before: Callable[[], None] | None = None
     ) -> CompletedProcess[str]:
-        surroundings = NO_SCREEN | homes
+        surroundings = NO_SCREEN | NO_LOCALE | homes
         return script(
             *arguments, environment=surroundings, before=before, timeout=LONGEST_S
         )

@@ -1,6 +1,7 @@
-"""Every step looks as it did when it was last looked at, in every look.
+"""Every step looks as it did when it was last looked at, and has room on small screens.
 
-`python docs/screens.py` draws the pictures anew after a wanted change.
+`python docs/screens.py` draws the pictures anew after a wanted change. The smallest
+screen is one of 1920 x 1080 at 200 %, which leaves 960 x 540, with a task bar.
 """
 
 import importlib.util
@@ -8,15 +9,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QRect
+from PySide6.QtCore import QPoint, QRect, QSize
 from PySide6.QtGui import QImage, QPainter
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QTabWidget
+from tests.app.room import Room, room_of
 
 from lightpen.arrays import FloatArray
+from lightpen_app.look.languages import Language
+from lightpen_app.look.theme import Appearance
 
 ROOT = Path(__file__).parents[2]
 DIFFERENT = ROOT / "screens-different"
@@ -36,6 +41,16 @@ def load_screens() -> ModuleType:
 
 SCREENS = load_screens()
 NAMES = [look.file_name(step) for step in SCREENS.STEPS for look in SCREENS.LOOKS]
+LEAST = QSize(940, 500)
+SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
+KEYS = [
+    (step, str(language), size.width())
+    for step in SCREENS.STEPS
+    for language in Language
+    for size in SIZES
+]
+
+Key = tuple[str, str, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +105,55 @@ def moved(picture: QImage, word: QRect, by: QPoint) -> QImage:
     return drawn
 
 
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of all steps.
+
+    Attributes
+    ----------
+    pictures : dict
+        By the names of their files.
+    rooms : dict
+        By step, language and width of the window; one for each tab.
+    """
+
+    pictures: dict[str, QImage]
+    rooms: dict[Key, list[Room]]
+
+
 @pytest.fixture(scope="module")
-def pictures(dressed: QApplication) -> Iterator[dict[str, QImage]]:
+def seen(dressed: QApplication) -> Iterator[Seen]:
+    seen = Seen({}, {})
     with SCREENS.anywhere():
         stage = SCREENS.Stage(dressed)
-        yield dict(SCREENS.draw_all(stage))
+        for step in SCREENS.walk(stage):
+            seen.pictures.update(SCREENS.draw(stage, step))
+            seen.rooms.update(rooms_of(stage, step))
+        yield seen
         stage.close()
+
+
+def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
+    """Yield what room the step that is shown has in each language and width."""
+    window = stage.wizard.window
+
+    def room() -> Room:
+        return room_of(window)
+
+    for language in Language:
+        for size in SIZES:
+            stage.set_look(SCREENS.Look(language, Appearance.DARK, size))
+            rooms = [stage.still(room)]
+            for tabs in window.page().findChildren(QTabWidget):
+                for index in range(tabs.count()):
+                    tabs.setCurrentIndex(index)
+                    rooms.append(stage.still(room))
+            yield (step, str(language), size.width()), rooms
+
+
+@pytest.fixture
+def pictures(seen: Seen) -> dict[str, QImage]:
+    return seen.pictures
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -153,3 +211,25 @@ def test_edges_that_are_shaded_otherwise_are_no_difference(
 
     assert other != picture
     assert not compared(other, picture).is_seen
+
+
+@pytest.mark.parametrize("key", KEYS, ids=lambda key: "-".join(map(str, key)))
+def test_a_step_has_room_in_a_small_window(seen: Seen, key: Key) -> None:
+    (size,) = (each for each in SIZES if each.width() == key[2])
+    for room in seen.rooms[key]:
+        assert room.size == size
+        assert room.lack == QSize(0, 0)
+        assert room.sideways == ()
+
+
+@pytest.mark.parametrize("key", KEYS, ids=lambda key: "-".join(map(str, key)))
+def test_no_words_of_a_step_are_clipped(seen: Seen, key: Key) -> None:
+    for room in seen.rooms[key]:
+        assert room.clipped == ()
+
+
+def test_the_tabs_of_the_review_are_all_looked_at(seen: Seen) -> None:
+    assert (
+        len(seen.rooms["review", "en", LEAST.width()]) == 1 + 5
+    )  # the result is a tab
+    assert len(seen.rooms["review", "en", 1280]) == 1 + 4

@@ -13,7 +13,6 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-import lightpen_app.work.workbench
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import ImageCamera
 from lightpen.formats.decoding import encode_png
@@ -79,7 +78,7 @@ def cameras(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedCamera]:
         opened.append(camera)
         return camera
 
-    monkeypatch.setattr(lightpen_app.work.workbench, "camera_of", noted)
+    monkeypatch.setattr("lightpen.live.sources.camera_of", noted)
     return opened
 
 
@@ -627,7 +626,7 @@ def test_pressing_enter_again_and_again_accepts_once(
         Qt.KeyboardModifier.NoModifier,
         place,
     )
-    walker.until(lambda: any(results.glob("*.json")))
+    walker.until(lambda: walker.workbench.run.status.result is not None)
     walker.window.close()  # which waits for all that is under way
 
     assert len(list(results.glob("*.json"))) == 1

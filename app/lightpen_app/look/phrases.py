@@ -122,6 +122,17 @@ _LACKS: dict[Lack, str] = {
     Lack.IMAGE_SIZE: QT_TRANSLATE_NOOP(
         "phrases", "The intrinsics file is for images of another size."
     ),
+    Lack.SECOND_DEVICE: QT_TRANSLATE_NOOP("phrases", "Choose the second camera."),
+    Lack.SECOND_IMAGES: QT_TRANSLATE_NOOP(
+        "phrases", "The second camera is not open yet."
+    ),
+    Lack.RIG_FILE: QT_TRANSLATE_NOOP("phrases", "Open the rig file of both cameras."),
+    Lack.RIG_OF_TWO: QT_TRANSLATE_NOOP(
+        "phrases", "The rig file is not of two cameras."
+    ),
+    Lack.SECOND_IMAGE_SIZE: QT_TRANSLATE_NOOP(
+        "phrases", "The rig file has another image size for the second camera."
+    ),
     Lack.PEN_FILE: QT_TRANSLATE_NOOP("phrases", "Open the LED geometry file."),
     Lack.SAVED_LEDS: QT_TRANSLATE_NOOP(
         "phrases", "The LED table is not that of the file in use: save or discard it."

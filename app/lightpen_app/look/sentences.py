@@ -9,8 +9,9 @@ CONTEXT = "core"
 
 def worded(sentence: Sentence | None) -> str:
     """Return the words of a sentence of the core; empty if there is none."""
-    return "" if sentence is None else sentence.text(_translated)
+    return "" if sentence is None else sentence.text(translated)
 
 
-def _translated(template: str) -> str:
+def translated(template: str) -> str:
+    """Return a template of the core in the language that is chosen."""
     return QCoreApplication.translate(CONTEXT, template)

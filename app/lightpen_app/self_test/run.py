@@ -18,8 +18,8 @@ from lightpen_app.self_test.report import Report, SelfTestError, Tip
 LONGEST = 600.0  # s, after which something hangs
 UNWRITTEN, HUNG = 2, 3  # exit status
 NEAR = 0.005  # mm from the true tip
-MODULES = ("numpy", "cv2", "msgspec", "yaml", "PySide6.QtWidgets", "PySide6.QtSvg",
-           "pyqtgraph", "lightpen.cli", "lightpen_app.application",
+MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2", "PySide6.QtWidgets",
+           "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
            "lightpen_app.wizard_pages")  # fmt: skip
 OPTIONAL = ("harvesters.core", "pypylon.pylon")  # drive cameras
 

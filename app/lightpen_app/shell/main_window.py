@@ -511,3 +511,4 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
+        self._set_status("")  # it was said in the language before

@@ -42,9 +42,12 @@ class PathField(QWidget):
     -------
     value_changed(str)
         Another path was given, or the same one again by Enter.
+    path_chosen(str)
+        So it was, and it is not empty.
     """
 
     value_changed = Signal(str)
+    path_chosen = Signal(str)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -108,6 +111,8 @@ class PathField(QWidget):
         """Take over a path as if it were typed."""
         self.set_value(path)
         self.value_changed.emit(path)
+        if path:
+            self.path_chosen.emit(path)
 
     def _typed(self) -> str:
         """Return what was typed, without the quotes that a desktop copies along."""

@@ -1,4 +1,4 @@
-"""A question in the page that takes a reason for an answer."""
+"""A question in the page that takes a reason, and a signature, for an answer."""
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
 from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.supervisor_fields import SupervisorFields
 
 LONGEST_REASON = 200  # characters
 
@@ -15,12 +16,13 @@ class ReasonBar(QFrame):
 
     Signals
     -------
-    given(str)
-        The reason, which is not empty.
+    given(str, Signature)
+        The reason, which is not empty, and who signs as a supervisor; None if nobody
+        is asked to.
     declined()
     """
 
-    given = Signal(str)
+    given = Signal(str, object)
     declined = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -32,6 +34,7 @@ class ReasonBar(QFrame):
         self._text = text_label(TextSize.BODY)
         self._edit = EnterEdit()
         self._edit.setMaxLength(LONGEST_REASON)
+        self._supervisor = SupervisorFields()
         self._decline = PushButton()
         self._give = PushButton()
 
@@ -41,12 +44,15 @@ class ReasonBar(QFrame):
         layout.setSpacing(GRID)
         layout.addWidget(self._text, 0, 0, 1, 3)
         layout.addWidget(self._edit, 1, 0)
+        layout.addWidget(self._supervisor, 2, 0)
         layout.addWidget(self._decline, 1, 1)
         layout.addWidget(self._give, 1, 2)
         layout.setColumnStretch(0, 1)
 
         # Connections
         self._edit.textChanged.connect(self._refresh)
+        self._supervisor.value_edited.connect(self._refresh)
+        self._supervisor.entered.connect(self._on_given)
         self._edit.returnPressed.connect(self._on_given)
         self._give.clicked.connect(self._on_given)
         self._decline.clicked.connect(self._on_declined)
@@ -63,22 +69,30 @@ class ReasonBar(QFrame):
         self._give.setText(yes)
         self._decline.setText(no)
 
-    def ask(self) -> None:
-        """Show the question and wait for what is typed."""
+    def ask(self, *, of_supervisor: bool = False) -> None:
+        """Show the question and wait for what is typed, by a supervisor or anybody."""
         self._edit.clear()
+        self._supervisor.clear()
+        self._supervisor.setVisible(of_supervisor)
         self.show()
         self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _reason(self) -> str:
         return self._edit.text().strip()
 
+    def _is_whole(self) -> bool:
+        is_asked = self._supervisor.isVisibleTo(self)
+        return bool(self._reason()) and (self._supervisor.is_filled() or not is_asked)
+
     def _refresh(self) -> None:
-        self._give.setEnabled(bool(self._reason()))
+        self._give.setEnabled(self._is_whole())
 
     def _on_given(self) -> None:
-        if self._reason():
+        if self._is_whole():
+            is_asked = self._supervisor.isVisibleTo(self)
+            signature = self._supervisor.value() if is_asked else None
             self.hide()
-            self.given.emit(self._reason())
+            self.given.emit(self._reason(), signature)
 
     def _on_declined(self) -> None:
         self.hide()

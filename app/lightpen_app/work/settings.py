@@ -9,7 +9,7 @@ import math
 from dataclasses import astuple, dataclass, fields, replace
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import platformdirs
 from PySide6.QtCore import QByteArray, QLocale, QObject, Qt, QTimer, Signal
@@ -20,6 +20,7 @@ from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
+from lightpen.record.due_rule import DueRule
 from lightpen.sentences import Sentence
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
@@ -67,6 +68,10 @@ class Station:
         Of a pen file that does not say.
     mask : str
         Stray light to leave out, "x y radius" in px, circles parted by ";".
+    second_source, second_place, second_producer, second_mask : str
+        Likewise of a second camera; empty where one looks alone.
+    rig_file : str
+        Of both.
     source_producer : str
         File of a GenTL producer, where one was chosen.
     max_uncertainty : float
@@ -74,8 +79,16 @@ class Station:
     focal_length, scale, form_error, center_bias, temperature, warmth, expansion : float
         What is assumed where files say nothing; see
         `lightpen.model.assumptions.Assumptions`.
-    temperature_c : float
-        Of the pen, degrees C; not a number when it was not measured.
+    temperature_c : float or None
+        Of the pen, degrees C; None when it was not measured.
+    verified : str
+        Names of what is touched to verify a tip, parted by "; ".
+    ring_radius, ring_uncertainty, bar_length, bar_uncertainty : float
+        What is certified, 0 where it is not known, and U (k = 2) of it, mm.
+    ring_surface : str
+        See `lightpen.verification.choices.Surface`.
+    touch_images : int
+        Of one touch.
     """
 
     operator: str = ""
@@ -91,6 +104,11 @@ class Station:
     pen_file: str = ""
     pen_units: str = ""
     mask: str = ""
+    second_source: str = ""
+    second_place: str = ""
+    second_producer: str = ""
+    second_mask: str = ""
+    rig_file: str = ""
     max_uncertainty: float = SwingLimits.max_uncertainty
     min_images: int = SwingLimits.min_images
     max_images: int = SwingLimits.max_images
@@ -98,10 +116,20 @@ class Station:
     scale: float = USUAL.scale
     form_error: float = USUAL.form_error
     center_bias: float = USUAL.center_bias
-    temperature_c: float = math.nan
+    temperature_c: float | None = None
     temperature: float = USUAL.temperature
     warmth: float = USUAL.warmth
     expansion: float = USUAL.expansion
+    verified: str = "fixed point"
+    fixed_point_touches: int = 10
+    ring_radius: float = 0.0
+    ring_uncertainty: float = 0.0
+    ring_surface: str = "groove"
+    ring_runs: int = 1
+    bar_length: float = 0.0
+    bar_uncertainty: float = 0.0
+    bar_places: int = 1
+    touch_images: int = 5
 
 
 @dataclass(frozen=True)
@@ -110,18 +138,18 @@ class KeptCamera:
 
     Attributes
     ----------
-    exposure_us, gain_db, frame_rate : float
-        Not a number when they were never set; likewise the texts are empty and the
-        size of packets is 0.
+    exposure_us, gain_db, frame_rate : float or None
+        None when they were never set; likewise the texts are empty and the size of
+        packets is 0.
     region : str
         "x y width height" in px.
     trigger : str
         See `lightpen.cameras.protocol.TriggerMode`.
     """
 
-    exposure_us: float = math.nan
-    gain_db: float = math.nan
-    frame_rate: float = math.nan
+    exposure_us: float | None = None
+    gain_db: float | None = None
+    frame_rate: float | None = None
     pixel_format: str = ""
     region: str = ""
     trigger: str = ""
@@ -224,6 +252,18 @@ class Settings(QObject):
         """Remember where results are saved."""
         self._save("last", {"export folder": folder})
 
+    def due_rule(self) -> DueRule:
+        """Return how long a tip may be in force."""
+        saved = self._content.get("due", {})
+        try:
+            return DueRule(saved["days"], saved["swings"])
+        except (KeyError, TypeError, ValueError):
+            return DueRule()
+
+    def set_due_rule(self, rule: DueRule) -> None:
+        """Remember how long a tip may be in force."""
+        self._save("due", {"days": rule.max_days, "swings": rule.max_swings})
+
     def restore_geometry(self, window: QWidget) -> bool:
         """Put a window where it was when the program ended; False if never."""
         saved = self._content.get("windows", {}).get(window.objectName())
@@ -309,12 +349,11 @@ def data_folder(preferences: Preferences) -> Path:
 
 
 def _kept_camera(settings: CameraSettings) -> KeptCamera:
-    nan = math.nan
     region = settings.region
     return KeptCamera(
-        exposure_us=nan if settings.exposure_us is None else settings.exposure_us,
-        gain_db=nan if settings.gain_db is None else settings.gain_db,
-        frame_rate=nan if settings.frame_rate is None else settings.frame_rate,
+        exposure_us=settings.exposure_us,
+        gain_db=settings.gain_db,
+        frame_rate=settings.frame_rate,
         pixel_format=settings.pixel_format or "",
         region="" if region is None else " ".join(map(str, astuple(region))),
         trigger="" if settings.trigger is None else str(settings.trigger),
@@ -325,18 +364,14 @@ def _kept_camera(settings: CameraSettings) -> KeptCamera:
 def _camera_settings(kept: KeptCamera) -> CameraSettings:
     """Return settings; what was not kept, or makes no sense, is left as it is."""
     return CameraSettings(
-        exposure_us=_given(kept.exposure_us),
-        gain_db=_given(kept.gain_db),
-        frame_rate=_given(kept.frame_rate),
+        exposure_us=kept.exposure_us,
+        gain_db=kept.gain_db,
+        frame_rate=kept.frame_rate,
         pixel_format=kept.pixel_format or None,
         region=_region(kept.region),
         trigger=next((mode for mode in TriggerMode if mode == kept.trigger), None),
         packet_size=kept.packet_size or None,
     )
-
-
-def _given(value: float) -> float | None:
-    return None if math.isnan(value) else value
 
 
 def _region(text: str) -> Region | None:
@@ -347,26 +382,21 @@ def _region(text: str) -> Region | None:
 
 
 def _entries(value: Preferences | Station | KeptCamera) -> dict[str, Any]:
-    """Return the fields of a value as they are kept; no number is none."""
-    entries = {each.name: getattr(value, each.name) for each in fields(value)}
-    return {
-        name: None if isinstance(entry, float) and math.isnan(entry) else entry
-        for name, entry in entries.items()
-    }
+    """Return the fields of a value as they are kept."""
+    return {each.name: getattr(value, each.name) for each in fields(value)}
 
 
 def _read(saved: object, default: Group) -> Group:
     """Return a default with what was saved of it and makes sense."""
     found: dict[str, Any] = {}
-    for each in fields(default):
-        if isinstance(saved, dict) and each.name in saved:
-            kind = type(getattr(default, each.name))
+    for name, kind in get_type_hints(type(default)).items():
+        if isinstance(saved, dict) and name in saved:
             try:
-                value = in_shape(saved[each.name], kind, strict=False)
+                value = in_shape(saved[name], kind, strict=False)
             except DamagedError:
                 continue
             if not isinstance(value, float) or math.isfinite(value):
-                found[each.name] = value
+                found[name] = value
     return replace(default, **found)
 
 

@@ -1,11 +1,11 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
@@ -17,30 +17,36 @@ from lightpen.cameras.sources import source_named
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import (
     Surroundings,
-    camera_of,
+    cameras_of,
     files_of_before,
     sample_files,
 )
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
-from lightpen.model.limits import SwingLimits
+from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
 from lightpen.record.presence import Presence
 from lightpen.record.recordings import FilesBeside
+from lightpen.record.supervision import Supervision, read_supervision
 from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
     CameraInUse,
     Preparation,
+    SecondCamera,
     SourceChoice,
     SourceKind,
 )
+from lightpen.verification.choices import VerificationChoices
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.station_choices import choices_of, with_choices
 from lightpen_app.work.swing_run import SwingRun
+from lightpen_app.work.verification_run import VerificationRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
 COUNTING_MS = 5000  # from one look for other windows to the next
@@ -129,17 +135,24 @@ class Workbench(QObject):
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
+        self._choices = VerificationChoices()
+        self._supervision = Supervision()
         self.run = SwingRun(folder, self._around.now, self)
-        self.live = LiveView(self.run, self)
+        self.verification = VerificationRun(
+            self.run.archive, folder, self._around.now, self
+        )
+        self.live = LiveView(self.run, self.verification, self)
 
         # Connections
         self.live.image_shown.connect(self._on_image_shown)
-        self.live.settings_applied.connect(self._on_settings_applied)
+        self.live.configured.connect(self._on_configured)
         self.live.troubled.connect(self.troubled)
         self.live.failed.connect(self.troubled)
         self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
         self.run.relieved.connect(self.relieved)
+        self.verification.troubled.connect(self.troubled)
+        self.verification.relieved.connect(self.relieved)
         self._counting.timeout.connect(self._count_others)
         self.run.changed.connect(self._tell_subject)
         self.changed.connect(self._tell_subject)
@@ -150,6 +163,43 @@ class Workbench(QObject):
     def preparation(self) -> Preparation:
         """What was chosen so far."""
         return self._preparation
+
+    @property
+    def choices(self) -> VerificationChoices:
+        """What the tip is verified by."""
+        return self._choices
+
+    def set_choices(self, choices: VerificationChoices) -> None:
+        """Take over other choices for verifications, and remember them."""
+        self._choices = choices
+        self._remember()
+        self._tell_runners()
+        self.changed.emit()
+
+    @property
+    def supervision(self) -> Supervision:
+        """What supervisors have laid down for the data folder."""
+        return self._supervision
+
+    def set_supervision(self, supervision: Supervision) -> None:
+        """Go by what supervisors have laid down, from now on."""
+        self._supervision = supervision
+        before = self._preparation
+        self._preparation = replace(before, limits=self._limits_for(before))
+        self._choices = self._limited(self._choices)
+        self._remember()
+        self._follow(before)
+
+    def _limits_for(self, preparation: Preparation) -> SwingLimits:
+        """Return the limits of a swing: those laid down, or those that are chosen."""
+        laid_down = self._supervision.limits.get(preparation.names.station)
+        return preparation.limits if laid_down is None else laid_down.swing
+
+    def _limited(self, choices: VerificationChoices) -> VerificationChoices:
+        """Return choices with the limits that are laid down for the station."""
+        station = self._preparation.names.station
+        laid_down = self._supervision.limits.get(station, StationLimits())
+        return replace(choices, limits=laid_down.verification)
 
     @property
     def folder(self) -> Path:
@@ -180,6 +230,8 @@ class Workbench(QObject):
             self._on_settings_troubled(self._settings.trouble)
         folder = self._folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
+        self.run.runner.open_logbook()
+        self._read_supervision()
         self._count_others()
         self._counting.start()
         self.choose_station(self._settings.last_station())
@@ -206,12 +258,17 @@ class Workbench(QObject):
             ),
             nominal_tip=_parse_point(station.nominal_tip),
             source=_source(station),
+            second=_second(station),
             camera_file=None,
             pen_file=None,
             mask=_parse_circles(station.mask),
             limits=_limits(station),
             assumptions=_assumptions(station),
         )
+        self._preparation = replace(
+            self._preparation, limits=self._limits_for(self._preparation)
+        )
+        self._choices = self._limited(choices_of(station))
         self._open_files(station)
         self._remember_station()
         self._follow(before)
@@ -224,6 +281,7 @@ class Workbench(QObject):
             nominal_tip=None,
             limits=SwingLimits(),
             assumptions=USUAL,
+            second=None,
         )
         self.set_preparation(now.with_source(SourceChoice()))
         self.use_sample_files()
@@ -248,6 +306,14 @@ class Workbench(QObject):
         """Remember where results are saved."""
         self._settings.set_export_folder(folder)
 
+    def due_rule(self) -> DueRule:
+        """Return how long a tip may be in force."""
+        return self._settings.due_rule()
+
+    def set_due_rule(self, rule: DueRule) -> None:
+        """Remember how long a tip may be in force."""
+        self._settings.set_due_rule(rule)
+
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
         self._relieve_of_files()
@@ -259,12 +325,14 @@ class Workbench(QObject):
         A swing that is captured goes on with it.
         """
         self._is_started = True
-        source = self._preparation.source
+        source, *others = self._preparation.sources
         if source.lacks_place:
             self.live.close()
             return
-        camera, clock = camera_of(source, self._around), self._around.clock
-        self.live.open(camera, CameraSettings(), clock, self._settings.cameras())
+        there = [other for other in others if not other.lacks_place]
+        cameras = cameras_of([source, *there], self._around)
+        clock, known = self._around.clock, self._settings.cameras()
+        self.live.open(cameras, CameraSettings(), clock, known)
 
     def search_cameras(self, kind: str, producer: str) -> None:
         """Look for the cameras of a source; `cameras_found` or `search_failed` tells.
@@ -314,12 +382,16 @@ class Workbench(QObject):
         deadline = monotonic() + timeout_s
         self._counting.stop()
         self.run.runner.shut_down()
+        self.verification.runner.shut_down()
         self.live.close()
         jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
         # A dead camera may take longer, and has nothing to tell any more.
         of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
         has_closed = self.live.await_closed(of_camera)
-        has_ended = self.run.runner.await_end(max(0.0, deadline - monotonic()))
+        has_ended = all(
+            runner.await_end(max(0.0, deadline - monotonic()))
+            for runner in (self.run.runner, self.verification.runner)
+        )
         self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
@@ -330,11 +402,14 @@ class Workbench(QObject):
         camera_path = Path(station.camera_file) if station.camera_file else None
         pen_path = Path(station.pen_file) if station.pen_file else None
         units = station.pen_units or None
-        if camera_path is not None or pen_path is not None:
+        rig_path = Path(station.rig_file) if station.rig_file else None
+        if any(path is not None for path in (camera_path, pen_path, rig_path)):
             self._unread = station
             samples = self._folder / SIMULATED
             self._start(
-                lambda _: files_of_before(samples, camera_path, pen_path, units),
+                lambda _: files_of_before(
+                    *(samples, camera_path, pen_path, units, rig_path)
+                ),
                 self._on_files_read,
             )
 
@@ -379,7 +454,7 @@ class Workbench(QObject):
             before,
             camera_file=before.camera_file or opened.camera_file,
             pen_file=before.pen_file or opened.pen_file,
-        )
+        ).with_rig(before.rig_file or opened.rig_file)
         self._follow(before)
         self._fill_in_samples()
 
@@ -401,20 +476,37 @@ class Workbench(QObject):
             before,
             camera_file=opened.camera_file or before.camera_file,
             pen_file=opened.pen_file or before.pen_file,
-        )
+        ).with_rig(opened.rig_file or before.rig_file)
         self._remember()
         self._follow(before)
 
     def _follow(self, before: Preparation) -> None:
         """Let the camera and its images follow the choices."""
         now = self._preparation
-        if now.source != before.source:
-            self._preparation = now = replace(now, image_size=None, camera_in_use=None)
-        self.run.runner.choose(now)
-        if now.source != before.source and self._is_started:
+        if now.sources != before.sources:
+            self._preparation = now = now.without_images()
+        self._tell_runners()
+        if now.sources != before.sources and self._is_started:
             self.open_camera()
         self.live.set_aim(now.aim)
         self.changed.emit()
+
+    def _tell_runners(self) -> None:
+        self.run.runner.choose(self._preparation)
+        self.verification.runner.choose(self._preparation, self._choices)
+
+    def _read_supervision(self) -> None:
+        folder = self._folder
+        job = Job(lambda _: read_supervision(folder), self)
+
+        # Connections
+        job.succeeded.connect(self._on_supervision_read)
+        job.failed.connect(self.troubled)
+        job.start()
+
+    def _on_supervision_read(self, supervision: Supervision) -> None:
+        if supervision.is_guarded:
+            self.set_supervision(supervision)
 
     def _count_others(self) -> None:
         """See whether other windows use the same data folder."""
@@ -464,6 +556,7 @@ class Workbench(QObject):
             return
         camera_file, pen_file = now.camera_file, now.pen_file
         unread = self._unread  # files that are being read stay remembered
+        beside = _second_station(now.second, unread)
         station = Station(
             operator=names.operator,
             pen=names.pen,
@@ -480,12 +573,18 @@ class Workbench(QObject):
             pen_file=unread.pen_file if pen_file is None else str(pen_file.path),
             pen_units=(unread.pen_units if pen_file is None else pen_file.units or ""),
             mask=_circles_text(now.mask),
+            second_source=beside.second_source,
+            second_place=beside.second_place,
+            second_producer=beside.second_producer,
+            second_mask=beside.second_mask,
+            rig_file=beside.rig_file,
             max_uncertainty=now.limits.max_uncertainty,
             min_images=now.limits.min_images,
             max_images=now.limits.max_images,
             **_assumed_entries(now.assumptions),
         )
-        self._settings.set_station(names.station, station)
+        kept = with_choices(station, self._choices)
+        self._settings.set_station(names.station, kept)
 
     def _on_settings_troubled(self, why: Sentence) -> None:
         self.troubled.emit(worded(why))
@@ -495,17 +594,28 @@ class Workbench(QObject):
 
     def _on_image_shown(self, shown: Shown) -> None:
         size = shown.size.width(), shown.size.height()
-        if size != self._preparation.image_size:
+        if shown.seen.camera == 0 and size != self._preparation.image_size:
             self._preparation = replace(self._preparation, image_size=size)
-            self.run.runner.choose(self._preparation)
+            self._tell_runners()
             self.changed.emit()
 
-    def _on_settings_applied(self, settings: CameraSettings) -> None:
-        serial = self.live.serial
+    def _on_configured(self, camera: int, settings: CameraSettings) -> None:
+        before, caps = self._preparation, self.live.caps_of(camera)
+        serial = self.live.serial_of(camera)
         used = CameraInUse(serial, settings)
-        self._preparation = replace(self._preparation, camera_in_use=used)
-        self.run.runner.choose(self._preparation)
-        if self._preparation.source.source.needs is not Needs.FILES:
+        if camera == 0:
+            now = replace(before, camera_in_use=used)
+        elif before.second is not None and caps is not None:
+            size = caps.width, caps.height
+            second = replace(before.second, in_use=used, image_size=size)
+            now = replace(before, second=second)
+        else:
+            return
+        self._preparation = now
+        self._tell_runners()
+        if camera > 0:
+            self.changed.emit()
+        if now.sources[camera].source.needs is not Needs.FILES:
             self._settings.set_camera(serial, settings)
 
 
@@ -522,20 +632,18 @@ def _limits(station: Station) -> SwingLimits:
 def _assumptions(station: Station) -> Assumptions:
     """Return what a station assumes, what is usual if that makes no sense."""
     own = {name: getattr(station, name) for name in ASSUMED}
-    measured = None if math.isnan(station.temperature_c) else station.temperature_c
     try:
-        others = replace(USUAL, temperature_c=measured, **own)
+        others = replace(USUAL, temperature_c=station.temperature_c, **own)
         return with_focal_length(others, station.focal_length)
     except ValueError:
         return USUAL
 
 
-def _assumed_entries(assumptions: Assumptions) -> dict[str, float]:
-    measured = assumptions.temperature_c
+def _assumed_entries(assumptions: Assumptions) -> dict[str, Any]:
     entries = {name: getattr(assumptions, name) for name in ASSUMED}
     return entries | {
         "focal_length": assumptions.focal_length,
-        "temperature_c": math.nan if measured is None else measured,
+        "temperature_c": assumptions.temperature_c,
     }
 
 
@@ -543,6 +651,29 @@ def _source(station: Station) -> SourceChoice:
     if source_named(station.source) is None:  # of a later version
         return SourceChoice()
     return SourceChoice(station.source, station.source_place, station.source_producer)
+
+
+def _second(station: Station) -> SecondCamera | None:
+    if source_named(station.second_source) is None:  # none, or of a later version
+        return None
+    source = SourceChoice(
+        station.second_source, station.second_place, station.second_producer
+    )
+    return SecondCamera(source, mask=_parse_circles(station.second_mask))
+
+
+def _second_station(second: SecondCamera | None, unread: Station) -> Station:
+    """Return a station with nothing but what is chosen of its second camera."""
+    if second is None:
+        return Station()
+    file = second.rig_file
+    return Station(
+        second_source=second.source.kind,
+        second_place=second.source.place,
+        second_producer=second.source.producer,
+        second_mask=_circles_text(second.mask),
+        rig_file=unread.rig_file if file is None else str(file.path),
+    )
 
 
 def _point_text(point: FloatArray | None) -> str:

@@ -24,6 +24,69 @@
     </message>
 </context>
 <context>
+    <name>ArchivePanel</name>
+    <message>
+        <source>Check the archive</source>
+        <translation>检查档案库</translation>
+    </message>
+    <message>
+        <source>Take up another station&apos;s...</source>
+        <translation>导入另一工位的条目...</translation>
+    </message>
+    <message>
+        <source>Save...</source>
+        <translation>保存…</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <source>Entries shown (CSV)...</source>
+        <translation>所列条目 (CSV)...</translation>
+    </message>
+    <message>
+        <source>Entries shown (JSON)...</source>
+        <translation>所列条目 (JSON)...</translation>
+    </message>
+    <message>
+        <source>All, for another station...</source>
+        <translation>全部条目，供另一工位使用...</translation>
+    </message>
+    <message>
+        <source>Something else is under way.</source>
+        <translation>另一项操作正在进行。</translation>
+    </message>
+    <message>
+        <source>Read every entry, record, result and image, and compare</source>
+        <translation>读取并核对每个条目、记录、结果和图像</translation>
+    </message>
+    <message>
+        <source>For other programs, or for another station</source>
+        <translation>供其他程序或另一工位使用</translation>
+    </message>
+    <message>
+        <source>Copy the entries of a file that was saved at another station</source>
+        <translation>复制另一工位所保存文件中的条目</translation>
+    </message>
+    <message>
+        <source>{0} more were found.</source>
+        <translation>另外还发现 {0} 处。</translation>
+    </message>
+    <message>
+        <source>Not checked since the program was started.</source>
+        <translation>程序启动后尚未检查。</translation>
+    </message>
+    <message>
+        <source>Something was changed. {0} entries and {1} files were read.</source>
+        <translation>发现更改。已读取 {0} 个条目和 {1} 个文件。</translation>
+    </message>
+    <message>
+        <source>No change was found in {0} entries and {1} files.</source>
+        <translation>在 {0} 个条目和 {1} 个文件中未发现更改。</translation>
+    </message>
+</context>
+<context>
     <name>AssumptionsDialog</name>
     <message>
         <source>Assumptions of the station</source>
@@ -152,6 +215,18 @@
         <translation>视图（最差的在前）</translation>
     </message>
     <message>
+        <source>Residuals</source>
+        <translation>残差</translation>
+    </message>
+    <message>
+        <source>Uncertainty</source>
+        <translation>不确定度</translation>
+    </message>
+    <message>
+        <source>How uncertain the intrinsics leave where a point is seen, over the image: standard uncertainty, px.</source>
+        <translation>由内参引起的成像位置的标准不确定度在整幅图像上的分布，单位 px。</translation>
+    </message>
+    <message>
         <source>Leave out and calibrate again</source>
         <translation>剔除并重新标定</translation>
     </message>
@@ -248,6 +323,13 @@
     </message>
 </context>
 <context>
+    <name>CameraSwitch</name>
+    <message>
+        <source>Camera {0}</source>
+        <translation>相机 {0}</translation>
+    </message>
+</context>
+<context>
     <name>DataFolderPanel</name>
     <message>
         <source>Data folder</source>
@@ -268,6 +350,13 @@
     <message>
         <source>Other windows of the program that use this folder: {0}. All of them put their tips in force here.</source>
         <translation>使用此文件夹的其他程序窗口：{0} 个。它们接受的测头都在这里生效。</translation>
+    </message>
+</context>
+<context>
+    <name>DateField</name>
+    <message>
+        <source>A day such as {0}; empty for any.</source>
+        <translation>日期，例如 {0}；留空则不限。</translation>
     </message>
 </context>
 <context>
@@ -299,6 +388,152 @@
     <message>
         <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
         <translation>演示结束。您可以随意查看；演示数据不会保留。要标定测头，请不带演示启动程序。</translation>
+    </message>
+</context>
+<context>
+    <name>DuePanel</name>
+    <message>
+        <source>Days in force at most</source>
+        <translation>最长有效天数</translation>
+    </message>
+    <message>
+        <source>Swings of its pen at most</source>
+        <translation>其光笔的最多摆动次数</translation>
+    </message>
+    <message>
+        <source>any number</source>
+        <translation>不限</translation>
+    </message>
+    <message>
+        <source>Each swing, with whatever tip, wears the seat of all tips.</source>
+        <translation>无论使用哪个测头，每次摆动都会磨损所有测头共用的安装座。</translation>
+    </message>
+    <message>
+        <source>{0} of {1} tips in force at this station are due.</source>
+        <translation>本工位的有效测头中，{1} 个里有 {0} 个已到期。</translation>
+    </message>
+    <message>
+        <source>Calibrated</source>
+        <translation>标定日期</translation>
+    </message>
+    <message>
+        <source>Due</source>
+        <translation>到期</translation>
+    </message>
+    <message>
+        <source>Swings since</source>
+        <translation>此后摆动次数</translation>
+    </message>
+    <message>
+        <source>Swings left</source>
+        <translation>剩余摆动次数</translation>
+    </message>
+    <message>
+        <source>State</source>
+        <translation>状态</translation>
+    </message>
+    <message>
+        <source>DUE</source>
+        <translation>已到期</translation>
+    </message>
+    <message>
+        <source>in time</source>
+        <translation>未到期</translation>
+    </message>
+</context>
+<context>
+    <name>EntryPanel</name>
+    <message>
+        <source>Put this tip in force again? It becomes a new entry; the tip in force now is kept.</source>
+        <translation>使该测头数据重新生效？这将成为一个新条目；当前有效的数据仍然保留。</translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Put in force</source>
+        <translation>使其生效</translation>
+    </message>
+    <message>
+        <source>Leave it</source>
+        <translation>不更改</translation>
+    </message>
+    <message>
+        <source>A note on this entry; it cannot be changed later.</source>
+        <translation>对该条目的备注；录入后不能更改。</translation>
+    </message>
+    <message>
+        <source>Note</source>
+        <translation>备注</translation>
+    </message>
+    <message>
+        <source>Enter</source>
+        <translation>录入</translation>
+    </message>
+    <message>
+        <source>Entry {0} was changed since it was entered. Nothing that it says now can be trusted; restore the archive from a copy.</source>
+        <translation>条目 {0} 在录入之后被更改。其现有内容不可信；请用副本恢复档案库。</translation>
+    </message>
+    <message>
+        <source>Add a note...</source>
+        <translation>添加备注...</translation>
+    </message>
+    <message>
+        <source>Put in force again...</source>
+        <translation>重新生效...</translation>
+    </message>
+    <message>
+        <source>Choose an entry.</source>
+        <translation>请选择一个条目。</translation>
+    </message>
+    <message>
+        <source>Say something of this entry</source>
+        <translation>对该条目作说明</translation>
+    </message>
+    <message>
+        <source>As a new entry</source>
+        <translation>作为新条目</translation>
+    </message>
+    <message>
+        <source>No entry is chosen.</source>
+        <translation>未选择条目。</translation>
+    </message>
+    <message>
+        <source>d MMMM yyyy, hh:mm</source>
+        <translation>yyyy年M月d日 hh:mm</translation>
+    </message>
+    <message>
+        <source>Entry {0}, {1}, SHA-256 {2}</source>
+        <translation>条目 {0}，{1}，SHA-256 {2}</translation>
+    </message>
+    <message>
+        <source>Station {0}</source>
+        <translation>工位 {0}</translation>
+    </message>
+    <message>
+        <source>by {0}</source>
+        <translation>操作员 {0}</translation>
+    </message>
+    <message>
+        <source>Pen {0}</source>
+        <translation>光笔 {0}</translation>
+    </message>
+    <message>
+        <source>Tip {0}</source>
+        <translation>测头 {0}</translation>
+    </message>
+    <message>
+        <source>Cone {0}</source>
+        <translation>锥孔 {0}</translation>
+    </message>
+    <message>
+        <source>Only a tip that was accepted can be put in force.</source>
+        <translation>只有已接受的测头数据才能生效。</translation>
+    </message>
+    <message>
+        <source>It is in force.</source>
+        <translation>该数据正在生效。</translation>
     </message>
 </context>
 <context>
@@ -461,6 +696,87 @@
     <message>
         <source>Open the aperture of the lens a little.</source>
         <translation>把镜头光圈调大一点。</translation>
+    </message>
+</context>
+<context>
+    <name>FilterBar</name>
+    <message>
+        <source>Pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
+        <source>Tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>Station</source>
+        <translation>工位</translation>
+    </message>
+    <message>
+        <source>From</source>
+        <translation>从</translation>
+    </message>
+    <message>
+        <source>To</source>
+        <translation>至</translation>
+    </message>
+    <message>
+        <source>All</source>
+        <translation>全部</translation>
+    </message>
+</context>
+<context>
+    <name>FixedPointFinding</name>
+    <message>
+        <source>Cone in the frame of the camera / mm</source>
+        <translation>相机坐标系中的锥孔 / mm</translation>
+    </message>
+    <message>
+        <source>Both tips / mm</source>
+        <translation>两个测头 / mm</translation>
+    </message>
+    <message>
+        <source>Average</source>
+        <translation>平均值</translation>
+    </message>
+    <message>
+        <source>U (k = 2) of it</source>
+        <translation>其 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Std expected</source>
+        <translation>预期标准差</translation>
+    </message>
+    <message>
+        <source>Tip wanted less own</source>
+        <translation>所需测头减现有测头</translation>
+    </message>
+    <message>
+        <source>its U (k = 2)</source>
+        <translation>其 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Nominal tip</source>
+        <translation>标称测头</translation>
+    </message>
+    <message>
+        <source>Std</source>
+        <translation>标准差</translation>
+    </message>
+    <message>
+        <source>Range</source>
+        <translation>极差</translation>
+    </message>
+</context>
+<context>
+    <name>FixedPointStrip</name>
+    <message>
+        <source>Touch the cone again</source>
+        <translation>再次接触锥孔</translation>
+    </message>
+    <message>
+        <source>Touches</source>
+        <translation>接触次数</translation>
     </message>
 </context>
 <context>
@@ -643,6 +959,126 @@
     </message>
 </context>
 <context>
+    <name>HistoryContent</name>
+    <message>
+        <source>Trend</source>
+        <translation>趋势</translation>
+    </message>
+    <message>
+        <source>Entry</source>
+        <translation>条目</translation>
+    </message>
+    <message>
+        <source>Repeatability</source>
+        <translation>重复性</translation>
+    </message>
+    <message>
+        <source>Due</source>
+        <translation>到期</translation>
+    </message>
+    <message>
+        <source>Archive</source>
+        <translation>档案库</translation>
+    </message>
+    <message>
+        <source>{0} entries</source>
+        <translation>{0} 个条目</translation>
+    </message>
+    <message>
+        <source>Tip {0} of pen {1} is in force as it was calibrated then.</source>
+        <translation>光笔 {1} 的测头 {0} 已按当时的标定重新生效。</translation>
+    </message>
+    <message>
+        <source>Entries of another station</source>
+        <translation>另一工位的条目</translation>
+    </message>
+    <message>
+        <source>{0} entries are new, {1} were there already.</source>
+        <translation>新增 {0} 个条目，已有 {1} 个。</translation>
+    </message>
+    <message>
+        <source>Save entries</source>
+        <translation>保存条目</translation>
+    </message>
+    <message>
+        <source>{0} entries are saved in {1}</source>
+        <translation>{0} 个条目已保存到 {1}</translation>
+    </message>
+</context>
+<context>
+    <name>HistoryModel</name>
+    <message>
+        <source>When</source>
+        <translation>时间</translation>
+    </message>
+    <message>
+        <source>Station</source>
+        <translation>工位</translation>
+    </message>
+    <message>
+        <source>Pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
+        <source>Tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>What</source>
+        <translation>内容</translation>
+    </message>
+    <message>
+        <source>Verdict</source>
+        <translation>结论</translation>
+    </message>
+    <message>
+        <source>x / mm</source>
+        <translation>x / mm</translation>
+    </message>
+    <message>
+        <source>y / mm</source>
+        <translation>y / mm</translation>
+    </message>
+    <message>
+        <source>z / mm</source>
+        <translation>z / mm</translation>
+    </message>
+    <message>
+        <source>U / mm</source>
+        <translation>U / mm</translation>
+    </message>
+    <message>
+        <source>By</source>
+        <translation>操作员</translation>
+    </message>
+    <message>
+        <source>Words</source>
+        <translation>说明</translation>
+    </message>
+</context>
+<context>
+    <name>HistoryPage</name>
+    <message>
+        <source>History</source>
+        <translation>历史</translation>
+    </message>
+    <message>
+        <source>All that ever became of a tip. Nothing here is ever changed.</source>
+        <translation>测头的全部经历。此处的内容从不更改。</translation>
+    </message>
+    <message>
+        <source>Next calibration</source>
+        <translation>下一次标定</translation>
+    </message>
+</context>
+<context>
+    <name>HistoryTable</name>
+    <message>
+        <source>Entries of the archive, the newest first</source>
+        <translation>档案库条目，最新的在前</translation>
+    </message>
+</context>
+<context>
     <name>ImageModel</name>
     <message>
         <source>Image</source>
@@ -752,6 +1188,45 @@
     <message>
         <source>The image cannot be shown.</source>
         <translation>无法显示该图像。</translation>
+    </message>
+</context>
+<context>
+    <name>ImagesRow</name>
+    <message>
+        <source>Choose...</source>
+        <translation>选择...</translation>
+    </message>
+    <message>
+        <source>Folder, video or record of images</source>
+        <translation>图像的文件夹、视频或记录</translation>
+    </message>
+    <message>
+        <source>Held still</source>
+        <translation>握住不动</translation>
+    </message>
+    <message>
+        <source>A touch is several images through which the pen is held still; else each image is a touch.</source>
+        <translation>一次接触是光笔握住不动的几幅图像；否则每幅图像就是一次接触。</translation>
+    </message>
+    <message>
+        <source>Read</source>
+        <translation>读取</translation>
+    </message>
+    <message>
+        <source>Do this task with recorded images: a folder, or one of folders.</source>
+        <translation>用录制的图像完成该项：一个文件夹，或由多个文件夹组成的文件夹。</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <source>Progress of reading</source>
+        <translation>读取进度</translation>
+    </message>
+    <message>
+        <source>Folder of recorded images</source>
+        <translation>录制图像的文件夹</translation>
     </message>
 </context>
 <context>
@@ -961,12 +1436,20 @@
 <context>
     <name>LastResultPanel</name>
     <message>
+        <source>Prove the tip in minutes by touching what is known.</source>
+        <translation>通过接触已知的东西，几分钟内证明测头。</translation>
+    </message>
+    <message>
         <source>Last practice with this pen and tip</source>
         <translation>本光笔和测头的上次练习</translation>
     </message>
     <message>
         <source>Last calibration of this pen and tip</source>
         <translation>本光笔和测头的上次标定</translation>
+    </message>
+    <message>
+        <source>Verify it</source>
+        <translation>验证</translation>
     </message>
     <message>
         <source>Take back...</source>
@@ -1019,6 +1502,10 @@
     <message>
         <source>Accepted with the reason: {0}</source>
         <translation>接受理由：{0}</translation>
+    </message>
+    <message>
+        <source>Accepted by the supervisor {0} with the reason: {1}</source>
+        <translation>由主管 {0} 接受，理由：{1}</translation>
     </message>
     <message>
         <source>It is dated later than now. Check the clock here.</source>
@@ -1273,10 +1760,147 @@
     </message>
 </context>
 <context>
+    <name>LengthFinding</name>
+    <message>
+        <source>Length at each place / mm</source>
+        <translation>各位置的长度 / mm</translation>
+    </message>
+    <message>
+        <source>Length / mm</source>
+        <translation>长度 / mm</translation>
+    </message>
+    <message>
+        <source>Error / mm</source>
+        <translation>误差 / mm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) / mm</source>
+        <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Limit / mm</source>
+        <translation>限值 / mm</translation>
+    </message>
+    <message>
+        <source>Scale of the pen by it: {0}, U (k = 2) {1} ppm; without it {2} ppm.</source>
+        <translation>由此得到的光笔比例：{0}，U (k = 2) {1} ppm；不用它时为 {2} ppm。</translation>
+    </message>
+</context>
+<context>
+    <name>LengthStrip</name>
+    <message>
+        <source>not known</source>
+        <translation>未知</translation>
+    </message>
+    <message>
+        <source>Touch both ends of a length</source>
+        <translation>接触长度的两端</translation>
+    </message>
+    <message>
+        <source>Certified length</source>
+        <translation>证书长度</translation>
+    </message>
+    <message>
+        <source>Its U (k = 2)</source>
+        <translation>其 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Places</source>
+        <translation>位置数</translation>
+    </message>
+</context>
+<context>
+    <name>LimitsDialog</name>
+    <message>
+        <source>Limits of the station</source>
+        <translation>工位的限值</translation>
+    </message>
+    <message>
+        <source>What lies beyond them, only a supervisor can accept, with a reason. Each change is kept with name and time.</source>
+        <translation>超出限值的，只有主管说明理由后才能接受。每次更改都连同姓名和时间保存。</translation>
+    </message>
+    <message>
+        <source>Sign with the supervisor&apos;s password.</source>
+        <translation>用主管密码签名。</translation>
+    </message>
+    <message>
+        <source>There is no password yet: the one that you type becomes the supervisor&apos;s. From then on it is asked for.</source>
+        <translation>尚无密码：您输入的密码将成为主管密码，此后都会要求输入。</translation>
+    </message>
+    <message>
+        <source>Lay down</source>
+        <translation>规定</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>关闭</translation>
+    </message>
+    <message>
+        <source>New password, or nothing to keep it</source>
+        <translation>新密码；留空则不变</translation>
+    </message>
+    <message>
+        <source>Swing: U (k = 2) at most</source>
+        <translation>摆动：U (k = 2) 最大</translation>
+    </message>
+    <message>
+        <source>Swing: images at least</source>
+        <translation>摆动：图像至少</translation>
+    </message>
+    <message>
+        <source>Swing: images at most</source>
+        <translation>摆动：图像至多</translation>
+    </message>
+    <message>
+        <source>Fixed point: std across the view</source>
+        <translation>固定点：垂直于视线的标准差</translation>
+    </message>
+    <message>
+        <source>Fixed point: std along the view</source>
+        <translation>固定点：沿视线的标准差</translation>
+    </message>
+    <message>
+        <source>Ring: error of the radius</source>
+        <translation>圆环：半径误差</translation>
+    </message>
+    <message>
+        <source>Ring: roundness, and off its plane</source>
+        <translation>圆环：圆度及离开平面</translation>
+    </message>
+    <message>
+        <source>Length: error</source>
+        <translation>长度：误差</translation>
+    </message>
+    <message>
+        <source>Location error</source>
+        <translation>位置误差</translation>
+    </message>
+    <message>
+        <source>Repeatability: std of the tip</source>
+        <translation>重复性：测头标准差</translation>
+    </message>
+    <message>
+        <source>Drift of a witness</source>
+        <translation>见证点的漂移</translation>
+    </message>
+    <message>
+        <source>Usual: {0}.</source>
+        <translation>通常：{0}。</translation>
+    </message>
+</context>
+<context>
     <name>LimitsForm</name>
     <message>
         <source>Limits of the swing</source>
         <translation>摆动限值</translation>
+    </message>
+    <message>
+        <source>All limits...</source>
+        <translation>所有限值...</translation>
+    </message>
+    <message>
+        <source>Those of verifications, too; a supervisor lays them down.</source>
+        <translation>包括验证的限值；由主管规定。</translation>
     </message>
     <message>
         <source>U (k = 2) at most</source>
@@ -1368,6 +1992,13 @@
     <message>
         <source>, other spots: {0}</source>
         <translation>，其他光点：{0}</translation>
+    </message>
+</context>
+<context>
+    <name>LiveView</name>
+    <message>
+        <source>Camera {0}: {1}</source>
+        <translation>相机 {0}：{1}</translation>
     </message>
 </context>
 <context>
@@ -1689,6 +2320,37 @@
     </message>
 </context>
 <context>
+    <name>PaperWindow</name>
+    <message>
+        <source>Record on paper</source>
+        <translation>纸质记录</translation>
+    </message>
+    <message>
+        <source>Pages</source>
+        <translation>页面</translation>
+    </message>
+    <message>
+        <source>Smaller</source>
+        <translation>缩小</translation>
+    </message>
+    <message>
+        <source>Larger</source>
+        <translation>放大</translation>
+    </message>
+    <message>
+        <source>Save as PDF...</source>
+        <translation>另存为 PDF...</translation>
+    </message>
+    <message>
+        <source>Print...</source>
+        <translation>打印...</translation>
+    </message>
+    <message>
+        <source>Save the record on paper</source>
+        <translation>保存纸质记录</translation>
+    </message>
+</context>
+<context>
     <name>PenInSpace</name>
     <message>
         <source>The pen in space</source>
@@ -1915,6 +2577,14 @@
         <translation>以光笔、测头和日期命名，保存结果和图</translation>
     </message>
     <message>
+        <source>Look at it, save it as PDF, or print it</source>
+        <translation>预览、另存为 PDF 或打印</translation>
+    </message>
+    <message>
+        <source>Record on paper...</source>
+        <translation>纸质记录...</translation>
+    </message>
+    <message>
         <source>Open folder</source>
         <translation>打开文件夹</translation>
     </message>
@@ -2058,6 +2728,14 @@
         <translation>接受…</translation>
     </message>
     <message>
+        <source>Verify it</source>
+        <translation>验证</translation>
+    </message>
+    <message>
+        <source>Prove the tip in minutes by touching what is known.</source>
+        <translation>通过接触已知的东西，几分钟内证明测头。</translation>
+    </message>
+    <message>
         <source>Take back...</source>
         <translation>撤回…</translation>
     </message>
@@ -2114,6 +2792,10 @@
         <translation>注明理由后使其生效</translation>
     </message>
     <message>
+        <source>Accept the tip first: it is of the result.</source>
+        <translation>请先接受测头：纸质记录由已接受的结果生成。</translation>
+    </message>
+    <message>
         <source>Since {0}. Earlier results are kept.</source>
         <translation>自 {0} 起。更早的结果均保留。</translation>
     </message>
@@ -2152,6 +2834,205 @@
     <message>
         <source>{0}: {1}</source>
         <translation>{0}：{1}</translation>
+    </message>
+</context>
+<context>
+    <name>RigPanel</name>
+    <message>
+        <source>Rig file of both cameras</source>
+        <translation>两台相机的相机组文件</translation>
+    </message>
+    <message>
+        <source>Rig files ({0})</source>
+        <translation>相机组文件 ({0})</translation>
+    </message>
+    <message>
+        <source>Two cameras at once</source>
+        <translation>两台相机同时观测</translation>
+    </message>
+    <message>
+        <source>A second camera looks at the pen, too</source>
+        <translation>第二台相机同时观测光笔</translation>
+    </message>
+    <message>
+        <source>Rig file</source>
+        <translation>相机组文件</translation>
+    </message>
+    <message>
+        <source>Open...</source>
+        <translation>打开...</translation>
+    </message>
+    <message>
+        <source>Open the file that says where both cameras stand. &quot;lightpen extrinsics LEFT RIGHT --board BOARD --out rig.json&quot; makes it from images of one board.</source>
+        <translation>请打开说明两台相机位置的文件。该文件可由同一标定板的图像生成：&quot;lightpen extrinsics LEFT RIGHT --board BOARD --out rig.json&quot;。</translation>
+    </message>
+    <message>
+        <source>{0} and {1} stand {2} mm apart</source>
+        <translation>{0} 与 {1} 相距 {2} mm</translation>
+    </message>
+    <message>
+        <source>Both take their images at the same moment.</source>
+        <translation>两台相机同步曝光。</translation>
+    </message>
+    <message>
+        <source>{0} Images without a partner: {1}.</source>
+        <translation>{0} 未能配对的图像：{1} 幅。</translation>
+    </message>
+</context>
+<context>
+    <name>RingFinding</name>
+    <message>
+        <source>Radius of each run / mm</source>
+        <translation>各轮的半径 / mm</translation>
+    </message>
+    <message>
+        <source>Radius / mm</source>
+        <translation>半径 / mm</translation>
+    </message>
+    <message>
+        <source>Error / mm</source>
+        <translation>误差 / mm</translation>
+    </message>
+    <message>
+        <source>Relative error × 1e-4</source>
+        <translation>相对误差 × 1e-4</translation>
+    </message>
+    <message>
+        <source>U (k = 2) / mm</source>
+        <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Roundness / mm</source>
+        <translation>圆度 / mm</translation>
+    </message>
+    <message>
+        <source>Off the plane / mm</source>
+        <translation>离开平面 / mm</translation>
+    </message>
+    <message>
+        <source>Covered / °</source>
+        <translation>覆盖 / °</translation>
+    </message>
+    <message>
+        <source>Touches</source>
+        <translation>接触次数</translation>
+    </message>
+    <message>
+        <source>Average</source>
+        <translation>平均值</translation>
+    </message>
+</context>
+<context>
+    <name>RingStrip</name>
+    <message>
+        <source>in a groove</source>
+        <translation>槽中</translation>
+    </message>
+    <message>
+        <source>in its bore</source>
+        <translation>孔内</translation>
+    </message>
+    <message>
+        <source>from outside</source>
+        <translation>外圆</translation>
+    </message>
+    <message>
+        <source>not known</source>
+        <translation>未知</translation>
+    </message>
+    <message>
+        <source>Touch a ring</source>
+        <translation>接触圆环</translation>
+    </message>
+    <message>
+        <source>Certified radius</source>
+        <translation>证书半径</translation>
+    </message>
+    <message>
+        <source>Its U (k = 2)</source>
+        <translation>其 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Touched</source>
+        <translation>接触处</translation>
+    </message>
+    <message>
+        <source>Runs</source>
+        <translation>轮数</translation>
+    </message>
+</context>
+<context>
+    <name>RingView</name>
+    <message>
+        <source>of {0}°</source>
+        <translation>共需 {0}°</translation>
+    </message>
+    <message>
+        <source>Ring: {0} of {1} degrees by {2} touches</source>
+        <translation>圆环：{2} 次接触覆盖 {0} 度，需 {1} 度</translation>
+    </message>
+</context>
+<context>
+    <name>SelectionPanel</name>
+    <message>
+        <source>Select two entries with a tip to compare them.</source>
+        <translation>选择两个带测头数据的条目即可比较。</translation>
+    </message>
+    <message>
+        <source>{0} and {1}</source>
+        <translation>{0} 与 {1}</translation>
+    </message>
+    <message>
+        <source>Earlier / mm</source>
+        <translation>较早 / mm</translation>
+    </message>
+    <message>
+        <source>Later / mm</source>
+        <translation>较晚 / mm</translation>
+    </message>
+    <message>
+        <source>Change / mm</source>
+        <translation>变化 / mm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) / mm</source>
+        <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>They are not of the same pen and tip.</source>
+        <translation>二者不是同一光笔和测头。</translation>
+    </message>
+    <message>
+        <source>The change is no more than both uncertainties explain.</source>
+        <translation>变化未超出两者不确定度所能解释的范围。</translation>
+    </message>
+    <message>
+        <source>Repeatability needs two calibrations of one tip.</source>
+        <translation>重复性至少需要同一测头的两次标定。</translation>
+    </message>
+    <message>
+        <source>Repeatability of the {0} that are selected</source>
+        <translation>所选 {0} 次标定的重复性</translation>
+    </message>
+    <message>
+        <source>Repeatability of all {0} of the trend</source>
+        <translation>趋势中全部 {0} 次标定的重复性</translation>
+    </message>
+    <message>
+        <source>Mean / mm</source>
+        <translation>平均 / mm</translation>
+    </message>
+    <message>
+        <source>Scatter / mm</source>
+        <translation>标准差 / mm</translation>
+    </message>
+    <message>
+        <source>Range / mm</source>
+        <translation>极差 / mm</translation>
+    </message>
+    <message>
+        <source>Stated U / mm</source>
+        <translation>标称 U / mm</translation>
     </message>
 </context>
 <context>
@@ -2382,6 +3263,10 @@
         <translation>图像来源</translation>
     </message>
     <message>
+        <source>Source of the second camera</source>
+        <translation>第二台相机的图像来源</translation>
+    </message>
+    <message>
         <source>{0} - not installed</source>
         <translation>{0} - 未安装</translation>
     </message>
@@ -2596,6 +3481,17 @@
     <message>
         <source>Bright spots: {0}. Is the pen covered? Without its LED file it cannot be told from stray light.</source>
         <translation>亮点：{0} 个。光笔遮住了吗？没有 LED 文件就无法区分光笔与杂散光。</translation>
+    </message>
+</context>
+<context>
+    <name>SupervisorFields</name>
+    <message>
+        <source>Supervisor</source>
+        <translation>主管</translation>
+    </message>
+    <message>
+        <source>Supervisor&apos;s password</source>
+        <translation>主管密码</translation>
     </message>
 </context>
 <context>
@@ -2918,6 +3814,75 @@
     </message>
 </context>
 <context>
+    <name>TaskPanel</name>
+    <message>
+        <source>Recorded images...</source>
+        <translation>录制的图像...</translation>
+    </message>
+    <message>
+        <source>Do this task with images that were recorded before.</source>
+        <translation>用以前录制的图像完成该项。</translation>
+    </message>
+    <message>
+        <source>Touch again</source>
+        <translation>重新接触</translation>
+    </message>
+    <message>
+        <source>Do this task again; what it found before is kept.</source>
+        <translation>重做该项；先前得到的结果保留。</translation>
+    </message>
+</context>
+<context>
+    <name>TouchHand</name>
+    <message>
+        <source>Simulated pen</source>
+        <translation>模拟光笔</translation>
+    </message>
+    <message>
+        <source>Let the simulated operator touch</source>
+        <translation>让模拟操作员接触</translation>
+    </message>
+    <message>
+        <source>It touches whatever is asked for by itself.</source>
+        <translation>它自行接触所要求的各处。</translation>
+    </message>
+    <message>
+        <source>Its ring has a radius of {0} mm, its bar a length of {1} mm.</source>
+        <translation>其圆环半径为 {0} mm，标准棒长度为 {1} mm。</translation>
+    </message>
+    <message>
+        <source>Lift</source>
+        <translation>抬起</translation>
+    </message>
+    <message>
+        <source>Take the tip away for a moment.</source>
+        <translation>暂时移开测头。</translation>
+    </message>
+</context>
+<context>
+    <name>TrendPanel</name>
+    <message>
+        <source>{0} / mm, with U (k = 2)</source>
+        <translation>{0} / mm，带 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>calibration no.</source>
+        <translation>标定序号</translation>
+    </message>
+    <message>
+        <source>Largest U (k = 2) / mm</source>
+        <translation>最大 U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Choose an entry with a tip: its trend is shown here.</source>
+        <translation>选择一个带测头数据的条目，此处显示其趋势。</translation>
+    </message>
+    <message>
+        <source>Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: three standard deviations from their mean, and the limit of U.</source>
+        <translation>光笔 {0}，测头 {1}：{2} 次标定，{3} 至 {4}。虚线：平均值上下三倍标准差，以及 U 的限值。</translation>
+    </message>
+</context>
+<context>
     <name>UncertaintyPanel</name>
     <message>
         <source>Parts of U (k = 2) / µm</source>
@@ -2969,6 +3934,300 @@
     <message>
         <source>Redo</source>
         <translation>取消撤销</translation>
+    </message>
+</context>
+<context>
+    <name>VerifyPage</name>
+    <message>
+        <source>Verify</source>
+        <translation>验证</translation>
+    </message>
+    <message>
+        <source>Prove the tip in force by touching what is known.</source>
+        <translation>通过接触已知的东西来证明当前有效的测头。</translation>
+    </message>
+    <message>
+        <source>d MMMM yyyy, hh:mm</source>
+        <translation>yyyy年M月d日 hh:mm</translation>
+    </message>
+    <message>
+        <source>Tip {0} of pen {1}, in force since {2}</source>
+        <translation>光笔 {1} 的测头 {0}，自 {2} 起有效</translation>
+    </message>
+    <message>
+        <source>accepted by {0}</source>
+        <translation>由 {0} 接受</translation>
+    </message>
+    <message>
+        <source>kept as {0}</source>
+        <translation>保存为 {0}</translation>
+    </message>
+    <message>
+        <source>Back to Start</source>
+        <translation>回到开始</translation>
+    </message>
+    <message>
+        <source>Nothing is touched yet.</source>
+        <translation>尚未接触任何点。</translation>
+    </message>
+    <message>
+        <source>Finish early</source>
+        <translation>提前结束</translation>
+    </message>
+    <message>
+        <source>The verification is not finished. The touches of the task at hand are lost; what is found is kept.</source>
+        <translation>验证尚未完成。当前项的接触将丢失；已得到的结果保留。</translation>
+    </message>
+    <message>
+        <source>Begin the verification anew? What was found is kept.</source>
+        <translation>重新开始验证？已得到的结果保留。</translation>
+    </message>
+    <message>
+        <source>Begin anew</source>
+        <translation>重新开始</translation>
+    </message>
+    <message>
+        <source>Go on</source>
+        <translation>继续</translation>
+    </message>
+    <message>
+        <source>Something was found against the tip. Why is it used nevertheless? The reason is kept with the verification.</source>
+        <translation>发现了对测头不利的情况。为何仍要使用它？理由随验证一起保存。</translation>
+    </message>
+    <message>
+        <source>Reason</source>
+        <translation>理由</translation>
+    </message>
+    <message>
+        <source>Accept with this reason</source>
+        <translation>按此理由接受</translation>
+    </message>
+    <message>
+        <source>Do not accept</source>
+        <translation>不接受</translation>
+    </message>
+    <message>
+        <source>Accept...</source>
+        <translation>接受…</translation>
+    </message>
+    <message>
+        <source>Use the tip with a reason</source>
+        <translation>说明理由后使用测头</translation>
+    </message>
+    <message>
+        <source>Start over</source>
+        <translation>重新开始</translation>
+    </message>
+    <message>
+        <source>Forget all touches, and verify the tip in force from the first.</source>
+        <translation>忘记所有接触，从头验证当前有效的测头。</translation>
+    </message>
+    <message>
+        <source>No image yet.</source>
+        <translation>尚无图像。</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>进度</translation>
+    </message>
+    <message>
+        <source>Tasks</source>
+        <translation>各项</translation>
+    </message>
+    <message>
+        <source>Live image</source>
+        <translation>实时图像</translation>
+    </message>
+    <message>
+        <source>Go on (Space)</source>
+        <translation>继续（空格键）</translation>
+    </message>
+    <message>
+        <source>Pause (Space)</source>
+        <translation>暂停（空格键）</translation>
+    </message>
+</context>
+<context>
+    <name>VerifyWords</name>
+    <message>
+        <source>Space: go on</source>
+        <translation>空格：继续</translation>
+    </message>
+    <message>
+        <source>Space: pause</source>
+        <translation>空格：暂停</translation>
+    </message>
+    <message>
+        <source>{0} of {1} touches</source>
+        <translation>接触 {0} / {1} 次</translation>
+    </message>
+    <message>
+        <source>{0} of {1}°</source>
+        <translation>{0}° / {1}°</translation>
+    </message>
+    <message>
+        <source>{0} of 2 ends</source>
+        <translation>{0} / 2 端</translation>
+    </message>
+    <message>
+        <source>{0}, run {1} of {2}</source>
+        <translation>{0}，第 {1} / {2} 轮</translation>
+    </message>
+    <message>
+        <source>Fixed point</source>
+        <translation>固定点</translation>
+    </message>
+    <message>
+        <source>Ring</source>
+        <translation>圆环</translation>
+    </message>
+    <message>
+        <source>Length</source>
+        <translation>长度</translation>
+    </message>
+    <message>
+        <source>left out</source>
+        <translation>不做</translation>
+    </message>
+    <message>
+        <source>now</source>
+        <translation>正在进行</translation>
+    </message>
+    <message>
+        <source>to do</source>
+        <translation>待做</translation>
+    </message>
+    <message>
+        <source>{0}: {1}</source>
+        <translation>{0}：{1}</translation>
+    </message>
+    <message>
+        <source>The touches of recorded images are measured.</source>
+        <translation>正在测量录制图像中的接触。</translation>
+    </message>
+    <message>
+        <source>Reading images</source>
+        <translation>正在读取图像</translation>
+    </message>
+    <message>
+        <source>Nothing to verify</source>
+        <translation>无法验证</translation>
+    </message>
+    <message>
+        <source>Wait</source>
+        <translation>请稍候</translation>
+    </message>
+    <message>
+        <source>The tip in force is being read.</source>
+        <translation>正在读取当前有效的测头。</translation>
+    </message>
+    <message>
+        <source>Tip proven</source>
+        <translation>测头已证明</translation>
+    </message>
+    <message>
+        <source>Look at it</source>
+        <translation>需查看</translation>
+    </message>
+    <message>
+        <source>Not proven</source>
+        <translation>未证明</translation>
+    </message>
+    <message>
+        <source>The camera sends none. It goes on by itself as soon as they come.</source>
+        <translation>相机没有送来图像。图像一到便自动继续。</translation>
+    </message>
+    <message>
+        <source>No images</source>
+        <translation>没有图像</translation>
+    </message>
+    <message>
+        <source>Paused</source>
+        <translation>已暂停</translation>
+    </message>
+    <message>
+        <source>Press Space to go on.</source>
+        <translation>按空格键继续。</translation>
+    </message>
+    <message>
+        <source>Hold still</source>
+        <translation>握住不动</translation>
+    </message>
+    <message>
+        <source>Touched before</source>
+        <translation>已接触过</translation>
+    </message>
+    <message>
+        <source>Lean another way</source>
+        <translation>换个方向倾斜</translation>
+    </message>
+    <message>
+        <source>Touch the cone</source>
+        <translation>接触锥孔</translation>
+    </message>
+    <message>
+        <source>Next point</source>
+        <translation>下一点</translation>
+    </message>
+    <message>
+        <source>Touch the ring</source>
+        <translation>接触圆环</translation>
+    </message>
+    <message>
+        <source>The other end</source>
+        <translation>另一端</translation>
+    </message>
+    <message>
+        <source>Touch one end</source>
+        <translation>接触一端</translation>
+    </message>
+    <message>
+        <source>Not taken</source>
+        <translation>未取得</translation>
+    </message>
+    <message>
+        <source>Not counted</source>
+        <translation>不计入</translation>
+    </message>
+    <message>
+        <source>READING</source>
+        <translation>读取中</translation>
+    </message>
+    <message>
+        <source>NOT POSSIBLE</source>
+        <translation>无法进行</translation>
+    </message>
+    <message>
+        <source>NO IMAGES</source>
+        <translation>没有图像</translation>
+    </message>
+    <message>
+        <source>PAUSED</source>
+        <translation>已暂停</translation>
+    </message>
+    <message>
+        <source>TAKEN</source>
+        <translation>已取得</translation>
+    </message>
+    <message>
+        <source>TOUCHED BEFORE</source>
+        <translation>已接触过</translation>
+    </message>
+    <message>
+        <source>HELD</source>
+        <translation>保持中</translation>
+    </message>
+    <message>
+        <source>NOT TAKEN</source>
+        <translation>未取得</translation>
+    </message>
+    <message>
+        <source>WAITING</source>
+        <translation>等待中</translation>
+    </message>
+    <message>
+        <source>PEN SEEN</source>
+        <translation>看到光笔</translation>
     </message>
 </context>
 <context>
@@ -3059,6 +4318,10 @@
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
     </message>
     <message>
+        <source>A touch {distance:.0f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
+        <translation>距其他接触 {distance:.0f} mm 的一次接触不计入：测头不在锥孔里。请放入锥孔并握住不动。</translation>
+    </message>
+    <message>
         <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
         <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个检定长度。</translation>
     </message>
@@ -3077,6 +4340,10 @@
     <message>
         <source>All views are from one distance. Hold the board nearer, too.</source>
         <translation>所有视图的距离都相同。请也把标定板拿近一些拍摄。</translation>
+    </message>
+    <message>
+        <source>An archive on a server needs the package psycopg, which is not installed. Install it with: pip install &quot;lightpen[postgres]&quot;.</source>
+        <translation>服务器上的档案库需要软件包 psycopg，但尚未安装。请用以下命令安装：pip install &quot;lightpen[postgres]&quot;。</translation>
     </message>
     <message>
         <source>Another program is writing to the swing in {folder}. Go on with it there, or close that program and try again.</source>
@@ -3151,8 +4418,40 @@
         <translation>发光面直径：{flaw}</translation>
     </message>
     <message>
+        <source>Enter the name of the supervisor.</source>
+        <translation>请输入主管的姓名。</translation>
+    </message>
+    <message>
+        <source>Entries {first} to {last} of the chain {chain} are missing.</source>
+        <translation>链 {chain} 的第 {first} 至第 {last} 条记录缺失。</translation>
+    </message>
+    <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of station {station} is not the one that follows here. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
+        <translation>工位 {station} 的第 {number} 条记录与此处应接续的记录不符。可能是数据文件夹被复制后两份都在继续使用，或记录被改动过。请检查两边的档案库。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of the archive {archive} is damaged. Restore the archive from a copy.</source>
+        <translation>档案库 {archive} 的第 {number} 条记录已损坏。请从备份恢复档案库。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of the chain {chain} does not follow the one before it: one of the two was replaced.</source>
+        <translation>链 {chain} 的第 {number} 条记录与前一条不衔接：两者之一被替换过。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of the chain {chain} is missing.</source>
+        <translation>链 {chain} 的第 {number} 条记录缺失。</translation>
+    </message>
+    <message>
+        <source>Entry {number} of the chain {chain} was changed.</source>
+        <translation>链 {chain} 的第 {number} 条记录被改动过。</translation>
+    </message>
+    <message>
+        <source>Entry {number} put no tip in force. Choose one that did.</source>
+        <translation>条目 {number} 未使任何测头数据生效。请选择使测头数据生效的条目。</translation>
     </message>
     <message>
         <source>Frame {number} of the video</source>
@@ -3475,6 +4774,10 @@
         <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
     </message>
     <message>
+        <source>No tip is in force for tip {tip} of pen {pen}. Calibrate it and accept the result; then it can be verified.</source>
+        <translation>光笔 {pen} 的测头 {tip} 没有有效的结果。请先标定并接受结果，然后才能验证。</translation>
+    </message>
+    <message>
         <source>No view reaches these corners of the image: {corners}.</source>
         <translation>没有视图覆盖图像的这些角：{corners}。</translation>
     </message>
@@ -3489,6 +4792,10 @@
     <message>
         <source>None of the {n_images} images shows the board {board}. The whole board must be in the image, sharp, with a bright rim round it; check its kind and count.</source>
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
+    </message>
+    <message>
+        <source>Nothing is chosen to be touched. Choose the fixed point, the ring or the length.</source>
+        <translation>没有选择要接触的内容。请选择固定点、圆环或长度。</translation>
     </message>
     <message>
         <source>Odd and even images put the tip {difference:.4f} mm apart, {usual:.4f} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
@@ -3595,8 +4902,32 @@
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
     </message>
     <message>
+        <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database.</source>
+        <translation>无法识别档案库服务器的地址。其格式为 postgresql://user:password@host/database。</translation>
+    </message>
+    <message>
         <source>The adjustment did not settle in {n_steps} steps. The views may be too alike, or of another board than was said: check both.</source>
         <translation>平差在 {n_steps} 步内未收敛。视图可能过于相似，或标定板与所指定的不符：请检查这两点。</translation>
+    </message>
+    <message>
+        <source>The archive cannot be exported to {file}: {reason}. Free some space, or choose another folder.</source>
+        <translation>无法将档案库导出到 {file}：{reason}。请释放一些空间，或选择其他文件夹。</translation>
+    </message>
+    <message>
+        <source>The archive does not tell enough of entry {number} to put its tip in force: its record is missing, or of an early version of the program. Calibrate the tip again.</source>
+        <translation>档案库中条目 {number} 的内容不足以使其测头数据生效：其记录缺失，或来自程序的早期版本。请重新标定该测头。</translation>
+    </message>
+    <message>
+        <source>The archive is closed: the program ends.</source>
+        <translation>档案库已关闭：程序正在结束。</translation>
+    </message>
+    <message>
+        <source>The archive {name} cannot be used: {reason}. See that its disk is not full and yours to write, or that its server runs and knows the user and the password.</source>
+        <translation>无法使用档案库 {name}：{reason}。请确认磁盘未满且您有写入权限，或其服务器正在运行且用户名和密码正确。</translation>
+    </message>
+    <message>
+        <source>The archive {name} was written by a later version of the program, and stays as it is. Use that version.</source>
+        <translation>档案库 {name} 由更新版本的程序写入，现保持原样。请使用该版本。</translation>
     </message>
     <message>
         <source>The board faces fewer than {least} times {sides}.</source>
@@ -3647,12 +4978,20 @@
         <translation>相机在摆动过程中移动了：视野中的固定灯移动了 {shift:.2f} px，光笔也随之移动。此移动已被扣除。请固定相机，并让其充分预热。</translation>
     </message>
     <message>
+        <source>The camera moved: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much.</source>
+        <translation>相机移动了：视野中的固定灯在光笔处移动 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。接触的结果也有同样大的偏差。</translation>
+    </message>
+    <message>
         <source>The camera sends no images in the pixel format {wanted} that can be used; it offers {offered}. Choose Mono8, or another of Mono8 to Mono16.</source>
         <translation>相机不能以像素格式 {wanted} 送来可用的图像；它提供 {offered}。请选择 Mono8，或 Mono8 到 Mono16 中的另一种。</translation>
     </message>
     <message>
         <source>The camera sends {sent:.1f} images a second, not the {wanted:.1f} that are set: its link or its exposure allows no more. Lower the frame rate, or take a smaller region or a shorter exposure.</source>
         <translation>相机每秒送来 {sent:.1f} 幅图像，而不是设定的 {wanted:.1f} 幅：其链路或曝光不允许更多。请降低帧率，或使用更小的区域或更短的曝光。</translation>
+    </message>
+    <message>
+        <source>The camera stands still: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
+        <translation>相机保持不动：视野中的固定灯在光笔处移动 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
     <message>
         <source>The camera was calibrated at {stated:.1f} degrees Celsius, the station is at {used:.1f}. Check it by a swing, or calibrate it again at this temperature.</source>
@@ -3683,6 +5022,14 @@
         <translation>相机 {serial} 已有 {waited:.1f} s 没有送来图像。请检查线缆和触发。</translation>
     </message>
     <message>
+        <source>The cameras are not synchronised: they take their images {lag:.1f} ms apart. At 100 mm/s the pen moves {way:.2f} mm meanwhile, {px:.1f} px in the image. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：曝光时刻相差 {lag:.1f} ms。光笔以 100 mm/s 运动时，其间移动 {way:.2f} mm，在图像中为 {px:.1f} px。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
+        <source>The cameras are not synchronised: they take their images {lag:.1f} ms apart. At 100 mm/s the pen moves {way:.2f} mm meanwhile. Trigger both cameras by one signal.</source>
+        <translation>两台相机不同步：曝光时刻相差 {lag:.1f} ms。光笔以 100 mm/s 运动时，其间移动 {way:.2f} mm。请用同一信号触发两台相机。</translation>
+    </message>
+    <message>
         <source>The cameras are not synchronised: {camera} is out of step by {lag:.1f} ± {u:.1f} ms, which costs {px:.2f} px at a pen&apos;s speed of 100 mm/s. Trigger both cameras by one signal.</source>
         <translation>两台相机不同步：{camera} 相差 {lag:.1f} ± {u:.1f} ms，光笔以 100 mm/s 移动时相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
@@ -3691,8 +5038,20 @@
         <translation>两台相机不同步：{camera} 相差两幅视图间隔的 {lag:.2f} ± {u:.2f} 倍。光笔以 100 mm/s 移动时，每毫秒相当于 {px:.2f} px。请用同一信号触发两台相机。</translation>
     </message>
     <message>
+        <source>The chain {chain} does not end with the entry that was entered last.</source>
+        <translation>链 {chain} 的末尾不是最后登记的那条记录。</translation>
+    </message>
+    <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
         <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm。请将两者夹紧，待相机预热后重做。该影响已计入不确定度。</translation>
+    </message>
+    <message>
+        <source>The diameter of the ball is not known, which a ring touched in its bore or from outside needs. Enter it where the tip is named.</source>
+        <translation>测球直径未知，而在孔内或外圆接触圆环时需要它。请在填写测头名称处输入。</translation>
+    </message>
+    <message>
+        <source>The difference from the tip that was in force before is accepted up to {gate:g} times U (k = 2) of the difference along each axis, with which an unchanged tip is accepted in 95 % of all cases; beyond it, or where that tip cannot be read, is CHECK. A CHECK is put in force only with a reason, a REPEAT not at all.</source>
+        <translation>与此前生效的测头之差，各轴均不超过该差值 U (k = 2) 的 {gate:g} 倍时予以接受；测头未变时，按此准则接受的概率为 95 %。超出此值，或无法读取此前的测头时，判为“需检查”。判为“需检查”的测头须注明理由才能生效，判为“重做”的不得生效。</translation>
     </message>
     <message>
         <source>The distortion coefficients of {name} fold the image of {width} x {height} px: some pixels have no direction of view, or two. Check them, or calibrate the camera again with views that reach into the corners.</source>
@@ -3707,12 +5066,36 @@
         <translation>文件有 {n_leds} 个 LED。</translation>
     </message>
     <message>
+        <source>The file of the result of tip {tip}, pen {pen}, is not in {folder} any more. Restore it from a copy.</source>
+        <translation>测头 {tip}（光笔 {pen}）的结果文件已不在 {folder} 中。请从备份恢复。</translation>
+    </message>
+    <message>
+        <source>The file {file} is damaged: {what}.</source>
+        <translation>文件 {file} 已损坏：{what}。</translation>
+    </message>
+    <message>
+        <source>The file {file} of entry {number} is missing.</source>
+        <translation>第 {number} 条记录的文件 {file} 缺失。</translation>
+    </message>
+    <message>
+        <source>The file {file} of entry {number} is not as it was entered.</source>
+        <translation>第 {number} 条记录的文件 {file} 与登记时不符。</translation>
+    </message>
+    <message>
+        <source>The file {file} was changed since it was closed.</source>
+        <translation>文件 {file} 在关闭之后被改动过。</translation>
+    </message>
+    <message>
         <source>The file {path} cannot be read: {reason}. Check the name and that it is yours to read.</source>
         <translation>文件 {path} 无法读取：{reason}。请检查名称和读取权限。</translation>
     </message>
     <message>
         <source>The first camera of {name}, {camera}, is the reference of the rig: its cam_from_rig must be the identity. List the reference camera first, and give the others from its frame.</source>
         <translation>{name} 中的第一台相机 {camera} 是相机组的基准：其 cam_from_rig 必须是单位变换。请把基准相机列在第一位，其余相机均相对于它的坐标系给出。</translation>
+    </message>
+    <message>
+        <source>The fixed point is done: this touch of the cone does not count. Touch the ring.</source>
+        <translation>固定点已完成：这次对锥孔的接触不计入。请接触圆环。</translation>
     </message>
     <message>
         <source>The folder {folder} cannot be made or read: {reason}. Choose another folder.</source>
@@ -3803,6 +5186,10 @@
         <translation>{run} 处的长度偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这是该标准杆的检定长度吗？否则是 LED 文件的尺度或内参文件有误，或光笔比测量 LED 时更热。</translation>
     </message>
     <message>
+        <source>The length is not known. Enter the certified one.</source>
+        <translation>长度未知。请输入证书长度。</translation>
+    </message>
+    <message>
         <source>The length is off by {error:+.4f} mm at most (U {uncertainty:.4f} mm, limit {limit:.4f} mm).</source>
         <translation>长度最大偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。</translation>
     </message>
@@ -3813,6 +5200,10 @@
     <message>
         <source>The lens distortion of the camera file cannot be undone for some image points: its coefficients fold the image. Check the distortion coefficients, or calibrate the camera again.</source>
         <translation>内参文件的镜头畸变在某些像点无法消除：其系数使图像折叠。请检查畸变系数，或重新标定相机。</translation>
+    </message>
+    <message>
+        <source>The limits in {file} are not as they were laid down: they were changed or damaged since. Restore the file from a copy.</source>
+        <translation>{file} 中的限值与当初规定的不同：此后被改动或损坏。请从副本恢复该文件。</translation>
     </message>
     <message>
         <source>The line, the plane and the columns are not parallel, or too close.</source>
@@ -3831,6 +5222,10 @@
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
     <message>
+        <source>The password has {length} characters, at least {needed} are needed.</source>
+        <translation>密码有 {length} 个字符，至少需要 {needed} 个。</translation>
+    </message>
+    <message>
         <source>The path of the video {path} is no valid UTF-8, which the video decoder needs. Rename the video or its folder, or copy it elsewhere.</source>
         <translation>视频路径 {path} 不是有效的 UTF-8，视频解码器无法使用。请重命名视频或其文件夹，或将其复制到别处。</translation>
     </message>
@@ -3845,6 +5240,10 @@
     <message>
         <source>The pen was held alike each time: its postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed to prove a tip. Lean it to all sides.</source>
         <translation>光笔每次的握持姿态相同：各姿态仅相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜。</translation>
+    </message>
+    <message>
+        <source>The pen was lifted or moved before the touch was taken, so it does not count. Hold it still until it is.</source>
+        <translation>接触取得之前光笔被抬起或移动，因此不计入。请握住不动直到取得。</translation>
     </message>
     <message>
         <source>The pen was swung about one axis only, {axis}: that axis itself turned by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the tip&apos;s place along it is not fixed. {advice}</source>
@@ -3895,6 +5294,10 @@
         <translation>程序自身出错，不再查看图像。请重新打开相机。</translation>
     </message>
     <message>
+        <source>The program made a mistake of its own, and the verification is paused. What was found so far is kept; go on, or start it over.</source>
+        <translation>程序自身出错，验证已暂停。已得到的结果保留；请继续，或重新开始。</translation>
+    </message>
+    <message>
         <source>The program made a mistake of its own. The images kept so far are safe; go on, or start the program again.</source>
         <translation>程序自身出错。已保留的图像是安全的；请继续，或重新启动程序。</translation>
     </message>
@@ -3907,24 +5310,60 @@
         <translation>半径偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。测头、LED 文件或内参文件可能有误，或未补偿测球半径。</translation>
     </message>
     <message>
+        <source>The radius of the ring is not known. Enter the certified one.</source>
+        <translation>圆环半径未知。请输入证书半径。</translation>
+    </message>
+    <message>
+        <source>The record of entry {number} of station {station} is missing or was changed. Get the entries from their station again.</source>
+        <translation>工位 {station} 第 {number} 条记录的标定数据缺失或被改动过。请从该工位重新获取这些记录。</translation>
+    </message>
+    <message>
+        <source>The record of {entry} is missing.</source>
+        <translation>{entry}的标定数据缺失。</translation>
+    </message>
+    <message>
         <source>The record {name} holds no images. Resume the swing, or begin a new one.</source>
         <translation>记录 {name} 中没有图像。请继续该摆动，或开始新的摆动。</translation>
+    </message>
+    <message>
+        <source>The record {record} of {entries} was changed in the archive.</source>
+        <translation>{entries}的标定数据 {record} 在档案库中被改动过。</translation>
     </message>
     <message>
         <source>The recorded images are {found}, not {wanted}. Choose {found}.</source>
         <translation>录制的图像为 {found}，而不是 {wanted}。请选择 {found}。</translation>
     </message>
     <message>
+        <source>The recording of the second camera holds another number of images than that of the first. Choose two recordings of the same moments.</source>
+        <translation>第二台相机的录像与第一台的图像数量不同。请选择同一时刻的两组录像。</translation>
+    </message>
+    <message>
         <source>The residuals are large: {sigma:.2f} px, {usual} px or less is usual. Check that the camera file is of this camera, lens and focus, and the pen file of this pen.</source>
         <translation>残差过大：{sigma:.2f} px，通常不超过 {usual} px。请检查内参文件是否属于此相机、镜头和对焦，LED 文件是否属于此光笔。</translation>
+    </message>
+    <message>
+        <source>The result {file} is not the one that was entered in the archive: it was changed since. Restore it from a copy.</source>
+        <translation>结果 {file} 与档案中登记的不一致：登记之后被更改过。请从备份恢复。</translation>
     </message>
     <message>
         <source>The rig file has camera {camera} {angle:.1f} degrees and {distance:.0f} mm away from where the images put it.</source>
         <translation>相机组文件中相机 {camera} 的位置与图像所示相差 {angle:.1f} 度和 {distance:.0f} mm。</translation>
     </message>
     <message>
+        <source>The seal {file} of the archive was changed or damaged.</source>
+        <translation>档案库的封印文件 {file} 被改动过或已损坏。</translation>
+    </message>
+    <message>
+        <source>The supervisor&apos;s password is another one. Type it again.</source>
+        <translation>主管密码不符。请重新输入。</translation>
+    </message>
+    <message>
         <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
         <translation>校准结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
+    </message>
+    <message>
+        <source>The swing {folder} of entry {number} is missing.</source>
+        <translation>第 {number} 条记录的摆动 {folder} 缺失。</translation>
     </message>
     <message>
         <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
@@ -3939,12 +5378,20 @@
         <translation>无法与已生效的测头比较。{why}</translation>
     </message>
     <message>
+        <source>The tip did not keep the limits. {why} Only a supervisor can accept it, with a reason.</source>
+        <translation>测头未满足限值。{why}只有主管说明理由后才能接受。</translation>
+    </message>
+    <message>
         <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
         <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
     <message>
         <source>The tip is being computed. Keep the pen at hand.</source>
         <translation>正在计算测头。请把光笔放在手边。</translation>
+    </message>
+    <message>
+        <source>The tip is beyond the limit of this station. {why} Only a supervisor can accept it, with a reason.</source>
+        <translation>测头超出本工位的限值。{why}只有主管说明理由后才能接受。</translation>
     </message>
     <message>
         <source>The tip is to be checked. {why} Accept it with a reason, or not at all.</source>
@@ -3995,6 +5442,10 @@
         <translation>{run} 的触测点最多偏离平面圆 {form:.4f} mm（限值 {limit:.4f} mm）：测头滑动，环不清洁，或测头有误。</translation>
     </message>
     <message>
+        <source>The two touches lie {distance:.2f} mm apart, {certified} mm is certified: they are not of its two ends. Touch the end opposite to the last touch.</source>
+        <translation>两次接触相距 {distance:.2f} mm，证书长度为 {certified} mm：它们不是该长度的两端。请接触与上一次接触相对的一端。</translation>
+    </message>
+    <message>
         <source>The verification is done. Put the pen down.</source>
         <translation>验证已完成。可以放下光笔。</translation>
     </message>
@@ -4027,6 +5478,10 @@
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
     <message>
+        <source>There are entries of the chain {chain}, which the archive does not know.</source>
+        <translation>存在链 {chain} 的记录，但档案库中没有这条链。</translation>
+    </message>
+    <message>
         <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
         <translation>{few} 有 {n_few} 幅图像，{many} 有 {n_many} 幅，而它们的名称（例如 {example} 和 {other}）不能表明哪些属于同一时刻。请让同一时刻的图像具有相同的名称或编号。</translation>
     </message>
@@ -4035,8 +5490,32 @@
         <translation>共有 {n_postures} 个姿态，需要 {needed} 个：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
+        <source>There is a file {file} already. Give the export another name.</source>
+        <translation>文件 {file} 已存在。请为导出文件另取名称。</translation>
+    </message>
+    <message>
+        <source>There is no archive {file}. Check the data folder.</source>
+        <translation>档案库 {file} 不存在。请检查数据文件夹。</translation>
+    </message>
+    <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
         <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
+    </message>
+    <message>
+        <source>There is no supervisor&apos;s password yet. Lay one down with the limits.</source>
+        <translation>尚无主管密码。请与限值一起规定。</translation>
+    </message>
+    <message>
+        <source>This end was touched before. Touch the other one.</source>
+        <translation>这一端已接触过。请接触另一端。</translation>
+    </message>
+    <message>
+        <source>This place of the ring was touched before. Touch it where it was not.</source>
+        <translation>圆环的这一处已接触过。请接触未接触过的地方。</translation>
+    </message>
+    <message>
+        <source>This posture was taken before. Leave the tip in the cone and lean the pen another way.</source>
+        <translation>这一姿态已取得。请把测头留在锥孔里，让光笔倒向另一个方向。</translation>
     </message>
     <message>
         <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
@@ -4051,6 +5530,10 @@
         <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
     </message>
     <message>
+        <source>Two cameras look at the pen, and a tip is verified by one. Choose a single camera with its intrinsics file.</source>
+        <translation>有两台相机看着光笔，而测头由一台相机验证。请选择单台相机及其内参文件。</translation>
+    </message>
+    <message>
         <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
         <translation>使用此 LED 文件，U (k = 2) 无法低于 {floor:.1f} µm；限值为 {limit:.1f} µm。除各姿态所需的图像外，不再要求更多图像。</translation>
     </message>
@@ -4063,8 +5546,16 @@
         <translation>半径的 U (k = 2) 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：不足以验证测头。</translation>
     </message>
     <message>
+        <source>U (k = 2) of the tip along its weakest direction is compared with the limit of {limit:.4f} mm by simple acceptance (ILAC-G8:09/2019, 4.2.1; JCGM 106:2012, 8.2): what is judged is U itself, so the guard band is zero. U up to the limit is PASS, above it CHECK, above {far:.4f} mm, {times:g} times the limit, REPEAT.</source>
+        <translation>测头沿最弱方向的 U (k = 2) 按简单接受准则（ILAC-G8:09/2019 第 4.2.1 条；JCGM 106:2012 第 8.2 条）与限值 {limit:.4f} mm 比较：被判定的量就是 U 本身，故保护带为零。U 不超过限值判为“合格”，超过限值判为“需检查”，超过 {far:.4f} mm（限值的 {times:g} 倍）判为“重做”。</translation>
+    </message>
+    <message>
         <source>Webcam, to try it</source>
         <translation>网络摄像头（试用）</translation>
+    </message>
+    <message>
+        <source>What would pass is CHECK nevertheless if odd and even images put the tip apart by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED stands out by more than {displaced:g} mm, if one of several cameras is out of step, if more than {dropped:.0f} % of the images take no part, if there are fewer than {n_images} images, or none on one of the eight sides.</source>
+        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥座与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；未参与计算的图像超过 {dropped:.0f} %；图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
     </message>
     <message>
         <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
@@ -4103,6 +5594,22 @@
         <translation>向下</translation>
     </message>
     <message>
+        <source>entry {number} of the chain {chain}</source>
+        <translation>链 {chain} 的第 {number} 条记录</translation>
+    </message>
+    <message>
+        <source>exported archive</source>
+        <translation>导出的档案库</translation>
+    </message>
+    <message>
+        <source>file</source>
+        <translation>文件</translation>
+    </message>
+    <message>
+        <source>file of limits</source>
+        <translation>限值文件</translation>
+    </message>
+    <message>
         <source>further turn of cam_from_rig about {axis}</source>
         <translation>cam_from_rig 绕 {axis} 轴的附加转角</translation>
     </message>
@@ -4121,6 +5628,10 @@
     <message>
         <source>micrometres</source>
         <translation>微米</translation>
+    </message>
+    <message>
+        <source>no entry</source>
+        <translation>无对应记录</translation>
     </message>
     <message>
         <source>no image</source>
@@ -4147,6 +5658,10 @@
         <translation>LED 坐标的比例</translation>
     </message>
     <message>
+        <source>seal</source>
+        <translation>封印文件</translation>
+    </message>
+    <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
         <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
@@ -4163,12 +5678,28 @@
         <translation>向上</translation>
     </message>
     <message>
+        <source>{file} is no exported archive, or not as it was exported: line {line}. Export it again, with this version of the program.</source>
+        <translation>{file} 不是导出的档案库，或与导出时不符：第 {line} 行。请用此版本的程序重新导出。</translation>
+    </message>
+    <message>
         <source>{name} has the calibration_temperature {celsius:g}; degrees Celsius from {coldest:g} to {warmest:g} are needed. Correct or remove it.</source>
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
     <message>
         <source>{name} has {width} x {height} px, {first} has {first_width} x {first_height} px. Give images of one camera, with one region and binning.</source>
         <translation>{name} 为 {width} x {height} px，{first} 为 {first_width} x {first_height} px。请提供同一相机、相同区域和像素合并设置的图像。</translation>
+    </message>
+    <message>
+        <source>{name} holds the tables of another program, and stays as it is. Give the archive a database of its own.</source>
+        <translation>{name} 中有其他程序的表，现保持原样。请为档案库使用单独的数据库。</translation>
+    </message>
+    <message>
+        <source>{name} is of {n_cameras} cameras, and {n_files} files of cameras are beside it. Restore it from a copy.</source>
+        <translation>{name} 对应 {n_cameras} 台相机，而与之相配的相机文件有 {n_files} 个。请从备份恢复该文件。</translation>
+    </message>
+    <message>
+        <source>{path} does not hold all that is put on paper: it is no calibration, or one by an earlier version of the program. Give an accepted result or what the command calibrate wrote, or calibrate again from the images.</source>
+        <translation>{path} 不包含纸质记录所需的全部内容：它不是标定结果，或由程序的早期版本生成。请给出已接受的结果或 calibrate 命令写出的文件，或用图像重新标定。</translation>
     </message>
     <message>
         <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
@@ -5111,6 +6642,10 @@
         <translation>无法写入 {path}：{reason}。请清理空间或选择其他文件夹；已记录的图像是安全的。</translation>
     </message>
     <message>
+        <source>{path} does not hold all that the tip was computed from: it is of an earlier version of the program, or was changed. Calibrate from the images.</source>
+        <translation>{path} 未包含计算测头所用的全部数据：它来自较早版本的程序，或被改动过。请用图像标定。</translation>
+    </message>
+    <message>
         <source>{path} is damaged. Restore it from a copy.</source>
         <translation>{path} 已损坏。请用备份恢复。</translation>
     </message>
@@ -5121,6 +6656,10 @@
     <message>
         <source>{path} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
+    </message>
+    <message>
+        <source>{path} is of several cameras or two cones; only the record of one camera and one cone is enough by itself. Calibrate from the images.</source>
+        <translation>{path} 来自多台相机或两个锥孔；只有单相机、单锥孔的标定数据本身才足以重新计算。请用图像标定。</translation>
     </message>
     <message>
         <source>{path} is of several cameras; only calibrations of a single camera are solved again. Leave it out.</source>
@@ -5225,6 +6764,572 @@
     <message>
         <source>{width} x {height} px</source>
         <translation>{width} × {height} px</translation>
+    </message>
+</context>
+<context>
+    <name>history</name>
+    <message>
+        <source>Calibration</source>
+        <translation>标定</translation>
+    </message>
+    <message>
+        <source>Restored</source>
+        <translation>重新生效</translation>
+    </message>
+    <message>
+        <source>Refused</source>
+        <translation>已拒绝</translation>
+    </message>
+    <message>
+        <source>Set aside</source>
+        <translation>已放弃</translation>
+    </message>
+    <message>
+        <source>Taking back</source>
+        <translation>撤回</translation>
+    </message>
+    <message>
+        <source>Note</source>
+        <translation>备注</translation>
+    </message>
+    <message>
+        <source>in force</source>
+        <translation>有效</translation>
+    </message>
+    <message>
+        <source>replaced</source>
+        <translation>已被取代</translation>
+    </message>
+    <message>
+        <source>taken back</source>
+        <translation>已撤回</translation>
+    </message>
+    <message>
+        <source>Changed since it was entered</source>
+        <translation>录入后被更改</translation>
+    </message>
+    <message>
+        <source>practice</source>
+        <translation>练习</translation>
+    </message>
+</context>
+<context>
+    <name>paper</name>
+    <message>
+        <source>Misfit of each image / px</source>
+        <translation>各图像的拟合偏差 / px</translation>
+    </message>
+    <message>
+        <source>rms</source>
+        <translation>均方根</translation>
+    </message>
+    <message>
+        <source>mean x</source>
+        <translation>x 均值</translation>
+    </message>
+    <message>
+        <source>mean y</source>
+        <translation>y 均值</translation>
+    </message>
+    <message>
+        <source>Residuals by LED / px</source>
+        <translation>各 LED 的残差 / px</translation>
+    </message>
+    <message>
+        <source>LED</source>
+        <translation>LED</translation>
+    </message>
+    <message>
+        <source>all</source>
+        <translation>合成</translation>
+    </message>
+    <message>
+        <source>Parts of U (k = 2) / µm</source>
+        <translation>U (k = 2) 的各分量 / µm</translation>
+    </message>
+    <message>
+        <source>Tip of each image from the cone / µm</source>
+        <translation>单幅图像测头相对锥孔的偏差 / µm</translation>
+    </message>
+    <message>
+        <source>Tip by the images so far, from the result / µm</source>
+        <translation>由前 n 幅图像求得的测头与结果之差 / µm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) by the images so far / µm</source>
+        <translation>由前 n 幅图像得到的 U (k = 2) / µm</translation>
+    </message>
+    <message>
+        <source>Residuals over the image × {0}</source>
+        <translation>图像上的残差 × {0}</translation>
+    </message>
+    <message>
+        <source>residual / px</source>
+        <translation>残差 / px</translation>
+    </message>
+    <message>
+        <source>Residuals beside the normal curve</source>
+        <translation>残差分布与正态曲线</translation>
+    </message>
+    <message>
+        <source>Postures: tilt / °</source>
+        <translation>姿态：倾角 / °</translation>
+    </message>
+    <message>
+        <source>Images in each field</source>
+        <translation>各区域的图像数</translation>
+    </message>
+    <message>
+        <source>towards the camera</source>
+        <translation>朝向相机</translation>
+    </message>
+    <message>
+        <source>image</source>
+        <translation>图像</translation>
+    </message>
+    <message>
+        <source>Page {0} of {1}</source>
+        <translation>第 {0} 页，共 {1} 页</translation>
+    </message>
+    <message>
+        <source>Pen {0}, tip {1}, cone {2}</source>
+        <translation>光笔 {0}，测头 {1}，锥孔 {2}</translation>
+    </message>
+    <message>
+        <source>SHA-256 of the JSON file: {0}</source>
+        <translation>JSON 文件的 SHA-256：{0}</translation>
+    </message>
+    <message>
+        <source>No. {0}</source>
+        <translation>编号 {0}</translation>
+    </message>
+    <message>
+        <source>NOT ACCEPTED</source>
+        <translation>未接受</translation>
+    </message>
+    <message>
+        <source>Calibration record</source>
+        <translation>标定记录</translation>
+    </message>
+    <message>
+        <source>Centre of the probe tip of a light pen, by images</source>
+        <translation>光笔测头中心的图像标定</translation>
+    </message>
+    <message>
+        <source>This tip was not accepted.</source>
+        <translation>该测头未被接受。</translation>
+    </message>
+    <message>
+        <source>The tip was accepted.</source>
+        <translation>该测头已被接受。</translation>
+    </message>
+    <message>
+        <source>The tip was accepted with the reason: {0}</source>
+        <translation>该测头已被接受，理由：{0}</translation>
+    </message>
+    <message>
+        <source>What was calibrated</source>
+        <translation>标定对象</translation>
+    </message>
+    <message>
+        <source>Pen, serial number</source>
+        <translation>光笔序列号</translation>
+    </message>
+    <message>
+        <source>Station</source>
+        <translation>工位</translation>
+    </message>
+    <message>
+        <source>Probe tip</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>Operator</source>
+        <translation>操作员</translation>
+    </message>
+    <message>
+        <source>Ball diameter</source>
+        <translation>测球直径</translation>
+    </message>
+    <message>
+        <source>Computed</source>
+        <translation>计算时间</translation>
+    </message>
+    <message>
+        <source>Cone</source>
+        <translation>锥孔</translation>
+    </message>
+    <message>
+        <source>Accepted</source>
+        <translation>接受时间</translation>
+    </message>
+    <message>
+        <source>no</source>
+        <translation>未接受</translation>
+    </message>
+    <message>
+        <source>Images are</source>
+        <translation>图像来源</translation>
+    </message>
+    <message>
+        <source>Temperature of the pen</source>
+        <translation>光笔温度</translation>
+    </message>
+    <message>
+        <source>not measured</source>
+        <translation>未测量</translation>
+    </message>
+    <message>
+        <source>Method</source>
+        <translation>方法</translation>
+    </message>
+    <message>
+        <source>Program</source>
+        <translation>程序</translation>
+    </message>
+    <message>
+        <source>Tip / mm</source>
+        <translation>测头 / mm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) / mm</source>
+        <translation>U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Nominal tip / mm</source>
+        <translation>标称测头 / mm</translation>
+    </message>
+    <message>
+        <source>Tip minus nominal / mm</source>
+        <translation>测头与标称之差 / mm</translation>
+    </message>
+    <message>
+        <source>Change since {0} / mm</source>
+        <translation>自 {0} 以来的变化 / mm</translation>
+    </message>
+    <message>
+        <source>its U (k = 2) / mm</source>
+        <translation>其 U (k = 2) / mm</translation>
+    </message>
+    <message>
+        <source>Result</source>
+        <translation>结果</translation>
+    </message>
+    <message>
+        <source>In the frame of the pen</source>
+        <translation>光笔坐标系</translation>
+    </message>
+    <message>
+        <source>In the frame of the camera</source>
+        <translation>相机坐标系</translation>
+    </message>
+    <message>
+        <source>Cone / mm</source>
+        <translation>锥孔 / mm</translation>
+    </message>
+    <message>
+        <source>Covariance of the tip / µm²</source>
+        <translation>测头的协方差 / µm²</translation>
+    </message>
+    <message>
+        <source>The tip is known least along ({0}) of the pen, where U (k = 2) is {1} mm. U is the standard uncertainty times k = 2, which for a normal distribution covers some 95 %, by JCGM 100:2008 (GUM).</source>
+        <translation>测头沿光笔坐标系的 ({0}) 方向不确定度最大，该方向的 U (k = 2) 为 {1} mm。U 为标准不确定度乘以包含因子 k = 2，对正态分布其包含概率约为 95 %，依据 JCGM 100:2008 (GUM)。</translation>
+    </message>
+    <message>
+        <source>No earlier tip was in force to compare with.</source>
+        <translation>此前没有生效的测头可供比较。</translation>
+    </message>
+    <message>
+        <source>To look into</source>
+        <translation>需要查看</translation>
+    </message>
+    <message>
+        <source>Odd minus even images / mm</source>
+        <translation>奇数图像减偶数图像 / mm</translation>
+    </message>
+    <message>
+        <source>Decision rule</source>
+        <translation>判定规则</translation>
+    </message>
+    <message>
+        <source>No conformity of the tip with a specification is stated. The rule is that of the program which made this paper; the verdict is that of the file.</source>
+        <translation>本记录不对测头是否符合规范作出声明。判定规则取自生成本文件的程序，判定结果取自 JSON 文件。</translation>
+    </message>
+    <message>
+        <source>assumed</source>
+        <translation>假定</translation>
+    </message>
+    <message>
+        <source>Combined standard uncertainty</source>
+        <translation>合成标准不确定度</translation>
+    </message>
+    <message>
+        <source>Expanded uncertainty U (k = 2)</source>
+        <translation>扩展不确定度 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Budget of uncertainty</source>
+        <translation>不确定度评定</translation>
+    </message>
+    <message>
+        <source>Standard uncertainty (k = 1) / µm</source>
+        <translation>标准不确定度 (k = 1) / µm</translation>
+    </message>
+    <message>
+        <source>U (k = 2), weakest direction</source>
+        <translation>U (k = 2)，最弱方向</translation>
+    </message>
+    <message>
+        <source>The parts add up in squares. Assumed is what no file states; the station or the program stands for it.</source>
+        <translation>各分量按平方和合成。“假定”指文件中未给出、由工位设置或程序取定的量。</translation>
+    </message>
+    <message>
+        <source>Images hang together: their noise counts {0} times (variance).</source>
+        <translation>图像之间相关：其噪声按 {0} 倍计入（方差）。</translation>
+    </message>
+    <message>
+        <source>Images</source>
+        <translation>图像</translation>
+    </message>
+    <message>
+        <source>Used</source>
+        <translation>使用</translation>
+    </message>
+    <message>
+        <source>{0} of {1}</source>
+        <translation>{0} / {1}</translation>
+    </message>
+    <message>
+        <source>Tilt of the pen</source>
+        <translation>光笔倾角</translation>
+    </message>
+    <message>
+        <source>{0} to {1}°</source>
+        <translation>{0} 至 {1}°</translation>
+    </message>
+    <message>
+        <source>Left out</source>
+        <translation>未用</translation>
+    </message>
+    <message>
+        <source>Turn about its axis</source>
+        <translation>绕自身轴转角</translation>
+    </message>
+    <message>
+        <source>Residuals, rms</source>
+        <translation>残差，均方根</translation>
+    </message>
+    <message>
+        <source>Noise of a centre</source>
+        <translation>中心噪声</translation>
+    </message>
+    <message>
+        <source>Residuals, largest image</source>
+        <translation>残差，最大的图像</translation>
+    </message>
+    <message>
+        <source>Tip of single images, rms</source>
+        <translation>单幅图像测头，均方根</translation>
+    </message>
+    <message>
+        <source>The tip image by image is drawn of one camera and one cone only, and of files that hold what it takes.</source>
+        <translation>仅对单相机、单锥孔且内容齐全的文件绘制测头随图像的变化。</translation>
+    </message>
+    <message>
+        <source>The curves are by the poses of single images, the result by the adjustment of all images together.</source>
+        <translation>曲线由各单幅图像的位姿求得，结果由全部图像整体平差求得。</translation>
+    </message>
+    <message>
+        <source>Images left out</source>
+        <translation>未用的图像</translation>
+    </message>
+    <message>
+        <source>Image</source>
+        <translation>图像</translation>
+    </message>
+    <message>
+        <source>File</source>
+        <translation>文件</translation>
+    </message>
+    <message>
+        <source>Why left out</source>
+        <translation>未用原因</translation>
+    </message>
+    <message>
+        <source>And {0} more, which the JSON file names.</source>
+        <translation>另有 {0} 幅，见 JSON 文件。</translation>
+    </message>
+    <message>
+        <source>LEDs and camera</source>
+        <translation>LED 与相机</translation>
+    </message>
+    <message>
+        <source>stands out</source>
+        <translation>明显偏离</translation>
+    </message>
+    <message>
+        <source>Seen</source>
+        <translation>可见</translation>
+    </message>
+    <message>
+        <source>rms / px</source>
+        <translation>均方根 / px</translation>
+    </message>
+    <message>
+        <source>mean x / px</source>
+        <translation>x 均值 / px</translation>
+    </message>
+    <message>
+        <source>mean y / px</source>
+        <translation>y 均值 / px</translation>
+    </message>
+    <message>
+        <source>off its place / µm</source>
+        <translation>偏离位置 / µm</translation>
+    </message>
+    <message>
+        <source>Camera as the images have it</source>
+        <translation>由图像求得的相机参数</translation>
+    </message>
+    <message>
+        <source>Parameter</source>
+        <translation>参数</translation>
+    </message>
+    <message>
+        <source>Value</source>
+        <translation>数值</translation>
+    </message>
+    <message>
+        <source>Standard uncertainty (k = 1)</source>
+        <translation>标准不确定度 (k = 1)</translation>
+    </message>
+    <message>
+        <source>Rig</source>
+        <translation>相机组</translation>
+    </message>
+    <message>
+        <source>Camera</source>
+        <translation>相机</translation>
+    </message>
+    <message>
+        <source>Pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
+        <source>Files that were read</source>
+        <translation>读取的文件</translation>
+    </message>
+    <message>
+        <source>Images or files of LED centres: {0}. The JSON file names each with its SHA-256.</source>
+        <translation>图像或 LED 中心文件：{0} 个。JSON 文件列出每个文件及其 SHA-256。</translation>
+    </message>
+    <message>
+        <source>The file behind this paper</source>
+        <translation>本记录所依据的文件</translation>
+    </message>
+    <message>
+        <source>JSON file</source>
+        <translation>JSON 文件</translation>
+    </message>
+    <message>
+        <source>Entry in the archive</source>
+        <translation>档案条目</translation>
+    </message>
+    <message>
+        <source>Its SHA-256</source>
+        <translation>该条目的 SHA-256</translation>
+    </message>
+    <message>
+        <source>SHA-256 of the entry before</source>
+        <translation>前一条目的 SHA-256</translation>
+    </message>
+    <message>
+        <source>The file has no checksum: a change of it would not have been noticed.</source>
+        <translation>该文件没有校验和：若被更改则无法发现。</translation>
+    </message>
+    <message>
+        <source>All figures are of that file alone, which holds more and is the original. They relate only to the items named, as they were at that time. This is a calibration record, not a certificate of an accredited laboratory. It is to be copied whole or not at all.</source>
+        <translation>全部数据仅取自该文件；该文件内容更全，为原始记录。数据仅对所列器具在当时的状态有效。本文件为标定记录，不是认可实验室出具的校准证书。不得部分复制。</translation>
+    </message>
+    <message>
+        <source>Calibrated by</source>
+        <translation>标定人</translation>
+    </message>
+    <message>
+        <source>Checked by</source>
+        <translation>核验人</translation>
+    </message>
+    <message>
+        <source>Name, date, signature</source>
+        <translation>姓名、日期、签字</translation>
+    </message>
+    <message>
+        <source>End of the record</source>
+        <translation>记录结束</translation>
+    </message>
+    <message>
+        <source>Noise of the images</source>
+        <translation>图像噪声</translation>
+    </message>
+    <message>
+        <source>LED centres, what does not average out</source>
+        <translation>LED 中心中不能被平均的误差</translation>
+    </message>
+    <message>
+        <source>Seat of the tip in the cone</source>
+        <translation>测头在锥孔中的就位</translation>
+    </message>
+    <message>
+        <source>Form of ball and cone</source>
+        <translation>测球与锥孔的形状误差</translation>
+    </message>
+    <message>
+        <source>Drift of cone and camera</source>
+        <translation>锥座与相机的漂移</translation>
+    </message>
+    <message>
+        <source>LED positions of the pen file</source>
+        <translation>光笔文件中的 LED 位置</translation>
+    </message>
+    <message>
+        <source>Scale of the pen file</source>
+        <translation>光笔文件的尺度</translation>
+    </message>
+    <message>
+        <source>Distance of the cones</source>
+        <translation>锥孔间距</translation>
+    </message>
+    <message>
+        <source>Diameter of the LED discs</source>
+        <translation>LED 圆盘直径</translation>
+    </message>
+    <message>
+        <source>Intrinsics of the camera file</source>
+        <translation>相机文件的内参</translation>
+    </message>
+    <message>
+        <source>Places of the cameras</source>
+        <translation>各相机的位置</translation>
+    </message>
+    <message>
+        <source>Effects too uncertain to be fitted</source>
+        <translation>尚不确定而未拟合的影响</translation>
+    </message>
+    <message>
+        <source>joint adjustment of all images</source>
+        <translation>全部图像整体平差</translation>
+    </message>
+    <message>
+        <source>two-stage, as published by S. Liu et al. (2013)</source>
+        <translation>两步法，S. Liu 等 (2013)</translation>
+    </message>
+    <message>
+        <source>none</source>
+        <translation>无</translation>
+    </message>
+    <message>
+        <source>not stated</source>
+        <translation>未注明</translation>
     </message>
 </context>
 <context>
@@ -5468,6 +7573,26 @@
     <message>
         <source>The intrinsics file is for images of another size.</source>
         <translation>内参文件适用于其他图像尺寸。</translation>
+    </message>
+    <message>
+        <source>Choose the second camera.</source>
+        <translation>选择第二台相机。</translation>
+    </message>
+    <message>
+        <source>The second camera is not open yet.</source>
+        <translation>第二台相机尚未打开。</translation>
+    </message>
+    <message>
+        <source>Open the rig file of both cameras.</source>
+        <translation>打开两台相机的相机组文件。</translation>
+    </message>
+    <message>
+        <source>The rig file is not of two cameras.</source>
+        <translation>该相机组文件不是两台相机的文件。</translation>
+    </message>
+    <message>
+        <source>The rig file has another image size for the second camera.</source>
+        <translation>相机组文件中第二台相机的图像尺寸与实际不同。</translation>
     </message>
     <message>
         <source>Open the LED geometry file.</source>

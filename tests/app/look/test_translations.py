@@ -23,7 +23,7 @@ APPLICATION = ROOT / "app" / "lightpen_app"
 CORE = ROOT / "core" / "lightpen"
 TRANSLATIONS = RESOURCES / "translations"
 CHINESE = TRANSLATIONS / "lightpen_zh_CN.ts"
-HELP_TOPICS = ("start", "camera", "leds", "swing", "review")
+HELP_TOPICS = (*("start", "camera", "leds", "swing", "review", "verify", "history"),)
 # Calls whose text a user reads, and how many of their first arguments are such.
 SHOWN = {
     "QLabel": 1,

@@ -20,6 +20,7 @@ from typing_extensions import override
 
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.notice_bar import NoticeBar
@@ -501,6 +502,17 @@ def test_a_page_speaks_through_the_window(shell: Shell) -> None:
     assert shell.window.operator_view().value().instruction == "Lean right"
     page.notice_raised.emit("")
     assert "The file holds no LED." not in shell.window.words()
+
+
+def test_what_a_page_said_in_one_language_does_not_stay_in_another(
+    shell: Shell, qapp: QApplication, qtbot: QtBot
+) -> None:
+    shell.pages[0].status_changed.emit("26 entries")
+    assert "26 entries" in shell.window.words()
+
+    LanguageSwitch(qapp).set_language(Language.CHINESE)
+
+    qtbot.waitUntil(lambda: "26 entries" not in shell.window.words())
 
 
 def test_f1_shows_the_help_of_the_step(shell: Shell, qtbot: QtBot) -> None:

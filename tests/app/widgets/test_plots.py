@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
+from lightpen_app.look.arrows import arrow_scale
 from lightpen_app.look.theme import DARK, LIGHT, apply_theme
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import (
@@ -19,7 +20,6 @@ from lightpen_app.steps.review.residual_plots import (
     DotPlot,
     Histogram,
     MisfitPlot,
-    arrow_scale,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
 from lightpen_app.widgets.plots import Axes, Curve, Plot, TracePlot

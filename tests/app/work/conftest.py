@@ -14,6 +14,7 @@ from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.preparation import Preparation
 from lightpen_app.work.swing_run import SwingRun
+from lightpen_app.work.verification_run import VerificationRun
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 
@@ -38,6 +39,16 @@ def run(tmp_path: Path, qapp: QApplication) -> Iterator[SwingRun]:
     yield run
     run.runner.shut_down()
     assert run.runner.await_end(60.0)
+    QApplication.processEvents()
+
+
+@pytest.fixture
+def verification(run: SwingRun, tmp_path: Path) -> Iterator[VerificationRun]:
+    """A verification of what the run puts in force."""
+    verification = VerificationRun(run.archive, tmp_path / "run", lambda: NOON)
+    yield verification
+    verification.runner.shut_down()
+    assert verification.runner.await_end(60.0)
     QApplication.processEvents()
 
 

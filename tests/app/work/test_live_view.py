@@ -24,6 +24,7 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_view import LiveView, Shown
 from lightpen_app.work.swing_run import SwingRun
+from lightpen_app.work.verification_run import VerificationRun
 
 TIMEOUT = 20.0  # s until a test gives up
 SIGNALS = (
@@ -48,8 +49,8 @@ class Diary:
 
 
 @pytest.fixture
-def view(run: SwingRun) -> Iterator[LiveView]:
-    view = LiveView(run)
+def view(run: SwingRun, verification: VerificationRun) -> Iterator[LiveView]:
+    view = LiveView(run, verification)
     yield view
     view.close()
     view.await_closed()
@@ -78,7 +79,7 @@ class Stage:
 
     def open(self, camera: SimulatedCamera | ReplayCamera | None = None) -> None:
         """Show a camera; a simulated operator follows the swing."""
-        self.view.open(camera or self.camera(), CameraSettings(), self.around.clock)
+        self.view.open([camera or self.camera()], CameraSettings(), self.around.clock)
         self.view.set_following(True)
 
     def camera(self) -> SimulatedCamera:

@@ -4,17 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray, IntArray
-from lightpen_app.look.theme import DARK, Tone
+from lightpen.intrinsics.uncertainty_map import UncertaintyMap
+from lightpen_app.look.theme import DARK, TextSize, Tone, font
 from lightpen_app.widgets.image_view import ImageView
 
 EMPTY_OPACITY = 0.28  # of the parts in which nothing was seen yet
 POINT = 2.5  # px of the screen, radius
 FOOT = 1.5  # px of the screen, radius of an arrow's foot
 LONGEST_ARROW = 40.0  # px of the screen
+# From no uncertainty to the largest: red, green, blue, opacity.
+_BEST, _WORST = np.array([16, 60, 96, 230]), np.array([214, 104, 24, 230])
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +34,15 @@ class BoardOverlay:
         Points seen in each part of the image; empty ones are filled.
     arrows : (M, 4) array or None
         Residuals: place and value, px; drawn enlarged.
+    uncertainty : UncertaintyMap or None
+        Of projections.
     """
 
     points: FloatArray | None = None
     outline: FloatArray | None = None
     cells: IntArray | None = None
     arrows: FloatArray | None = None
+    uncertainty: UncertaintyMap | None = None
 
 
 class BoardView(ImageView):
@@ -62,6 +68,8 @@ class BoardView(ImageView):
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         shown = self._overlay
+        if shown.uncertainty is not None:
+            self._draw_uncertainty(painter, shown.uncertainty)
         if shown.cells is not None:
             self._fill_empty(painter, shown.cells)
         if shown.outline is not None:
@@ -81,6 +89,37 @@ class BoardView(ImageView):
             x, y = column * width - 0.5, row * height - 0.5
             corners = self.place_of(x, y), self.place_of(x + width, y + height)
             painter.fillRect(QRectF(*corners), color)
+
+    def _draw_uncertainty(self, painter: QPainter, uncertainty: UncertaintyMap) -> None:
+        """Colour the image by how uncertain a projection is, with numbers, px."""
+        sigmas, size = uncertainty.sigmas, self.image_size()
+        rows, columns = sigmas.shape
+        colors = np.stack([_BEST, _WORST]).astype(float)
+        shares = (sigmas / max(uncertainty.worst, 1e-12))[..., None]
+        pixels = np.ascontiguousarray(colors[0] + shares * (colors[1] - colors[0]))
+        picture = QImage(
+            pixels.astype(np.uint8).tobytes(),
+            *(columns, rows, 4 * columns),
+            QImage.Format.Format_RGBA8888,
+        )
+        # The samples lie on the border of the image, those of a picture within.
+        x, y = size.width() / (columns - 1) / 2, size.height() / (rows - 1) / 2
+        right, bottom = float(size.width()), float(size.height())
+        whole = self.place_of(-x, -y), self.place_of(right + x, bottom + y)
+        inside = self.place_of(-0.5, -0.5), self.place_of(right - 0.5, bottom - 0.5)
+        painter.save()
+        painter.setClipRect(QRectF(*inside))
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.drawImage(QRectF(*whole), picture)
+        painter.restore()
+        painter.setPen(QColor(DARK.text))
+        painter.setFont(font(TextSize.SMALL))
+        for row, column in np.ndindex(rows, columns):
+            if row % 2 and column % 2:
+                place = self.place_of(*uncertainty.pixels[row, column].tolist())
+                words = f"{sigmas[row, column]:.3f}"
+                box = QRectF(place.x() - 40, place.y() - 12, 80, 24)
+                painter.drawText(box, Qt.AlignmentFlag.AlignCenter, words)
 
     def _draw_outline(self, painter: QPainter, outline: FloatArray) -> None:
         places = [self.place_of(x, y) for x, y in outline.tolist()]

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -32,7 +32,7 @@ from lightpen.intrinsics.capture import Capture, Sight, wanted_outline
 from lightpen.intrinsics.coverage import cells_of
 from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.sightings import find_points
-from lightpen.intrinsics.uncertainty_map import map_uncertainty
+from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.local_time import local_now
 from lightpen_app.look.sentences import worded
@@ -86,6 +86,12 @@ class BoardWindow(Translated, QWidget):
         self._compute = PushButton()
         self._count = text_label(TextSize.BODY)
         self._facts = text_label(TextSize.BODY)
+        self._shows_residuals = PushButton()
+        self._shows_uncertainty = PushButton()
+        for button in (self._shows_residuals, self._shows_uncertainty):
+            button.setCheckable(True)
+            button.setAutoExclusive(True)
+        self._shows_residuals.setChecked(True)
         self._worst_title = text_label(TextSize.SMALL, Tone.QUIET)
         self._worst = QListWidget()
         self._remove = PushButton()
@@ -104,6 +110,10 @@ class BoardWindow(Translated, QWidget):
         side.addWidget(self._count)
         side.addWidget(self._compute)
         side.addWidget(self._facts)
+        pictures = QHBoxLayout()
+        pictures.addWidget(self._shows_residuals)
+        pictures.addWidget(self._shows_uncertainty)
+        side.addLayout(pictures)
         side.addWidget(self._worst_title)
         side.addWidget(self._worst, 1)
         side.addWidget(self._remove)
@@ -128,6 +138,7 @@ class BoardWindow(Translated, QWidget):
         self._remove.clicked.connect(self._on_remove_clicked)
         self._save.clicked.connect(self._on_save_clicked)
         self._worst.currentRowChanged.connect(self._refresh)
+        self._shows_residuals.toggled.connect(self._refresh)
 
         self._retranslate()
 
@@ -272,6 +283,10 @@ class BoardWindow(Translated, QWidget):
     def _on_found(self, found: CameraCalibration) -> None:
         self._computing, self._found = None, found
         self._worst.clear()
+        if self._image.image_size().isEmpty():  # the views are from a folder
+            width, height = found.views.image_sizes[0]
+            blank = np.zeros((height // 2, width // 2), np.uint8)
+            self._image.set_half(blank, QSize(width, height))
         rms = found.adjustment.view_rms[:, 0]
         for v in found.worst_first:
             words = self.tr("{0}: {1:.4f} px, by the others {2:.4f} px")
@@ -332,6 +347,13 @@ class BoardWindow(Translated, QWidget):
         self._compute.setText(self.tr("Calibrate"))
         self._worst_title.setText(self.tr("Views, the worst first"))
         self._worst.setAccessibleName(self.tr("Views, the worst first"))
+        self._shows_residuals.setText(self.tr("Residuals"))
+        self._shows_uncertainty.setText(self.tr("Uncertainty"))
+        told = self.tr(
+            "How uncertain the intrinsics leave where a point is seen, over the image: "
+            "standard uncertainty, px."
+        )
+        self._shows_uncertainty.setToolTip(told)
         self._remove.setText(self.tr("Leave out and calibrate again"))
         self._save.setText(self.tr("Save and use..."))
         self._image.set_message(
@@ -351,14 +373,19 @@ class BoardWindow(Translated, QWidget):
         is_chosen = self._found is not None and self._worst.currentItem() is not None
         self._remove.set_why_not("" if is_chosen else self.tr("Choose a view."))
         self._facts.setText("" if self._found is None else self._told(self._found))
+        for button in (self._shows_residuals, self._shows_uncertainty):
+            button.setVisible(self._found is not None)
         self._image.set_overlay(self._overlay())
         if is_live and self._capture is not None:
             words = self._words_of(self._capture.sight)
             self._remark.set_value(Remark(words, Sign.WAIT, Tone.QUIET))
 
     def _overlay(self) -> BoardOverlay:
-        if self._found is not None:
-            return _residuals(self._found)
+        found = self._found
+        if found is not None and self._shows_uncertainty.isChecked():
+            return BoardOverlay(uncertainty=_uncertainty(found))
+        if found is not None:
+            return _residuals(found)
         if self._capture is None:
             return BoardOverlay()
         points = self._capture.points if self._sought is not None else None
@@ -382,7 +409,7 @@ class BoardWindow(Translated, QWidget):
         assert camera.covariance is not None
         fx, fy, cx, cy = camera.intrinsics[:4].tolist()
         u = (2 * np.sqrt(np.diag(camera.covariance)[:4])).tolist()
-        uncertain = map_uncertainty(camera, camera.covariance)
+        uncertain = _uncertainty(found)
         residuals = self.tr("Residuals {0:.4f} px rms, in views left out {1:.4f} px")
         projection = self.tr("Projection uncertain by {0:.3f} px, at worst {1:.3f} px")
         return "\n".join(
@@ -437,6 +464,12 @@ def _residuals(found: CameraCalibration) -> BoardOverlay:
     pixels, residuals = found.views.pixels[:, 0][seen], found.adjustment.residuals[:, 0]
     arrows = np.concatenate([pixels, residuals[seen]], axis=1)
     return BoardOverlay(cells=cells_of(found.views), arrows=arrows)
+
+
+def _uncertainty(found: CameraCalibration) -> UncertaintyMap:
+    camera = found.camera
+    assert camera.covariance is not None
+    return map_uncertainty(camera, camera.covariance)
 
 
 def _trouble(sentence: str) -> Remark:

@@ -80,7 +80,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         layout.addLayout(grid)
 
         # Connections
-        self._path.value_changed.connect(self._on_path_changed)
+        self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
         self._calibrate.clicked.connect(self.calibration_requested)
@@ -116,10 +116,6 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._path.set_faulty(bool(sentence))
         self._problem.set_value(Remark(sentence, Sign.CROSS, Tone.BAD))
         self._refresh()
-
-    def _on_path_changed(self, path: str) -> None:
-        if path:
-            self.path_chosen.emit(path)
 
     def _on_open_clicked(self) -> None:
         self._path.pick(

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from math import hypot
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from lightpen.cameras.protocol import Stats
@@ -16,6 +16,7 @@ from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
+from lightpen_app.steps.camera.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import led_numbers, live_markers
 from lightpen_app.widgets.sign_label import Remark, SignLabel
@@ -27,18 +28,28 @@ WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
 
 class LivePanel(Translated, QWidget):
-    """Shows images and how they come."""
+    """Shows images and how they come.
+
+    Signals
+    -------
+    camera_chosen(int)
+        The other of two cameras is to be shown, by its number from 0.
+    """
+
+    camera_chosen = Signal(int)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._connection = Connection.CLOSED
         self._sentence = ""
+        self._shown = 0  # of the cameras
         self._arrivals: deque[tuple[int, int]] = deque(maxlen=N_TIMED)  # ns, number
         self._seen: LiveImage | None = None
         self._n_lost: deque[int] = deque(maxlen=N_TIMED)
         self._extra: tuple[Marker, ...] = ()
 
         # Widgets
+        self._switch = CameraSwitch()
         self._state = SignLabel(wraps=False)
         self._figures = text_label(TextSize.SMALL, Tone.QUIET)
         self._figures.setWordWrap(False)
@@ -58,10 +69,23 @@ class LivePanel(Translated, QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
+        layout.addWidget(self._switch, 0, Qt.AlignmentFlag.AlignLeft)
         layout.addLayout(head)
         layout.addWidget(self._view, 1)
 
+        # Connections
+        self._switch.value_changed.connect(self.camera_chosen)
+
+        self.set_cameras(1, 0)
         self._retranslate()
+
+    def set_cameras(self, n_cameras: int, shown: int) -> None:
+        """Offer to show one of so many cameras; which is shown, from 0."""
+        self._switch.setVisible(n_cameras > 1)
+        if shown != self._shown:
+            self._forget()
+        self._shown = shown
+        self._switch.set_value(shown)
 
     def state(self) -> Remark:
         """Return how the camera is."""
@@ -98,13 +122,17 @@ class LivePanel(Translated, QWidget):
     def set_connection(self, connection: Connection, sentence: str) -> None:
         """Show how the camera is; ``sentence`` says why no images come."""
         if connection in WITHOUT_IMAGES or connection is Connection.OPENING:
-            self._view.set_image(None)
-            self._seen = None
-            self._arrivals.clear()
-            self._n_lost.clear()
-            self._figures.clear()
+            self._forget()
         self._connection, self._sentence = connection, sentence
         self._refresh()
+
+    def _forget(self) -> None:
+        """Show no image until the next comes."""
+        self._view.set_image(None)
+        self._seen = None
+        self._arrivals.clear()
+        self._n_lost.clear()
+        self._figures.clear()
 
     def _retranslate(self) -> None:
         self._view.setToolTip(

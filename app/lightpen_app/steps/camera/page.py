@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -29,10 +30,10 @@ from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.sounds import Sound, Sounds
 from lightpen_app.look.theme import GRID, Tone
-from lightpen_app.steps.camera.board_window import BoardWindow
 from lightpen_app.steps.camera.exposure_panel import ExposurePanel, FocusPanel
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.live_panel import LivePanel
+from lightpen_app.steps.camera.second_camera import SecondCameraChoice
 from lightpen_app.steps.camera.settings_panel import SettingsPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
@@ -44,6 +45,9 @@ from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.work.job import Job
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.camera.board_window import BoardWindow
 
 SIDE_WIDTH, NARROW_SIDE_WIDTH = 50 * GRID, 46 * GRID
 
@@ -75,12 +79,15 @@ class CameraPage(Rearranged, Page):
         # Widgets
         self._swing_remark = SignLabel()
         self._source = SourcePanel()
+        self._second = SecondCameraChoice(workbench)
         self._more = SettingsPanel()
         self._intrinsics = IntrinsicsPanel()
         self._stray = StrayLightPanel()
         self._images = LivePanel()
         self._exposure = ExposurePanel()
         self._focus = FocusPanel()
+
+        self._searching = self._source  # for whom cameras are looked for
 
         # Layout
         self._arrange()
@@ -89,6 +96,9 @@ class CameraPage(Rearranged, Page):
         self._source.value_changed.connect(self._on_source_chosen)
         self._source.retry_requested.connect(self._workbench.open_camera)
         self._source.search_requested.connect(self._on_search_requested)
+        self._second.chosen.connect(self._forget_trouble)
+        self._second.search_requested.connect(self._on_second_search_requested)
+        self._images.camera_chosen.connect(self._on_camera_chosen)
         self._more.settings_changed.connect(self._live.configure)
         self._source.files_requested.connect(self._workbench.use_files)
         self._intrinsics.path_chosen.connect(self._on_path_chosen)
@@ -110,6 +120,7 @@ class CameraPage(Rearranged, Page):
         self._workbench.run.changed.connect(self._remark_swing)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
+        self._live.other_changed.connect(self._on_other_changed)
         self._live.settings_applied.connect(self._on_settings_applied)
         self._live.troubled.connect(self._on_troubled)
         self._live.failed.connect(self._on_failed)
@@ -140,7 +151,7 @@ class CameraPage(Rearranged, Page):
     @override
     def main_action(self) -> MainAction:
         why_not = _first_text(self._workbench.preparation.camera_lacks())
-        if not why_not and self._live.connection is Connection.LOST:
+        if not why_not and self._live.worst_connection is Connection.LOST:
             why_not = self.tr("The camera is lost. It is looked for until it is back.")
         return MainAction(self.tr("Continue to the LEDs"), why_not)
 
@@ -156,12 +167,14 @@ class CameraPage(Rearranged, Page):
     def left(self) -> None:
         self._is_shown = False
         self._end_adjustment()
+        self._show_camera(0)
         self._stray.give_up()
         self._stray.end_drawing()
         self._stray.uncover()
 
     @override
     def shut_down(self) -> None:
+        self._second.shut_down()
         if self._board is not None:
             self._board.close()
         for job in (self._reading, self._looking):
@@ -180,7 +193,10 @@ class CameraPage(Rearranged, Page):
         panels.setContentsMargins(0, 0, 0, 0)
         panels.setSpacing(2 * GRID)
         panels.addWidget(self._swing_remark)
-        for panel in (self._source, self._more, self._intrinsics, self._stray):
+        for panel in (
+            *(self._source, self._more, self._intrinsics),
+            *(self._second, self._stray),
+        ):
             panels.addWidget(panel)
         panels.addStretch(1)
         self._side = scroll = PageScroll()
@@ -223,7 +239,9 @@ class CameraPage(Rearranged, Page):
         self._offer_beside()
         self._intrinsics.set_value(now.camera_file)
         self._intrinsics.set_image_size(now.image_size)
-        self._stray.set_n_masked(len(now.mask))
+        self._intrinsics.setVisible(now.second is None)
+        self._show_camera(self._live.chosen)
+        self._stray.set_n_masked(len(self._mask))
         self._mark()
         self.changed.emit()
 
@@ -269,20 +287,53 @@ class CameraPage(Rearranged, Page):
 
         # Connections
         job.succeeded.connect(self._source.set_absent)
+        job.succeeded.connect(self._second.source().set_absent)
         job.start()
 
     def _on_search_requested(self) -> None:
-        source = self._source.value()
+        self._search_for(self._source)
+
+    def _on_second_search_requested(self) -> None:
+        self._search_for(self._second.source())
+
+    def _search_for(self, panel: SourcePanel) -> None:
+        self._searching.set_searching(False)
+        self._searching, source = panel, panel.value()
         self._workbench.search_cameras(source.kind, source.producer)
-        self._source.set_searching(True)
+        panel.set_searching(True)
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
-        self._source.set_searching(False)
-        self._source.set_found(found)
+        self._searching.set_searching(False)
+        self._searching.set_found(found)
 
     def _on_search_failed(self, why: str) -> None:
-        self._source.set_searching(False)
-        self._source.set_search_problem(why)
+        self._searching.set_searching(False)
+        self._searching.set_search_problem(why)
+
+    # Two cameras
+
+    def _on_camera_chosen(self, camera: int) -> None:
+        self._end_adjustment()
+        self._stray.give_up()
+        self._show_camera(camera)
+
+    def _show_camera(self, camera: int) -> None:
+        """Show one of the cameras there are, by its number from 0."""
+        self._live.choose(camera)
+        self._images.set_cameras(self._live.n_cameras, self._live.chosen)
+        self._stray.set_n_masked(len(self._mask))
+        self._mark()
+
+    @property
+    def _mask(self) -> FloatArray:
+        """Stray light in the images that are shown, (M, 3), px."""
+        return self._workbench.preparation.mask_of(self._live.chosen)
+
+    def _on_other_changed(self, connection: Connection) -> None:
+        self._images.set_cameras(self._live.n_cameras, self._live.chosen)
+        if connection is Connection.LOST:
+            self._on_lost()
+        self.changed.emit()
 
     def _on_exposure_asked(self, exposure_us: float) -> None:
         self._end_adjustment()
@@ -325,6 +376,9 @@ class CameraPage(Rearranged, Page):
 
     def _on_calibration_requested(self) -> None:
         if self._board is None:
+            # A camera is calibrated once a year; it is not waited for at each start.
+            from lightpen_app.steps.camera.board_window import BoardWindow
+
             self._board = BoardWindow(self._live, self)
 
             # Connections
@@ -345,7 +399,7 @@ class CameraPage(Rearranged, Page):
         self._workbench.use_sample_files()
 
     def _on_mask_requested(self, circles: FloatArray) -> None:
-        mask = np.concatenate([self._workbench.preparation.mask, circles])
+        mask = np.concatenate([self._mask, circles])
         self._set_mask(mask)
 
     def _on_clear_requested(self) -> None:
@@ -354,16 +408,15 @@ class CameraPage(Rearranged, Page):
     def _on_image_clicked(self, x: float, y: float) -> None:
         spots = self._images.spots()
         if self._stray.is_drawing and spots is not None:
-            mask = self._workbench.preparation.mask
-            self._set_mask(clicked(mask, spots, np.array([x, y])))
+            self._set_mask(clicked(self._mask, spots, np.array([x, y])))
 
     def _on_circle_drawn(self, x: float, y: float, radius: float) -> None:
         circle = np.array([x, y, radius])
-        self._set_mask(with_circle(self._workbench.preparation.mask, circle))
+        self._set_mask(with_circle(self._mask, circle))
 
     def _set_mask(self, mask: FloatArray) -> None:
         now = self._workbench.preparation
-        self._workbench.set_preparation(replace(now, mask=mask))
+        self._workbench.set_preparation(now.with_mask(self._live.chosen, mask))
 
     # What the camera does
 
@@ -376,6 +429,7 @@ class CameraPage(Rearranged, Page):
         inspection = inspect(seen.spots, labels)
         self._images.set_image(shown, self._live.stats)
         self._more.set_stats(self._live.stats)
+        self._second.tell_step(seen)
         self._exposure.set_value(inspection.exposure)
         self._focus.add(inspection)
         outcome = self._stray.outcome()
@@ -389,9 +443,7 @@ class CameraPage(Rearranged, Page):
         if connection in (Connection.OPENING, Connection.STREAMING):
             self._forget_trouble()
         if connection is Connection.LOST:
-            if not self._workbench.run.status.is_capturing:  # else the swing does
-                self._sounds.play(Sound.LOST)
-            self._raise_trouble(self._trouble)
+            self._on_lost()
         if connection is Connection.OPENING:
             self._stray.uncover()  # another operator holds the pen
         if connection is not Connection.STREAMING:
@@ -402,6 +454,11 @@ class CameraPage(Rearranged, Page):
             self._show_pen()
         self._show_connection()
         self.changed.emit()
+
+    def _on_lost(self) -> None:
+        if not self._workbench.run.status.is_capturing:  # else the swing does
+            self._sounds.play(Sound.LOST)
+        self._raise_trouble(self._trouble)
 
     def _on_settings_applied(self, settings: CameraSettings) -> None:
         self._settings = settings
@@ -461,7 +518,7 @@ class CameraPage(Rearranged, Page):
 
     def _mark(self) -> None:
         """Mark what is masked, and what the search for stray light found."""
-        masked = mask_markers(self._workbench.preparation.mask)
+        masked = mask_markers(self._mask)
         found = stray_markers(self._stray.found(), self.tr("stray"))
         self._images.set_extra_markers((*masked, *found))
 

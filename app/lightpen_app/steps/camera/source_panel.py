@@ -34,6 +34,11 @@ from lightpen_app.widgets.translated import Translated
 class SourcePanel(Translated, QGroupBox):
     """The choice of a source.
 
+    Parameters
+    ----------
+    is_second : bool
+        Whether it is of a second camera, whose files are those of the rig.
+
     Signals
     -------
     value_changed(SourceChoice)
@@ -53,8 +58,11 @@ class SourcePanel(Translated, QGroupBox):
     retry_requested = Signal()
     files_requested = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(
+        self, *, is_second: bool = False, parent: QWidget | None = None
+    ) -> None:
         super().__init__(parent)
+        self._is_second = is_second
         self._value = SourceChoice()
         self._absent: Mapping[str, Sentence] = {}
         self._is_searching = False
@@ -259,7 +267,8 @@ class SourcePanel(Translated, QGroupBox):
         self._search.set_why_not(
             self.tr("The search is on.") if self._is_searching else ""
         )
-        self._samples.setVisible(self._value.kind == SourceKind.SIMULATED)
+        is_simulated = self._value.kind == SourceKind.SIMULATED
+        self._samples.setVisible(is_simulated and not self._is_second)
         self._told.set_value(self._remark(absent))
         self._refresh_beside()
 
@@ -285,13 +294,15 @@ class SourcePanel(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self._refresh_beside()
-        self.setTitle(self.tr("Source of the images"))
+        title = self.tr("Source of the images")
+        if self._is_second:
+            title = self.tr("Source of the second camera")
+        self.setTitle(title)
         for index, source in enumerate(SOURCES):
             name = worded(source.name)
             if source.key in self._absent:
                 name = self.tr("{0} - not installed").format(name)
             self._kind.setItemText(index, name)
-        title = self.tr("Source of the images")
         self._kind.setAccessibleName(title)
         # On Linux the name of a list that drops down is what is chosen in it.
         self._kind.setAccessibleDescription(title)

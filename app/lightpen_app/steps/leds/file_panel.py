@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from lightpen.formats.pen_files import UNITS
+from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.widgets.file_drops import FileDrops
@@ -89,7 +89,7 @@ class LedFilePanel(Translated, QWidget):
         layout.addWidget(self._question)
 
         # Connections
-        self._path.value_changed.connect(self._on_path_changed)
+        self._path.path_chosen.connect(self.path_chosen)
         FileDrops(self).dropped.connect(self._path.take)
         self._open.clicked.connect(self._on_open_clicked)
         self._save.clicked.connect(self._on_save_clicked)
@@ -149,10 +149,6 @@ class LedFilePanel(Translated, QWidget):
     def set_has_samples(self, has_samples: bool) -> None:
         """Offer the file of the simulated pen, or not."""
         self._samples.setVisible(has_samples)
-
-    def _on_path_changed(self, path: str) -> None:
-        if path:
-            self.path_chosen.emit(path)
 
     def _on_open_clicked(self) -> None:
         self._path.pick(

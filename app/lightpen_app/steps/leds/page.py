@@ -102,6 +102,7 @@ class LedsPage(Rearranged, Page):
         self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.live.image_shown.connect(self._on_image_shown)
         self._workbench.live.connection_changed.connect(self._on_connection_changed)
+        self._workbench.live.other_changed.connect(self._on_connection_changed)
 
         self._on_workbench_changed()
 
@@ -392,7 +393,7 @@ class LedsPage(Rearranged, Page):
         preparation = self._workbench.preparation
         if not self._workbench.live.is_open:
             why = self.tr("The camera is not open. See the step Camera.")
-        elif self._workbench.live.connection is Connection.LOST:
+        elif self._workbench.live.worst_connection is Connection.LOST:
             why = self.tr("The camera is lost. It is looked for until it is back.")
         elif preparation.camera is None:
             why = self.tr("The intrinsics are missing. See the step Camera.")
@@ -403,7 +404,7 @@ class LedsPage(Rearranged, Page):
         self._match.set_why_unknown(why)
 
     def _on_image_shown(self, shown: Shown) -> None:
-        is_live = self._workbench.live.connection is Connection.STREAMING
+        is_live = self._workbench.live.worst_connection is Connection.STREAMING
         if not (self._is_shown and is_live):  # the last image comes after the loss
             return
         self._match.set_image(shown)
@@ -412,7 +413,7 @@ class LedsPage(Rearranged, Page):
     def _on_connection_changed(self) -> None:
         if self._is_shown:
             self._workbench.live.show_pen()
-            if self._workbench.live.connection is not Connection.STREAMING:
+            if self._workbench.live.worst_connection is not Connection.STREAMING:
                 self._match.clear()
             self._refresh_live()
 

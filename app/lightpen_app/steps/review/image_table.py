@@ -12,18 +12,18 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.record.image_rows import ImageRow
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.row_table import RowTable
 from lightpen_app.widgets.translated import Translated
 
 Index = QModelIndex | QPersistentModelIndex
 NUMBER, MISFIT, LEDS, STATE = range(4)
-ROW_HEIGHT = 7 * GRID // 2
 
 
 class ImageModel(QAbstractTableModel):
@@ -99,7 +99,7 @@ class ImageModel(QAbstractTableModel):
         return number_text(row.misfit, self._decimals) if known else ""
 
 
-class ImageTable(Translated, QTableView):
+class ImageTable(Translated, RowTable):
     """Shows the images; the current one and the selected ones are kept over changes.
 
     Signals
@@ -114,21 +114,10 @@ class ImageTable(Translated, QTableView):
     selection_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._model = ImageModel(self)
-        self.setModel(self._model)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
-        self.setTabKeyNavigation(False)
-        self.setShowGrid(False)
-        self.setWordWrap(False)
+        self._model = ImageModel()
+        super().__init__(self._model, parent)
+        self._model.setParent(self)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.verticalHeader().hide()
-        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
-        across = self.horizontalHeader()
-        across.setHighlightSections(False)
-        across.setStretchLastSection(True)
         for column, width in ((NUMBER, 7.5), (MISFIT, 11.5), (LEDS, 6.5)):
             self.setColumnWidth(column, round(width * GRID))
 

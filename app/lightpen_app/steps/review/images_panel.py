@@ -13,13 +13,14 @@ from lightpen.arrays import Image
 from lightpen.record.image_rows import ImageRow, count_left_out, worst_first
 from lightpen.record.reading import RecordSource
 from lightpen.record.solving import Solution, load_image
+from lightpen_app.look.arrows import arrow_scale
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.plot_card import PlotCard
-from lightpen_app.steps.review.residual_plots import MisfitPlot, arrow_scale
+from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualView
 from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.plots import Axes

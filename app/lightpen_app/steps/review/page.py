@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 
 from PySide6.QtCore import Qt, QTimer, QUrl, Slot
 from PySide6.QtGui import QDesktopServices
@@ -17,13 +18,17 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.archive.entered import entry_of_file
 from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade, NextStep
 from lightpen.local_time import local_time
+from lightpen.record.acceptance import takes_supervisor
 from lightpen.record.assessment import Assessment
 from lightpen.record.exports import export_json, export_tables, tip_text
 from lightpen.record.next_tips import next_tips
 from lightpen.record.results import Result
+from lightpen.record.retraced import Retraced, retrace
+from lightpen.record.statement import Entered, Statement, read_statement
 from lightpen.sentences import Sentence
 from lightpen.swing.status import Activity
 from lightpen_app.look.grades import GRADE_MARKS
@@ -33,14 +38,13 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.review.images_panel import ImagesPanel
-from lightpen_app.steps.review.next_tips_row import NextTipsRow
-from lightpen_app.steps.review.plots_panel import (
-    MethodsPanel,
-    PlotsPanel,
-    ResidualsPanel,
-    UncertaintyPanel,
+from lightpen_app.steps.review.late_panels import (
+    make_images_panel,
+    make_methods_panel,
+    make_residuals_panel,
+    make_uncertainty_panel,
 )
+from lightpen_app.steps.review.next_tips_row import NextTipsRow
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
 from lightpen_app.steps.review.result_tools import Export, ResultTools
@@ -56,11 +60,16 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
 
+if TYPE_CHECKING:
+    from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plots_panel import PlotsPanel
+
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
 TAB_WIDTH = 64 * GRID  # of the result in a tab
 # What the sentence of a verdict has in it whose cause is the intrinsics file.
 OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
+Read: TypeAlias = tuple[Statement, Retraced | None, Entered | None]
 
 
 class ReviewPage(Rearranged, Page):
@@ -80,6 +89,7 @@ class ReviewPage(Rearranged, Page):
         self._place = SavePlace(workbench)
         self._search: Job | None = None
         self._saving: Job | None = None
+        self._reading: Job | None = None
         self._on_yes: Callable[[], object] = self._repeat_swing
 
         # Widgets
@@ -101,15 +111,16 @@ class ReviewPage(Rearranged, Page):
         self._repeat = PushButton()
         self._capture_more = PushButton()
         self._accept = PushButton()
+        self._verify = PushButton()
         self._take_back = PushButton()
         self._tools = ResultTools()
         self._next_tips = NextTipsRow()
-        self._images = Late(ImagesPanel)
+        self._images = Late(make_images_panel)
         self._panels: tuple[Late[ImagesPanel] | Late[PlotsPanel], ...] = (
             self._images,
-            Late[PlotsPanel](ResidualsPanel),
-            Late[PlotsPanel](UncertaintyPanel),
-            Late[PlotsPanel](MethodsPanel),
+            Late(make_residuals_panel),
+            Late(make_uncertainty_panel),
+            Late(make_methods_panel),
         )
         self._tabs = QTabWidget()
         self._tab_of = {panel: PageScroll() for panel in self._panels}
@@ -130,8 +141,9 @@ class ReviewPage(Rearranged, Page):
         self._acceptance.timeout.connect(self.changed)
         self._capture_more.clicked.connect(self._on_capture_more_clicked)
         self._repeat.clicked.connect(self._ask_to_repeat)
+        self._verify.clicked.connect(self._on_verify_clicked)
         self._take_back.clicked.connect(self._ask_to_take_back)
-        self._accept.clicked.connect(self._reason.ask)
+        self._accept.clicked.connect(self._ask_reason)
         self._reason.given.connect(self._run.runner.accept)
         self._reason.declined.connect(self._tabs.setFocus)
         self._question.agreed.connect(self._on_question_agreed)
@@ -141,6 +153,7 @@ class ReviewPage(Rearranged, Page):
         self._tools.folder_requested.connect(self._open_folder)
         self._tools.copy_requested.connect(self._copy_tip)
         self._tools.save_requested.connect(self._ask_folder)
+        self._tools.paper_requested.connect(self._read_paper)
         self._next_tips.chosen.connect(self._on_next_tip_chosen)
         for panel in self._panels:
             panel.made.connect(self._on_panel_made)
@@ -241,7 +254,7 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
-        for job in (self._search, self._saving):
+        for job in (self._search, self._saving, self._reading):
             if job is not None:
                 job.cancel()
         images = self._images.content_so_far()
@@ -268,6 +281,10 @@ class ReviewPage(Rearranged, Page):
         self._capture_more.setText(self.tr("Capture more"))
         self._repeat.setText(self.tr("Repeat"))
         self._accept.setText(self.tr("Accept..."))
+        self._verify.setText(self.tr("Verify it"))
+        self._verify.setToolTip(
+            self.tr("Prove the tip in minutes by touching what is known.")
+        )
         self._take_back.setText(self.tr("Take back..."))
         self._take_back.setToolTip(
             self.tr("Put the result before in force again; both are kept.")
@@ -299,6 +316,7 @@ class ReviewPage(Rearranged, Page):
         buttons.addWidget(self._repeat, 1)
         buttons.addWidget(self._capture_more, 1)
         buttons.addWidget(self._accept, 1)
+        buttons.addWidget(self._verify, 1)
         buttons.addWidget(self._take_back, 1)
         column = QVBoxLayout(self._result_side)
         column.setContentsMargins(0, 0, 0, 0)
@@ -364,7 +382,7 @@ class ReviewPage(Rearranged, Page):
             return self.tr("Swing the pen first.")
         return ""
 
-    def _lock(self, images: ImagesPanel) -> None:
+    def _lock(self, images: "ImagesPanel") -> None:
         goes_on = self.tr("The swing goes on.") if self._run.status.is_reading else ""
         images.set_locked(self._why_locked() or goes_on)
 
@@ -429,17 +447,17 @@ class ReviewPage(Rearranged, Page):
             if tab is self._tabs.currentWidget():
                 self._show_solution(panel.content())
 
-    def _show_solution(self, panel: ImagesPanel | PlotsPanel) -> None:
+    def _show_solution(self, panel: "ImagesPanel | PlotsPanel") -> None:
         solution = self._run.status.solution
         if panel.value() is not solution:
             panel.set_value(solution)
 
-    def _on_images_made(self, images: ImagesPanel) -> None:
+    def _on_images_made(self, images: "ImagesPanel") -> None:
         self._lock(images)
         images.take_out_requested.connect(self._run.runner.take_out)
         images.put_back_requested.connect(self._run.runner.put_back)
 
-    def _on_panel_made(self, panel: ImagesPanel | PlotsPanel) -> None:
+    def _on_panel_made(self, panel: "ImagesPanel | PlotsPanel") -> None:
         for card in panel.cards():
             card.set_place(self._place)
         panel.saved.connect(self.status_changed)
@@ -471,8 +489,12 @@ class ReviewPage(Rearranged, Page):
             self.tr("Swing the pen first.") if status.solution is None else ""
         )
         is_accepted, main = status.result is not None, self.main_action().text
+        self._tools.set_paper_why_not(
+            "" if is_accepted else self.tr("Accept the tip first: it is of the result.")
+        )
         for button in (self._repeat, self._capture_more):
             button.setVisible(not is_accepted and button.text() != main)
+        self._verify.setVisible(is_accepted)
         self._take_back.setVisible(is_accepted)
 
     def _state(self) -> State:
@@ -534,6 +556,16 @@ class ReviewPage(Rearranged, Page):
             self.tr("Go on with these"),
             self._repeat_swing,
         )
+
+    def _on_verify_clicked(self) -> None:
+        self.step_requested.emit("verify")
+
+    def _ask_reason(self) -> None:
+        assessment = self._run.status.assessment
+        supervision = self._workbench.supervision
+        if assessment is not None:
+            of_supervisor = takes_supervisor(supervision, assessment)
+            self._reason.ask(of_supervisor=of_supervisor)
 
     def _ask_to_take_back(self) -> None:
         self._ask(
@@ -634,6 +666,35 @@ class ReviewPage(Rearranged, Page):
         job.succeeded.connect(lambda _: self._tell_saved(folder))
         job.failed.connect(self.notice_raised)
         job.start()
+
+    def _read_paper(self) -> None:
+        """Show the record on paper, of the result as it is on the disk."""
+        result, archive = self._run.status.result, self._run.archive
+        if result is None:
+            return
+
+        def read(_: Report) -> Read:
+            file = archive.file_of(result)
+            statement = read_statement(file)
+            retraced = retrace(statement.calibration)
+            return statement, retraced, entry_of_file(file, statement.sha256)
+
+        self._reading = job = Job(read, self)
+
+        # Connections
+        job.succeeded.connect(self._show_paper)
+        job.failed.connect(self.notice_raised)
+        job.start()
+
+    def _show_paper(self, read: Read) -> None:
+        # Printing takes long to be imported, and few swings are printed.
+        from lightpen_app.paper.preview import PaperWindow
+        from lightpen_app.paper.printing import paper_of
+
+        window = PaperWindow(paper_of(*read), self._place, self)
+        window.saved.connect(lambda path: self._tell_saved(path.parent))
+        window.failed.connect(self.notice_raised)
+        window.show()
 
     def _save_plots(self, folder: Path, stem: str) -> None:
         for panel in self._panels:

@@ -14,7 +14,6 @@ from lightpen.record.solving import Solution
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
-from lightpen_app.steps.review.number_table import Figures, NumberTable
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import (
     ArrowPlot,
@@ -22,6 +21,7 @@ from lightpen_app.steps.review.residual_plots import (
     Histogram,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plots import Axes, Curve
 from lightpen_app.widgets.translated import Translated
 

@@ -8,12 +8,11 @@ from PySide6.QtWidgets import QGraphicsRectItem, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
+from lightpen_app.look.arrows import MANY, arrow_lines, arrow_scale, cell_means
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, colors_of, font
 from lightpen_app.widgets.plots import Axes, Plot
 
-MANY = 400  # arrows; more are told by their means
-N_CELLS = 20  # across, of which each shows the mean of its arrows
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.98  # of the width, where it has a grip
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
@@ -278,7 +277,7 @@ class ArrowPlot(SquarePlot):
         shown = _around(points) if len(points) else frame
         starts, vectors = points, residuals
         if len(points) > MANY:
-            starts, vectors = _cell_means(points, residuals)
+            starts, vectors = cell_means(points, residuals)
         self._scale = arrow_scale(vectors, shown.width())
         self._shafts.setData(*arrow_lines(starts, vectors * self._scale))
         self._frame.setRect(frame)
@@ -359,55 +358,3 @@ def _around(points: FloatArray) -> QRectF:
     room = 0.06 * max(float(np.max(high - low)), 1.0)
     width, height = (high - low + 2 * room).tolist()
     return QRectF(float(low[0]) - room, float(low[1]) - room, width, height)
-
-
-def _cell_means(
-    points: FloatArray, vectors: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the means of points (N, 2) and vectors (N, 2) in cells of the image."""
-    low = points.min(axis=0)
-    side = float(np.max(points.max(axis=0) - low)) / N_CELLS or 1.0
-    columns, rows = ((points - low) / side).astype(np.int64).T
-    _, cells = np.unique(rows * (N_CELLS + 1) + columns, return_inverse=True)
-    counts = np.bincount(cells)
-    means = [
-        np.bincount(cells, weights=values) / counts
-        for values in (*points.T, *vectors.T)
-    ]
-    return np.column_stack(means[:2]), np.column_stack(means[2:])
-
-
-def arrow_lines(
-    points: FloatArray, vectors: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the ends of shafts and heads as pairs, for one curve of them all.
-
-    Parameters
-    ----------
-    points, vectors : (N, 2) array
-        Where arrows begin, and where they go from there.
-
-    Returns
-    -------
-    x, y : (6 N,) array
-    """
-    tips = points + vectors
-    ahead = vectors * 0.3
-    aside = np.column_stack([-ahead[:, 1], ahead[:, 0]]) * 0.5
-    strokes = (points, tips, tips, tips - ahead + aside, tips, tips - ahead - aside)
-    lines = np.stack(strokes, axis=1).reshape(-1, 2)
-    return lines[:, 0], lines[:, 1]
-
-
-def arrow_scale(residuals: FloatArray, image_width: float) -> float:
-    """Return by how much to enlarge residuals (N, 2), px, to be seen on an image.
-
-    Arrows then are about a thirtieth of its width; the factor is 1, 2 or 5 times a
-    power of ten.
-    """
-    rms = float(np.sqrt(np.mean(np.sum(residuals**2, axis=1)))) if len(residuals) else 0
-    if not rms > 0:
-        return 1.0
-    wanted = image_width / 30 / rms
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted))

@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
+from lightpen_app.look.arrows import arrow_lines
 from lightpen_app.look.theme import DARK
-from lightpen_app.steps.review.residual_plots import arrow_lines
 from lightpen_app.widgets.image_view import ImageView
 
 ROOM = 1.5  # times the extent of the pen, that is shown at first

@@ -14,8 +14,8 @@ from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import shortened
-from lightpen_app.steps.review.number_table import Figures, NumberTable
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 

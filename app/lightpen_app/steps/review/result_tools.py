@@ -30,11 +30,14 @@ class ResultTools(Translated, QWidget):
     copy_requested()
         The tip is to be put on the clipboard.
     save_requested(Export)
+    paper_requested()
+        The record on paper is to be shown.
     """
 
     folder_requested = Signal()
     copy_requested = Signal()
     save_requested = Signal(object)
+    paper_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -48,6 +51,9 @@ class ResultTools(Translated, QWidget):
         self._exports: dict[Export, QAction] = {
             export: menu.addAction("") for export in Export
         }
+        menu.addSeparator()
+        menu.setToolTipsVisible(True)
+        self._paper = menu.addAction("")
         self._save.setMenu(menu)
         self._buttons = (self._folder, self._copy, self._save)
 
@@ -65,6 +71,7 @@ class ResultTools(Translated, QWidget):
             action.triggered.connect(
                 lambda _=False, export=export: self.save_requested.emit(export)
             )
+        self._paper.triggered.connect(self.paper_requested)
 
         self._retranslate()
 
@@ -78,7 +85,14 @@ class ResultTools(Translated, QWidget):
         for button, words in zip(self._buttons, told, strict=True):
             button.set_why_not(why_not, words)
 
+    def set_paper_why_not(self, why_not: str) -> None:
+        """Offer no record on paper and say why not, or offer it."""
+        self._paper.setEnabled(not why_not)
+        told = self.tr("Look at it, save it as PDF, or print it")
+        self._paper.setToolTip(why_not or told)
+
     def _retranslate(self) -> None:
+        self._paper.setText(self.tr("Record on paper..."))
         self._folder.setText(self.tr("Open folder"))
         self._copy.setText(self.tr("Copy the tip"))
         self._save.setText(self.tr("Save..."))

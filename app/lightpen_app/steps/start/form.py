@@ -17,10 +17,12 @@ from lightpen.arrays import FloatArray
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
 from lightpen.swing.preparation import Lack
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID
 from lightpen_app.steps.start.point_field import PointField
 from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
+from lightpen_app.widgets.labelled import field_label, stacked
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LARGEST_BALL = 100.0  # mm
@@ -66,7 +68,7 @@ class NamesForm(Translated, QWidget):
         self._nominal_tip = PointField()
         self._edits = (self._operator, self._pen, self._tip, self._cone)
         self._labels: dict[QWidget, QLabel] = {
-            field: _field_label(field)
+            field: field_label(field)
             for field in (self._station, *self._edits, self._ball, self._nominal_tip)
         }
 
@@ -159,7 +161,7 @@ class NamesForm(Translated, QWidget):
         self._nominal_tip.settle()
 
     def _labelled(self, field: QWidget) -> QVBoxLayout:
-        return _stacked(self._labels[field], field)
+        return stacked(self._labels[field], field)
 
     def _retranslate(self) -> None:
         self._place.setTitle(self.tr("Where and who"))
@@ -191,9 +193,12 @@ class LimitsForm(Translated, QGroupBox):
     -------
     value_changed()
         The user chose other limits.
+    all_requested()
+        All limits of the station shall be shown.
     """
 
     value_changed = Signal()
+    all_requested = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -204,14 +209,16 @@ class LimitsForm(Translated, QGroupBox):
         self._uncertainty.setSingleStep(0.001)
         self._least = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
         self._most = NumberField("", (LEAST_IMAGES, MOST_IMAGES), 0)
+        self._all = PushButton()
         self._fields = (self._uncertainty, self._least, self._most)
-        self._labels = tuple(map(_field_label, self._fields))
+        self._labels = tuple(map(field_label, self._fields))
 
         # Layout
         layout = _panel(self)
         layout.setColumnStretch(2, 1)
         for column, field in enumerate(self._fields):
-            layout.addLayout(_stacked(self._labels[column], field), 0, column)
+            layout.addLayout(stacked(self._labels[column], field), 0, column)
+        layout.addWidget(self._all, 0, 3, Qt.AlignmentFlag.AlignBottom)
 
         # Connections
         for field in self._fields:
@@ -219,6 +226,7 @@ class LimitsForm(Translated, QGroupBox):
         self._uncertainty.valueChanged.connect(self.value_changed)
         self._least.valueChanged.connect(self._on_least_changed)
         self._most.valueChanged.connect(self._on_most_changed)
+        self._all.clicked.connect(self.all_requested)
 
         self.set_value(self._value)
         self._retranslate()
@@ -243,6 +251,11 @@ class LimitsForm(Translated, QGroupBox):
         self._least.setValue(limits.min_images)
         self.blockSignals(blocked)
 
+    def set_guarded(self, guarded: bool) -> None:
+        """Let nobody change them here, as it takes a supervisor."""
+        for field in self._fields:
+            field.setEnabled(not guarded)
+
     def settle(self) -> None:
         """Take over the numbers that are being typed."""
         for field in self._fields:
@@ -258,6 +271,10 @@ class LimitsForm(Translated, QGroupBox):
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Limits of the swing"))
+        self._all.setText(self.tr("All limits..."))
+        self._all.setToolTip(
+            self.tr("Those of verifications, too; a supervisor lays them down.")
+        )
         texts = (
             self.tr("U (k = 2) at most"),
             self.tr("Images at least"),
@@ -291,13 +308,6 @@ def _name_edit() -> QLineEdit:
     return edit
 
 
-def _field_label(field: QWidget) -> QLabel:
-    label = text_label(TextSize.SMALL, Tone.QUIET)
-    label.setWordWrap(False)
-    label.setBuddy(field)
-    return label
-
-
 def _panel(group: QGroupBox) -> QGridLayout:
     layout = QGridLayout(group)
     layout.setContentsMargins(0, 0, 0, 0)
@@ -305,12 +315,4 @@ def _panel(group: QGroupBox) -> QGridLayout:
     layout.setVerticalSpacing(3 * GRID // 2)
     layout.setColumnStretch(0, 1)
     layout.setColumnStretch(1, 1)
-    return layout
-
-
-def _stacked(label: QLabel, field: QWidget) -> QVBoxLayout:
-    layout = QVBoxLayout()
-    layout.setSpacing(GRID // 2)
-    layout.addWidget(label)
-    layout.addWidget(field)
     return layout

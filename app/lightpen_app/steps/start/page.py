@@ -10,11 +10,13 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
+from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.acceptance import conclude_accepted
 from lightpen.record.opening import swing_folder
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result
+from lightpen.record.supervision import Signature, Supervision, lay_down
 from lightpen.record.unfinished import (
     Unfinished,
     discard_damaged,
@@ -33,6 +35,7 @@ from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
@@ -64,6 +67,7 @@ class StartPage(Rearranged, Page):
         self._lookup: Job | None = None
         self._search: Job | None = None
         self._work: Job | None = None
+        self._signing: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
         self._is_trying = False
@@ -71,6 +75,7 @@ class StartPage(Rearranged, Page):
         # Widgets: the order of making them is the order of the Tab key
         self._names = NamesForm()
         self._limits = LimitsForm()
+        self._all_limits = LimitsDialog(self)
         self._assumed = AssumptionsPanel()
         self._interrupted = InterruptedPanel()
         self._last = LastResultPanel(workbench.around.now)
@@ -118,6 +123,8 @@ class StartPage(Rearranged, Page):
         self._names.station_entered.connect(self.show_lack)
         self._names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
         self._limits.value_changed.connect(self._on_limits_changed)
+        self._limits.all_requested.connect(self._on_all_limits_requested)
+        self._all_limits.signed.connect(self._on_limits_signed)
         self._assumed.value_changed.connect(self._on_assumed_changed)
         self._typing.timeout.connect(self._take_names)
         self._searching.timeout.connect(self._search_interrupted)
@@ -126,6 +133,7 @@ class StartPage(Rearranged, Page):
         self._interrupted.search_requested.connect(self._search_interrupted)
         self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.take_back_requested.connect(self._on_take_back_requested)
+        self._last.verification_requested.connect(self._on_verification_requested)
         workbench.others_counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.swing_wanted.connect(self._on_swing_wanted)
@@ -179,7 +187,7 @@ class StartPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._searching.stop()
-        for job in (self._lookup, self._search, self._work):
+        for job in (self._lookup, self._search, self._work, self._signing):
             if job is not None:
                 job.cancel()
 
@@ -202,6 +210,7 @@ class StartPage(Rearranged, Page):
 
     @override
     def _retranslate(self) -> None:
+        self._tell_why_unverified()
         self.changed.emit()
 
     # What is typed
@@ -241,6 +250,31 @@ class StartPage(Rearranged, Page):
     def _on_limits_changed(self) -> None:
         self._choose(replace(self._workbench.preparation, limits=self._limits.value()))
 
+    def _on_all_limits_requested(self) -> None:
+        now, choices = self._workbench.preparation, self._workbench.choices
+        limits = StationLimits(now.limits, choices.limits)
+        is_guarded = self._workbench.supervision.is_guarded
+        self._all_limits.set_value(limits, is_guarded=is_guarded)
+        self._all_limits.open()
+
+    def _on_limits_signed(
+        self, limits: StationLimits, signature: Signature, new_password: str
+    ) -> None:
+        workbench = self._workbench
+        folder, now = workbench.folder, workbench.around.now
+        station = workbench.preparation.names.station
+        self._signing = self._started(
+            lambda _: lay_down(
+                *(folder, station, limits, signature, new_password, now())
+            ),
+            self._on_laid_down,
+        )
+        self._signing.failed.connect(self._all_limits.tell)
+
+    def _on_laid_down(self, supervision: Supervision) -> None:
+        self._all_limits.close()
+        self._workbench.set_supervision(supervision)
+
     def _on_assumed_changed(self) -> None:
         assumed = self._assumed.value()
         self._choose(replace(self._workbench.preparation, assumptions=assumed))
@@ -271,6 +305,8 @@ class StartPage(Rearranged, Page):
         self._shown = now
         self._show_changes(before, now)
         self._go_on_trying()
+        self._tell_why_unverified()
+        self._limits.set_guarded(self._workbench.supervision.is_guarded)
         if _key(now) != self._looked_up:
             self._look_up_last()
         self.changed.emit()
@@ -290,6 +326,10 @@ class StartPage(Rearranged, Page):
             pen = None if now.pen_file is None else now.pen_file.pen
             self._names.set_tip_of_file(None if pen is None else pen.nominal_tip)
 
+    def _tell_why_unverified(self) -> None:
+        lacks = self._workbench.preparation.lacks()
+        self._last.set_why_unverified(lack_text(lacks[0]) if lacks else "")
+
     def _look_up_last(self) -> None:
         """Look for the result in force, for the pen and tip that are named."""
         if self._lookup is not None:
@@ -308,7 +348,8 @@ class StartPage(Rearranged, Page):
 
     def _on_looked_up(self, result: Result | None) -> None:
         is_simulated = self._looked_up[2]
-        self._last.set_value(LastResult(result, is_simulated=is_simulated))
+        rule = self._workbench.due_rule()
+        self._last.set_value(LastResult(result, is_simulated=is_simulated, rule=rule))
         now = self._workbench.preparation
         wants_last, self._wants_last = self._wants_last, False
         is_bare = now.names.ball_diameter is None and now.nominal_tip is None
@@ -380,7 +421,7 @@ class StartPage(Rearranged, Page):
                     "Camera, then resume the swing here."
                 )
             )
-        elif not swing.is_of(self._workbench.preparation.source):
+        elif not swing.is_of(self._workbench.preparation.sources):
             self.notice_raised.emit(
                 self.tr(
                     "The swing was captured with another source of images. Choose that "
@@ -415,6 +456,10 @@ class StartPage(Rearranged, Page):
     def _go_on(self, swing: Resumable) -> None:
         self._resumed = swing.record.folder
         self._workbench.run.runner.go_on(swing)
+
+    def _on_verification_requested(self) -> None:
+        self._settle()
+        self.step_requested.emit("verify")
 
     def _on_take_back_requested(self, result: Result) -> None:
         operator = self._workbench.preparation.names.operator

@@ -1,7 +1,7 @@
 """The tip in force for a pen and probe tip, and its age."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
 from PySide6.QtCore import Qt, Signal
@@ -16,7 +16,8 @@ from PySide6.QtWidgets import (
 
 from lightpen.estimation.verdict import Grade
 from lightpen.local_time import local_time
-from lightpen.record.results import OLD, Result
+from lightpen.record.due_rule import DueRule
+from lightpen.record.results import Result
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
@@ -46,12 +47,15 @@ class LastResult:
         Why it cannot be told; else empty.
     is_simulated : bool
         Whether it is asked for a simulated pen.
+    rule : DueRule
+        How long a tip may be in force.
     """
 
     result: Result | None = None
     is_named: bool = True
     trouble: str = ""
     is_simulated: bool = False
+    rule: DueRule = field(default_factory=DueRule)
 
 
 class LastResultPanel(Translated, QGroupBox):
@@ -66,9 +70,12 @@ class LastResultPanel(Translated, QGroupBox):
     -------
     take_back_requested(Result)
         The result that is shown shall not be in force any more.
+    verification_requested()
+        The tip that is shown shall be verified.
     """
 
     take_back_requested = Signal(object)
+    verification_requested = Signal()
 
     def __init__(
         self, now: Callable[[], datetime], parent: QWidget | None = None
@@ -89,6 +96,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._origin = SignLabel()
         self._reason = SignLabel()
         self._warning = SignLabel()
+        self._verify = PushButton()
         self._take_back = PushButton()
         self._question = QuestionBar()
 
@@ -118,10 +126,16 @@ class LastResultPanel(Translated, QGroupBox):
         layout.addWidget(self._origin)
         layout.addWidget(self._reason)
         layout.addWidget(self._warning)
-        layout.addWidget(self._take_back, 0, Qt.AlignmentFlag.AlignLeft)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(GRID)
+        buttons.addWidget(self._verify)
+        buttons.addWidget(self._take_back)
+        buttons.addStretch(1)
+        layout.addLayout(buttons)
         layout.addWidget(self._question)
 
         # Connections
+        self._verify.clicked.connect(self.verification_requested)
         self._take_back.clicked.connect(self._question.ask)
         self._question.agreed.connect(self._on_agreed)
         self._question.declined.connect(self._take_back.setFocus)
@@ -137,6 +151,11 @@ class LastResultPanel(Translated, QGroupBox):
         self._value = value
         self._question.hide()
         self._retranslate()
+
+    def set_why_unverified(self, why_not: str) -> None:
+        """Say why the tip cannot be verified now, or let it."""
+        told = self.tr("Prove the tip in minutes by touching what is known.")
+        self._verify.set_why_not(why_not, told)
 
     def words(self) -> tuple[str, ...]:
         """Return what is said, line by line."""
@@ -159,6 +178,7 @@ class LastResultPanel(Translated, QGroupBox):
             if value.is_simulated
             else self.tr("Last calibration of this pen and tip")
         )
+        self._verify.setText(self.tr("Verify it"))
         self._take_back.setText(self.tr("Take back..."))
         self._take_back.setToolTip(
             self.tr("Put the result before in force again; both are kept.")
@@ -168,7 +188,8 @@ class LastResultPanel(Translated, QGroupBox):
             self.tr("Take back"),
             self.tr("Leave it in force"),
         )
-        self._take_back.setVisible(value.result is not None)
+        for button in (self._verify, self._take_back):
+            button.setVisible(value.result is not None)
         if value.result is not None:
             self._show(value.result)
         elif value.trouble:
@@ -222,6 +243,9 @@ class LastResultPanel(Translated, QGroupBox):
         if not result.reason:
             return Remark()
         text = self.tr("Accepted with the reason: {0}").format(result.reason)
+        if result.supervisor:
+            text = self.tr("Accepted by the supervisor {0} with the reason: {1}")
+            text = text.format(shortened(result.supervisor), result.reason)
         return Remark(text, Sign.WARNING, Tone.WARN)
 
     def _on_agreed(self) -> None:
@@ -230,10 +254,10 @@ class LastResultPanel(Translated, QGroupBox):
     def _warning_of(self, result: Result, now: datetime) -> Remark:
         if result.accepted > now:
             text = self.tr("It is dated later than now. Check the clock here.")
-        elif result.is_old(now):
+        elif now > self._value.rule.due(result.accepted):
             text = self.tr(
                 "It is older than {0} days. Calibrate before you measure."
-            ).format(OLD.days)
+            ).format(self._value.rule.max_days)
         else:
             return Remark()
         return Remark(text, Sign.WARNING, Tone.WARN)

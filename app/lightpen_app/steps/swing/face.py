@@ -1,6 +1,7 @@
 """What is seen of a swing: instruction, dial, count, state, image and plots."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize
 from PySide6.QtWidgets import (
@@ -17,7 +18,6 @@ from typing_extensions import override
 from lightpen.arrays import Image
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.swing.leaning_dial import LeaningDial
-from lightpen_app.steps.swing.plots_panel import SwingPlots
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.late import Late
@@ -28,6 +28,9 @@ from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.widgets.translated import Translated
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.swing.plots_panel import SwingPlots
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
@@ -75,7 +78,7 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._pen = PenInSpace()
         self._image = ImageView()
         self._image.setMinimumWidth(LEAST_IMAGE)
-        self._plots = Late(SwingPlots)
+        self._plots = Late(_make_plots)
 
         # Layout
         head = QHBoxLayout()
@@ -162,7 +165,7 @@ class SwingFace(Rearranged, Translated, QWidget):
         """Show a live image; see `ImageView.set_half`."""
         self._image.set_half(half, size, markers)
 
-    def plots(self) -> SwingPlots:
+    def plots(self) -> "SwingPlots":
         """Return the plots."""
         return self._plots.content()
 
@@ -204,3 +207,10 @@ class SwingFace(Rearranged, Translated, QWidget):
     def _hold_first_row(self, height: int) -> None:
         """Let the dial and what is beside it be seen whole above the plots."""
         self._body.setRowMinimumHeight(0, height if self._is_small else 0)
+
+
+def _make_plots() -> "SwingPlots":
+    # What draws plots takes a fifth of the time to the first window, which has none.
+    from lightpen_app.steps.swing.plots_panel import SwingPlots
+
+    return SwingPlots()

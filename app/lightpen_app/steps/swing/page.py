@@ -90,9 +90,11 @@ class SwingPage(Page):
         # Connections
         self._run.changed.connect(self._on_run_changed)
         self._run.happened.connect(self._on_happened)
+        self._workbench.verification.changed.connect(self._show_soon)
         self._run.progressed.connect(self._on_progressed)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
+        self._live.other_changed.connect(self._on_connection_changed)
         self._question.agreed.connect(self._on_question_agreed)
         self._act.clicked.connect(self._on_act_clicked)
         self._start_over.clicked.connect(self._on_start_over_clicked)
@@ -224,7 +226,7 @@ class SwingPage(Page):
             setup=setup,
             state=state,
             short=self._measured[1],
-            connection=self._live.connection,
+            connection=self._live.worst_connection,
             seen=self._sight.words(),
             is_troubled=status.is_troubled,
             solving=self._solved if status.is_solving else None,
@@ -264,7 +266,7 @@ class SwingPage(Page):
         """Show what is the case now, here and in the operator view."""
         moment = self._moment()
         if moment is None:
-            is_near = self._live.connection is Connection.STREAMING
+            is_near = self._live.worst_connection is Connection.STREAMING
             value = self._words.waiting_value(self._run.status.refusal, is_near=is_near)
             self._face.set_value(value)
             self._face.set_warning(Remark())
@@ -279,7 +281,8 @@ class SwingPage(Page):
             self._face.set_stand(self._words.stand(moment))
             if is_verdict and not moment.asks_upright:
                 value = replace(value, dial=None)
-        self.operator_value_changed.emit(value)
+        if not self._workbench.verification.status.is_here:
+            self.operator_value_changed.emit(value)
         self._face.dial.set_interactive(self._live.operator is not None)
         text, self._press_act = self._offered()
         self._act.setText(text)
@@ -296,7 +299,7 @@ class SwingPage(Page):
         """Return what the button beside Start over does now."""
         state = self._run.status.state
         if state is None or self._run.status.is_capturing:
-            if self._live.connection is Connection.CLOSED:
+            if self._live.worst_connection is Connection.CLOSED:
                 return self.tr("Open the camera"), self._try_again
             if state is None:
                 return self.tr("Try again"), self._try_again
@@ -389,6 +392,6 @@ class SwingPage(Page):
 
     def _try_again(self) -> None:
         """Open the camera again, or begin where it was refused."""
-        if self._live.connection is Connection.CLOSED:
+        if self._live.worst_connection is Connection.CLOSED:
             self._workbench.open_camera()
         self._runner.try_again()

@@ -69,6 +69,13 @@ def views_listed(window: BoardWindow) -> int:
     return window.findChildren(QListWidget)[0].count()
 
 
+def inside(pixel: np.ndarray) -> list[float]:
+    """Return a place in the image that is not on its border, beside numbers."""
+    middle = np.array([CAMERA.width, CAMERA.height]) / 2
+    place: list[float] = (middle + 0.95 * (pixel - middle) + 2).tolist()
+    return place
+
+
 def written(folder: Path, images: list[Image]) -> str:
     for number, image in enumerate(images):
         cv2.imwrite(str(folder / f"{number}.png"), image)
@@ -89,6 +96,23 @@ def test_a_folder_of_images_becomes_a_camera_file_in_use(
     overlay = window.findChildren(BoardView)[0].overlay()
     assert overlay.arrows is not None
     assert len(overlay.arrows) == 7 * 35
+
+    press(window, "Uncertainty")
+    view = window.findChildren(BoardView)[0]
+    uncertainty = view.overlay().uncertainty
+    assert view.overlay().arrows is None
+    assert uncertainty is not None
+    assert view.image_size() == QSize(CAMERA.width, CAMERA.height)
+    picture = view.grab().toImage()
+    best = np.unravel_index(np.argmin(uncertainty.sigmas), uncertainty.sigmas.shape)
+    worst = np.unravel_index(np.argmax(uncertainty.sigmas), uncertainty.sigmas.shape)
+    reds = [
+        picture.pixelColor(
+            view.place_of(*inside(uncertainty.pixels[at])).toPoint()
+        ).red()
+        for at in (best, worst)
+    ]
+    assert reds[0] < reds[1]
 
 
 def test_a_view_that_is_left_out_takes_no_part(

@@ -1,6 +1,6 @@
 """The step Camera as an operator sees it: live image, exposure, intrinsics, masks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -22,6 +22,7 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QCheckBox,
     QFileDialog,
     QLabel,
     QLineEdit,
@@ -31,7 +32,9 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
+from lightpen.cameras.pairing import not_synchronised
 from lightpen.cameras.protocol import CameraSettings, Frame, sealed
+from lightpen.cameras.worker import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
@@ -54,6 +57,7 @@ from lightpen_app.steps.camera.exposure_bar import ExposureBar
 from lightpen_app.steps.camera.focus_meter import FocusMeter
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
 from lightpen_app.steps.camera.page import CameraPage
+from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
 from lightpen_app.steps.camera.stray_light_panel import StrayLightPanel
 from lightpen_app.steps.page import MainAction, Page
@@ -65,6 +69,7 @@ from lightpen_app.work.workbench import Workbench
 if TYPE_CHECKING:
     from tests.app.steps.conftest import See, Seen
 
+N_LEDS = 10
 LAMPS = (
     Lamp(np.array([200.0, 150.0]), (8.0, 6.0)),
     Lamp(np.array([1050.0, 760.0]), (5.0, 5.0)),
@@ -115,7 +120,7 @@ def plugged(workbench: Workbench, scene: Scene, *lamps: Lamp) -> SimulatedCamera
     """Open a simulated camera in which things can go wrong."""
     clock = workbench.around.clock
     camera = SimulatedCamera(scene, clock, lamps=lamps)
-    workbench.live.open(camera, CameraSettings(), clock)
+    workbench.live.open([camera], CameraSettings(), clock)
     return camera
 
 
@@ -139,6 +144,79 @@ def intrinsics(workbench: Workbench, folder: Path, **changes: object) -> Path:
     path = folder / "other.yaml"
     write_camera(replace(camera, **changes), path)  # type: ignore[arg-type]
     return path
+
+
+# Two cameras
+
+
+def places(seen: "Seen") -> dict[str, float]:
+    """Return where the LEDs are marked, px from the left."""
+    return {marker.label: marker.x for marker in seen.markers}
+
+
+def are_apart(one: Mapping[str, float], other: Mapping[str, float]) -> bool:
+    """Whether every LED is seen elsewhere by the other camera."""
+    return all(abs(other[label] - x) > 5 for label, x in one.items())
+
+
+def ask_for_second(seen: "Seen") -> None:
+    (box,) = (
+        each
+        for each in seen.page.findChildren(QCheckBox)
+        if each.text().startswith("A second camera")
+    )
+    box.click()
+
+
+def test_a_second_camera_is_shown_set_and_masked_by_itself(
+    live: "Seen", workbench: Workbench
+) -> None:
+    assert workbench.preparation.second is None
+    ask_for_second(live)
+    live.wait("left and right stand 500.00")
+    live.until(lambda: len(places(live)) == N_LEDS)
+    first = places(live)
+    live.click("Camera 2")
+    live.until(lambda: len(places(live)) == N_LEDS and are_apart(first, places(live)))
+    workbench.live.set_exposure(400.0)
+    live.until(lambda: workbench.live.connection is Connection.STREAMING)
+
+    workbench.set_preparation(
+        workbench.preparation.with_mask(1, np.array([[5.0, 5.0, 3.0]]))
+    )
+    assert not len(workbench.preparation.mask)
+    live.until(lambda: not workbench.preparation.camera_lacks())
+    live.page.left()
+    assert workbench.live.chosen == 0
+
+    live.page.entered()
+    ask_for_second(live)
+    assert workbench.preparation.second is None
+    live.until(lambda: workbench.live.n_cameras == 1)
+
+
+def test_a_rig_file_that_cannot_be_read_is_told_where_it_was_chosen(
+    live: "Seen", workbench: Workbench, tmp_path: Path
+) -> None:
+    ask_for_second(live)
+    live.wait("left and right stand")
+    (tmp_path / "rig.json").write_text("{}")
+    panel = live.child(RigPanel)
+    panel.path_chosen.emit(str(tmp_path / "rig.json"))
+
+    live.until(lambda: "cameras" in panel.remark().text)
+    assert panel.remark().tone is Tone.BAD
+    assert workbench.preparation.rig_file is not None
+
+
+def test_cameras_out_of_step_are_told_with_what_that_costs(live: "Seen") -> None:
+    ask_for_second(live)
+    live.wait("left and right stand")
+    panel = live.child(RigPanel)
+    panel.set_step(not_synchronised(12.5, 2.0), 3)
+
+    assert "12.5 ms apart" in panel.step().text
+    assert "Images without a partner: 3" in panel.step().text
 
 
 # Live image
@@ -650,7 +728,7 @@ def test_a_camera_that_is_not_there_is_told(
     clock = workbench.around.clock
     camera = SimulatedCamera(small_scene, clock)
     camera.faults.unplug()
-    workbench.live.open(camera, CameraSettings(), clock)
+    workbench.live.open([camera], CameraSettings(), clock)
     seen.page.entered()
 
     seen.wait("is not plugged in. Plug it in.")
@@ -982,6 +1060,7 @@ def test_every_control_is_named_and_reached_by_tab(
         "Intrinsics file",
         "Open...",
         "Calibrate this camera...",
+        "A second camera looks at the pen, too",
         "Draw the mask on the image",
         "Search",
         "Cover the LEDs",

@@ -129,7 +129,7 @@ def live(seen: "Seen", workbench: Workbench, small_scene: Scene) -> "Seen":
 
 def plugged(workbench: Workbench, scene: Scene) -> SimulatedCamera:
     camera = SimulatedCamera(scene, workbench.around.clock)
-    workbench.live.open(camera, CameraSettings(), workbench.around.clock)
+    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     camera.operator.seat()
     camera.operator.swing()
     return camera
@@ -823,7 +823,7 @@ def test_a_pen_that_is_away_is_not_found(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     camera = SimulatedCamera(small_scene, workbench.around.clock)
-    workbench.live.open(camera, CameraSettings(), workbench.around.clock)
+    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
     seen.page.entered()
     seen.wait("10 of 10 LEDs")  # the simulated pen is shown by itself
     camera.operator.leave()

@@ -50,11 +50,11 @@ from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.shortfall import N_MORE
 from lightpen_app.look.theme import Tone
+from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
 from lightpen_app.steps.review.next_tips_row import NextTipsRow
-from lightpen_app.steps.review.number_table import NumberTable
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.plots_panel import MethodsPanel
@@ -62,7 +62,9 @@ from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import ResidualView
 from lightpen_app.steps.review.result_panel import ResultPanel
+from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.tip_readout import TipReadout
+from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.state_banner import State, StateBanner
@@ -209,7 +211,11 @@ def answer(page: ReviewPage, text: str) -> None:
 def give_reason(page: ReviewPage, reason: str) -> None:
     """Click to accept a tip that is to be checked, type why, and press Enter."""
     click(page, "Accept...")
-    edit = the(the(page, ReasonBar), QLineEdit)
+    (edit,) = (
+        each
+        for each in the(page, ReasonBar).findChildren(QLineEdit)
+        if each.isVisible()
+    )
     QTest.keyClicks(edit, reason)
     QTest.keyClick(edit, Qt.Key.Key_Return)
 
@@ -1048,6 +1054,40 @@ def test_an_accepted_tip_is_in_force_and_said_to_be(
     assert page.unsaved() == ""
     assert "no earlier result" in differences(page)  # not compared with itself
     assert open_record(workbench.run.records_folder / "swing").verdict == Grade.PASS
+
+
+def test_the_record_on_paper_is_of_the_result_on_the_disk(
+    page: ReviewPage, bed: Bed, qtbot: QtBot
+) -> None:
+    entry = next(
+        action
+        for menu in page.findChildren(QMenu)
+        for action in menu.actions()
+        if action.text() == "Record on paper..."
+    )
+    assert not entry.isEnabled()
+    assert entry.toolTip().startswith("Accept the tip first")
+
+    accept(page, qtbot)
+    entry.trigger()
+    qtbot.waitUntil(lambda: bool(page.findChildren(PaperWindow)))
+
+    window = the(page, PaperWindow)
+    qtbot.waitUntil(lambda: window.n_pages() > 2)
+    window.close()
+
+
+def test_a_result_that_is_gone_is_not_put_on_paper(
+    page: ReviewPage, bed: Bed, qtbot: QtBot
+) -> None:
+    accept(page, qtbot)
+    shutil.rmtree(bed.workbench.run.archive.folder)
+
+    with qtbot.waitSignal(page.notice_raised) as told:
+        the(page, ResultTools).paper_requested.emit()
+
+    assert "LP-04" in told.args[0]
+    assert page.findChildren(PaperWindow) == []
 
 
 def test_an_accepted_swing_is_changed_no_more(

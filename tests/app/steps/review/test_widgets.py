@@ -14,10 +14,10 @@ from lightpen_app.look.quantities import decimals_for, number_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.review.image_table import ImageTable
-from lightpen_app.steps.review.number_table import Figures, NumberTable
 from lightpen_app.steps.review.remark_list import MOST, RemarkList
 from lightpen_app.steps.review.residual_view import Arrows, ResidualView
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
+from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.sign_label import Remark
 

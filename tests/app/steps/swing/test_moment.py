@@ -26,6 +26,7 @@ def words(qapp: QApplication) -> SwingWords:
 
 def moment(state: SwingState, **more: object) -> Moment:
     short = measure_shortfall(SETUP, state)
+    # Which names there are is known to the class alone.
     return replace(Moment(SETUP, state, short), **more)  # type: ignore[arg-type]
 
 

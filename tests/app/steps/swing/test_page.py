@@ -574,7 +574,7 @@ def test_a_camera_that_is_unplugged_and_back_costs_nothing(
 ) -> None:
     around = capturing.workbench.around
     camera = SimulatedCamera(around.scene, around.clock)
-    capturing.workbench.live.open(camera, CameraSettings(), around.clock)
+    capturing.workbench.live.open([camera], CameraSettings(), around.clock)
     keep_on(qtbot, capturing)  # on another camera, from the record
     n_before, n_played = capturing.state.n_kept, len(capturing.recorder.played)
 
@@ -596,7 +596,7 @@ def test_a_damaged_image_is_not_taken_for_the_reason_of_a_pause(
         capturing.workbench.around.scene, capturing.workbench.around.clock
     )
     capturing.workbench.live.open(
-        camera, CameraSettings(), capturing.workbench.around.clock
+        [camera], CameraSettings(), capturing.workbench.around.clock
     )
     keep_on(qtbot, capturing, 1)
     capturing.type(Key.Key_Space)

@@ -1,0 +1,57 @@
+"""Which of two cameras is shown and set."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
+
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+N_CAMERAS = 2
+
+
+class CameraSwitch(Translated, QWidget):
+    """A button for each camera, of which one is pressed.
+
+    Signals
+    -------
+    value_changed(int)
+        Another camera is to be shown, by its number from 0.
+    """
+
+    value_changed = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._buttons = [PushButton() for _ in range(N_CAMERAS)]
+        self._group = QButtonGroup(self)
+        for c, button in enumerate(self._buttons):
+            button.setCheckable(True)
+            self._group.addButton(button, c)
+        self._buttons[0].setChecked(True)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        for button in self._buttons:
+            layout.addWidget(button)
+
+        # Connections
+        self._group.idClicked.connect(self.value_changed)
+
+        self._retranslate()
+
+    def value(self) -> int:
+        """Return the number of the camera that is shown, from 0."""
+        return self._group.checkedId()
+
+    def set_value(self, camera: int) -> None:
+        """Show another camera as chosen."""
+        self._buttons[camera].setChecked(True)
+
+    def _retranslate(self) -> None:
+        for number, button in enumerate(self._buttons, start=1):
+            button.setText(self.tr("Camera {0}").format(number))

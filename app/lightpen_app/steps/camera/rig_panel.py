@@ -1,0 +1,163 @@
+"""Two cameras at once: the file that says where they stand, and if they keep step."""
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QGroupBox, QVBoxLayout, QWidget
+
+from lightpen.formats.rig_files import RigFile
+from lightpen.model.rig import Rig
+from lightpen.sentences import Sentence
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.file_drops import FileDrops
+from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+FILES = "*.json *.yaml *.yml"
+
+
+class RigPanel(Translated, QGroupBox):
+    """Asks for a second camera, and for the rig file that belongs to it.
+
+    Signals
+    -------
+    wanted(bool)
+        Whether two cameras are to look at once.
+    path_chosen(str)
+        A rig file is to be read.
+    """
+
+    wanted = Signal(bool)
+    path_chosen = Signal(str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._file: RigFile | None = None
+        self._late: Sentence | None = None
+        self._n_unpaired: int | None = None
+
+        # Widgets
+        self._second = QCheckBox()
+        self._path = PathField()
+        self._open = PushButton()
+        self._path.add_button(self._open)
+        self._told = SignLabel()
+        self._step = SignLabel()
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        for widget in (self._second, self._path, self._told, self._step):
+            layout.addWidget(widget)
+
+        # Connections
+        self._second.toggled.connect(self._on_toggled)
+        self._path.path_chosen.connect(self.path_chosen)
+        self._open.clicked.connect(self._on_open_clicked)
+        FileDrops(self).dropped.connect(self._path.take)
+
+        self._retranslate()
+
+    def remark(self) -> Remark:
+        """Return what is told of the file."""
+        return self._told.value()
+
+    def step(self) -> Remark:
+        """Return whether the cameras keep step."""
+        return self._step.value()
+
+    def set_value(self, is_wanted: bool, file: RigFile | None) -> None:
+        """Show whether there are two cameras, and their file."""
+        self._second.blockSignals(True)
+        self._second.setChecked(is_wanted)
+        self._second.blockSignals(False)
+        if file is not self._file:
+            self._path.set_value("" if file is None else str(file.path))
+            self._path.set_faulty(False)
+        self._file = file
+        self._refresh()
+
+    def set_problem(self, why: str) -> None:
+        """Say why the file that was chosen is not used."""
+        self._path.set_faulty(True)
+        self._told.set_value(Remark(why, Sign.CROSS, Tone.BAD))
+
+    def set_step(self, late: Sentence | None, n_unpaired: int | None) -> None:
+        """Show by how much the cameras are apart, and how many images found no partner.
+
+        Nothing is known yet of None of these.
+        """
+        if (late, n_unpaired) != (self._late, self._n_unpaired):
+            self._late, self._n_unpaired = late, n_unpaired
+            self._refresh_step()
+
+    def _on_toggled(self, is_wanted: bool) -> None:
+        self.wanted.emit(is_wanted)
+
+    def _on_open_clicked(self) -> None:
+        self._path.pick(
+            QFileDialog.FileMode.ExistingFile,
+            self.tr("Rig file of both cameras"),
+            self.tr("Rig files ({0})").format(FILES),
+        )
+
+    def _retranslate(self) -> None:
+        self.setTitle(self.tr("Two cameras at once"))
+        asked = self.tr("A second camera looks at the pen, too")
+        self._second.setText(asked)
+        self._second.setAccessibleName(asked)
+        edit = self._path.edit()
+        edit.setAccessibleName(self.tr("Rig file"))
+        edit.setPlaceholderText(self.tr("Rig file"))
+        self._open.setText(self.tr("Open..."))
+        self._refresh()
+
+    def _refresh(self) -> None:
+        is_wanted = self._second.isChecked()
+        for widget in (self._path, self._open):
+            widget.setVisible(is_wanted)
+        self._told.set_value(self._checked() if is_wanted else Remark())
+        self._refresh_step()
+
+    def _checked(self) -> Remark:
+        if self._file is None:
+            words = self.tr(
+                'Open the file that says where both cameras stand. "lightpen '
+                'extrinsics LEFT RIGHT --board BOARD --out rig.json" makes it from '
+                "images of one board."
+            )
+            return Remark(words, Sign.WARNING, Tone.WARN)
+        rig = self._file.rig
+        words = self.tr("{0} and {1} stand {2} mm apart").format(
+            rig.names[0], rig.names[1], _baseline(rig)
+        )
+        return Remark(words, Sign.CHECK, Tone.GOOD)
+
+    def _refresh_step(self) -> None:
+        remark = Remark()
+        if self._second.isChecked() and self._n_unpaired is not None:
+            if self._late is not None:
+                remark = Remark(worded(self._late), Sign.WARNING, Tone.WARN)
+            else:
+                words = self.tr("Both take their images at the same moment.")
+                remark = Remark(words, Sign.CHECK, Tone.GOOD)
+            if self._n_unpaired:
+                words = self.tr("{0} Images without a partner: {1}.")
+                text = words.format(remark.text, self._n_unpaired)
+                remark = Remark(text, Sign.WARNING, Tone.WARN)
+        self._step.set_value(remark)
+
+
+def _baseline(rig: Rig) -> str:
+    """Return how far the second camera stands from the first, mm."""
+    shift = rig.translations[1]
+    length = float(np.linalg.norm(shift))
+    if rig.covariance is None:
+        return f"{length:.1f}"
+    along = shift / length
+    sigma = float(np.sqrt(along @ rig.covariance[3:6, 3:6] @ along))
+    return f"{length:.2f} \u00b1 {2 * sigma:.2f}"

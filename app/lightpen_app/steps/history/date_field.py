@@ -1,0 +1,52 @@
+"""A field for a day, which may be left empty."""
+
+from datetime import date
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from lightpen_app.look.theme import Tone, set_tone
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.translated import Translated
+
+EXAMPLE = date(2026, 8, 14)
+
+
+class DateField(Translated, EnterEdit):
+    """A day as 2026-08-14; what is no day is marked, and counts as none.
+
+    Signals
+    -------
+    value_changed()
+        Another day is typed, or none.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value: date | None = None
+        self.setPlaceholderText(f"{EXAMPLE}")
+
+        # Connections
+        self.textChanged.connect(self._on_text_changed)
+
+        self._retranslate()
+
+    def value(self) -> date | None:
+        """Return the day; None for any."""
+        return self._value
+
+    def _on_text_changed(self, text: str) -> None:
+        before, typed = self._value, text.strip()
+        try:
+            self._value = date.fromisoformat(typed) if typed else None
+        except ValueError:
+            self._value = None
+        is_wrong = bool(typed) and self._value is None
+        set_tone(self, Tone.BAD if is_wrong else Tone.PLAIN)
+        if self._value != before:
+            self.value_changed.emit()
+
+    def _retranslate(self) -> None:
+        self.setToolTip(self.tr("A day such as {0}; empty for any.").format(EXAMPLE))

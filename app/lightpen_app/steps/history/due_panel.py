@@ -1,0 +1,137 @@
+"""When the tips in force are due to be calibrated again."""
+
+from collections.abc import Callable, Sequence
+from datetime import datetime
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from lightpen.archive.due import DueTip
+from lightpen.record.due_rule import DueRule
+from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.look.words import PARTED, moment_text, shortened
+from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.translated import Translated
+
+MOST_DAYS, MOST_SWINGS = 3650, 10_000
+FIELD_WIDTH = 20 * GRID
+
+
+class DuePanel(Translated, QWidget):
+    """Shows the tips in force with their due dates, by a rule that can be changed.
+
+    Parameters
+    ----------
+    now : callable
+        Returns the date and time that they are due by.
+
+    Signals
+    -------
+    rule_changed(DueRule)
+        The user chose another rule.
+    """
+
+    rule_changed = Signal(object)
+
+    def __init__(
+        self,
+        rule: DueRule,
+        now: Callable[[], datetime],
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._now = now
+        self._tips: tuple[DueTip, ...] = ()
+
+        # Widgets
+        self._days = NumberField("", (1, MOST_DAYS), 0)
+        self._swings = NumberField("", (0, MOST_SWINGS), 0)
+        self._fields = (self._days, self._swings)
+        self._labels = tuple(map(field_label, self._fields))
+        self._head = text_label(TextSize.LEAD)
+        self._table = NumberTable()
+
+        # Layout
+        fields = QHBoxLayout()
+        fields.setSpacing(2 * GRID)
+        for label, field in zip(self._labels, self._fields, strict=True):
+            field.setKeyboardTracking(False)
+            field.setFixedWidth(FIELD_WIDTH)
+            fields.addLayout(stacked(label, field))
+        fields.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, GRID, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addLayout(fields)
+        layout.addWidget(self._head)
+        layout.addWidget(self._table)
+        layout.addStretch(1)
+
+        self._days.setValue(rule.max_days)
+        self._swings.setValue(rule.max_swings)
+
+        # Connections
+        for field in self._fields:
+            field.valueChanged.connect(self._on_edited)
+
+        self._retranslate()
+
+    def rule(self) -> DueRule:
+        """Return the rule as it is typed."""
+        return DueRule(round(self._days.value()), round(self._swings.value()))
+
+    def set_tips(self, tips: Sequence[DueTip]) -> None:
+        """Show other tips."""
+        self._tips = tuple(tips)
+        self._retranslate()
+
+    def figures(self) -> Figures:
+        """Return the tips as they are shown."""
+        return self._table.value()
+
+    def _on_edited(self) -> None:
+        self.rule_changed.emit(self.rule())
+
+    def _retranslate(self) -> None:
+        words = (
+            self.tr("Days in force at most"),
+            self.tr("Swings of its pen at most"),
+        )
+        for label, field, text in zip(self._labels, self._fields, words, strict=True):
+            label.setText(text)
+            field.setAccessibleName(text)
+        self._swings.setSpecialValueText(self.tr("any number"))
+        self._swings.setToolTip(
+            self.tr("Each swing, with whatever tip, wears the seat of all tips.")
+        )
+        now = self._now()
+        n_due = sum(tip.is_due(now) for tip in self._tips)
+        self._head.setText(
+            self.tr("{0} of {1} tips in force at this station are due.").format(
+                n_due, len(self._tips)
+            )
+        )
+        self._table.setVisible(bool(self._tips))
+        columns = (
+            *(self.tr("Calibrated"), self.tr("Due"), self.tr("Swings since")),
+            *(self.tr("Swings left"), self.tr("State")),
+        )
+        rows = tuple(map(_name, self._tips))
+        cells = tuple(self._cells(tip, now) for tip in self._tips)
+        self._table.set_value(Figures(columns, rows, cells))
+
+    def _cells(self, tip: DueTip, now: datetime) -> tuple[str, ...]:
+        days = (tip.entry.entry.event.at, tip.due)
+        return (
+            *(moment_text(day, "yyyy-MM-dd") for day in days),
+            f"{tip.n_swings}",
+            self.tr("any number") if tip.n_left is None else f"{max(0, tip.n_left)}",
+            self.tr("DUE") if tip.is_due(now) else self.tr("in time"),
+        )
+
+
+def _name(tip: DueTip) -> str:
+    names = tip.entry.entry.event.names
+    return PARTED.join((shortened(names.pen), shortened(names.tip)))

@@ -1,0 +1,122 @@
+"""Which entries are shown: those of a pen, a tip, a station, a time."""
+
+from collections.abc import Sequence
+from datetime import date, datetime, time, timedelta
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
+
+from lightpen.archive.history import KnownNames
+from lightpen.archive.queries import Wanted
+from lightpen.local_time import local_time
+from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import shortened
+from lightpen_app.steps.history.date_field import DateField
+from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.translated import Translated
+
+DATE_WIDTH = 17 * GRID
+LEAST_CHOICE = 12 * GRID
+
+
+class FilterBar(Translated, QWidget):
+    """Three lists and two days.
+
+    Signals
+    -------
+    value_changed()
+        Other entries are to be shown.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._known = KnownNames()
+
+        # Widgets: the order of making them is the order of the Tab key
+        self._pen, self._tip, self._station = _choice(), _choice(), _choice()
+        self._choices = (self._pen, self._tip, self._station)
+        self._begin, self._end = DateField(), DateField()
+        self._fields = (*self._choices, self._begin, self._end)
+        self._labels = tuple(map(field_label, self._fields))
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        for label, field in zip(self._labels, self._fields, strict=True):
+            layout.addLayout(stacked(label, field), 1)
+        for day in (self._begin, self._end):
+            day.setMaximumWidth(DATE_WIDTH)
+
+        # Connections
+        self._pen.currentIndexChanged.connect(self._on_pen_changed)
+        for choice in (self._tip, self._station):
+            choice.currentIndexChanged.connect(self.value_changed)
+        for day in (self._begin, self._end):
+            day.value_changed.connect(self.value_changed)
+
+        self._retranslate()
+
+    def value(self) -> Wanted:
+        """Return what is looked for; the last day is one of its own."""
+        end = self._end.value()
+        pen, tip, station = (choice.currentData() or "" for choice in self._choices)
+        return Wanted(
+            *(pen, tip, station),
+            begin=_midnight(self._begin.value()),
+            end=_midnight(None if end is None else end + timedelta(days=1)),
+        )
+
+    def set_known(self, known: KnownNames) -> None:
+        """List the names that are known; what is chosen stays chosen."""
+        if known == self._known:
+            return
+        self._known = known
+        _list(self._pen, known.pens)
+        _list(self._station, known.stations)
+        self._list_tips()
+
+    def _list_tips(self) -> None:
+        _list(self._tip, self._known.tips_of(self._pen.currentData() or ""))
+
+    def _on_pen_changed(self) -> None:
+        self._list_tips()
+        self.value_changed.emit()
+
+    def _retranslate(self) -> None:
+        words = (
+            *(self.tr("Pen"), self.tr("Tip"), self.tr("Station")),
+            *(self.tr("From"), self.tr("To")),
+        )
+        for label, field, text in zip(self._labels, self._fields, words, strict=True):
+            label.setText(text)
+            field.setAccessibleName(text)
+        for choice in self._choices:
+            choice.setItemText(0, self.tr("All"))
+
+
+def _choice() -> QComboBox:
+    choice = QComboBox()
+    choice.addItem("", "")
+    policy = QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+    choice.setSizeAdjustPolicy(policy)
+    choice.setMinimumWidth(LEAST_CHOICE)
+    return choice
+
+
+def _list(choice: QComboBox, names: Sequence[str]) -> None:
+    """List names behind the choice of all; one that is chosen stays so."""
+    chosen = choice.currentData()
+    blocked = choice.blockSignals(True)
+    while choice.count() > 1:
+        choice.removeItem(1)
+    for name in filter(None, names):
+        choice.addItem(shortened(name), name)
+    choice.setCurrentIndex(max(0, choice.findData(chosen)))
+    choice.blockSignals(blocked)
+
+
+def _midnight(day: date | None) -> datetime | None:
+    return None if day is None else local_time(datetime.combine(day, time()))

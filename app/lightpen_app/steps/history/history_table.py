@@ -1,0 +1,272 @@
+"""The entries of the archive as a table, the newest first; what is seen is read."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from itertools import chain, islice
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QItemSelectionModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QPalette
+from PySide6.QtWidgets import QAbstractItemView, QWidget
+from typing_extensions import override
+
+from lightpen.archive.history import Line
+from lightpen_app.look.quantities import decimals_for, number_text
+from lightpen_app.look.theme import GRID, Tone, colors_of
+from lightpen_app.look.words import moment_text
+from lightpen_app.steps.history.reader import BLOCK
+from lightpen_app.steps.history.texts import line_tone, verdict_text, what_text
+from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
+from lightpen_app.widgets.translated import Translated
+
+Index = QModelIndex | QPersistentModelIndex
+WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
+NUMBERS = (X, Y, Z, U)
+WIDTHS = {
+    WHEN: 19,
+    STATION: 8.5,
+    PEN: 8,
+    TIP: 9.5,
+    WHAT: 21.5,
+    VERDICT: 9,
+    X: 11,
+    Y: 11,
+    Z: 11,
+    U: 9,
+    BY: 12,
+}
+LEAST_ROWS = 5
+MOST_BLOCKS = 40  # that are kept
+MOST_SELECTED = 1000  # lines that are compared
+UNREAD = "\u2026"
+
+
+class HistoryModel(QAbstractTableModel):
+    """As many rows as there are entries, of which those are read that are seen.
+
+    Signals
+    -------
+    block_wanted(int)
+        Number of the first line of a block that is to be shown.
+    """
+
+    block_wanted = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._n_lines = 0
+        self._blocks: OrderedDict[int, tuple[Line, ...]] = OrderedDict()
+        self._asked: set[int] = set()
+
+    def set_lines(self, n_lines: int, first: Sequence[Line]) -> None:
+        """Show other entries, of which the newest are known."""
+        self.beginResetModel()
+        self._n_lines = n_lines
+        self._blocks.clear()
+        self._asked.clear()
+        self._blocks[0] = tuple(first)
+        self.endResetModel()
+
+    def put_block(self, first: int, found: Sequence[Line]) -> None:
+        """Show the lines of a block that was wanted."""
+        self._asked.discard(first)
+        self._blocks[first] = tuple(found)
+        while len(self._blocks) > MOST_BLOCKS:
+            self._blocks.popitem(last=False)
+        last = min(first + BLOCK, self._n_lines) - 1
+        self.dataChanged.emit(self.index(first, 0), self.index(last, WORDS))
+
+    def forget_block(self, first: int) -> None:
+        """Ask for a block again when it is to be shown the next time."""
+        self._asked.discard(first)
+
+    def line(self, row: int) -> Line | None:
+        """Return a line that is to be shown; None as long as it is not read."""
+        first = row - row % BLOCK
+        if first in self._blocks:
+            self._blocks.move_to_end(first)
+        elif first not in self._asked:
+            self._asked.add(first)
+            self.block_wanted.emit(first)
+        return self.known_line(row)
+
+    def known_line(self, row: int) -> Line | None:
+        """Return a line if it is read."""
+        first = row - row % BLOCK
+        block = self._blocks.get(first, ())
+        return block[row - first] if row - first < len(block) else None
+
+    @override
+    def rowCount(self, parent: Index | None = None) -> int:
+        return 0 if parent is not None and parent.isValid() else self._n_lines
+
+    @override
+    def columnCount(self, parent: Index | None = None) -> int:
+        return 0 if parent is not None and parent.isValid() else WORDS + 1
+
+    @override
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        column = index.column()
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in NUMBERS:
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        if role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
+            line = self.line(index.row())
+            return UNREAD if line is None else _text(line, column)
+        if role == Qt.ItemDataRole.ForegroundRole and column in (WHAT, VERDICT):
+            line = self.line(index.row())
+            tone = Tone.PLAIN if line is None else line_tone(line, column == VERDICT)
+            widget = self.parent()
+            assert isinstance(widget, QWidget)
+            return (
+                None if tone is Tone.PLAIN else colors_of(widget.palette()).tone(tone)
+            )
+        return None
+
+    def _palette(self) -> QPalette:
+        widget = self.parent()
+        assert isinstance(widget, QWidget)
+        return widget.palette()
+
+    @override
+    def headerData(
+        self,
+        section: int,
+        orientation: Qt.Orientation,
+        role: int = Qt.ItemDataRole.DisplayRole,
+    ) -> Any:
+        if orientation != Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            side = Qt.AlignmentFlag.AlignLeft
+            if section in NUMBERS:
+                side = Qt.AlignmentFlag.AlignRight
+            return side | Qt.AlignmentFlag.AlignVCenter
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        return (
+            *(self.tr("When"), self.tr("Station"), self.tr("Pen"), self.tr("Tip")),
+            *(self.tr("What"), self.tr("Verdict")),
+            *(self.tr("x / mm"), self.tr("y / mm"), self.tr("z / mm")),
+            *(self.tr("U / mm"), self.tr("By"), self.tr("Words")),
+        )[section]
+
+
+class HistoryTable(Translated, RowTable):
+    """Shows the entries; the current one is told of once it is read.
+
+    Signals
+    -------
+    block_wanted(int)
+        Number of the first line of a block that is to be shown.
+    selection_changed()
+        Other lines are current or selected, or were read by now.
+    """
+
+    block_wanted = Signal(int)
+    selection_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        self._model = HistoryModel()
+        super().__init__(self._model, parent)
+        self._model.setParent(self)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
+        for column, width in WIDTHS.items():
+            self.setColumnWidth(column, round(width * GRID))
+        self.setMinimumHeight((LEAST_ROWS + 2) * ROW_HEIGHT)
+
+        # Connections
+        self._model.block_wanted.connect(
+            self.block_wanted, Qt.ConnectionType.QueuedConnection
+        )
+        chosen = self.selectionModel()
+        chosen.currentRowChanged.connect(self.selection_changed)
+        chosen.selectionChanged.connect(self.selection_changed)
+
+        self._retranslate()
+
+    def set_lines(self, n_lines: int, first: Sequence[Line]) -> None:
+        """Show other entries; the newest of them is current."""
+        self._model.set_lines(n_lines, first)
+        self.scrollToTop()
+        if first:
+            flags = QItemSelectionModel.SelectionFlag
+            self.selectionModel().setCurrentIndex(
+                self._model.index(0, WHEN), flags.ClearAndSelect | flags.Rows
+            )
+        else:
+            self.selection_changed.emit()
+
+    def put_block(self, first: int, found: Sequence[Line]) -> None:
+        """Show the lines of a block that was wanted."""
+        self._model.put_block(first, found)
+        self.selection_changed.emit()
+
+    def forget_block(self, first: int) -> None:
+        """Ask for a block again when it is to be shown the next time."""
+        self._model.forget_block(first)
+
+    def n_lines(self) -> int:
+        """Return how many entries there are."""
+        return self._model.rowCount()
+
+    def current(self) -> Line | None:
+        """Return the current line."""
+        at = self.currentIndex()
+        return self._model.line(at.row()) if at.isValid() else None
+
+    def selected(self) -> tuple[Line, ...]:
+        """Return the lines that are selected, as far as they are read and not many."""
+        ranges = self.selectionModel().selection()
+        parts = map(ranges.at, range(ranges.count()))
+        rows = chain.from_iterable(range(r.top(), r.bottom() + 1) for r in parts)
+        found = map(self._model.known_line, islice(sorted(rows), MOST_SELECTED))
+        return tuple(line for line in found if line is not None)
+
+    @override
+    def _retranslate(self) -> None:
+        self.viewport().update()
+        self.horizontalHeader().viewport().update()
+        self.setAccessibleName(self.tr("Entries of the archive, the newest first"))
+
+
+def _text(line: Line, column: int) -> str:
+    if column == WHAT:
+        return what_text(line)
+    if line.entry is None:
+        return ""
+    event = line.entry.entry.event
+    names = event.names
+    if column == WHEN:
+        return moment_text(event.at, "yyyy-MM-dd hh:mm")
+    if column == VERDICT:
+        return verdict_text(event.grade)
+    if column in NUMBERS:
+        return _number(line, column)
+    words = {
+        STATION: names.station,
+        PEN: names.pen,
+        TIP: names.tip,
+        BY: names.operator,
+        WORDS: event.reason,
+    }
+    return words[column]
+
+
+def _number(line: Line, column: int) -> str:
+    """Return a coordinate of the tip, or the largest U, to the digits that count."""
+    assert line.entry is not None
+    event = line.entry.entry.event
+    tip, uncertainty = event.tip_pen_mm, event.expanded_uncertainty_mm
+    if tip is None or uncertainty is None:
+        return ""
+    if column == U:
+        return number_text(max(uncertainty), decimals_for(max(uncertainty)))
+    axis = column - X
+    return number_text(tip[axis], decimals_for(uncertainty[axis]))

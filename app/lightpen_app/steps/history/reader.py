@@ -1,0 +1,173 @@
+"""Reads the archive for the step History, off the thread of the window."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.archive.due import DueTip, due_tips
+from lightpen.archive.entries import Written
+from lightpen.archive.history import KnownNames, Line, known_names, lines, remarks_on
+from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.queries import Wanted, n_wanted
+from lightpen.record.due_rule import DueRule
+from lightpen.verification.trend import trend_of
+from lightpen_app.work.job import Job, Report
+
+T = TypeVar("T")
+BLOCK = 100  # lines that are read at one time
+MOST_WAITING = 3  # blocks; of those that were scrolled past, none is read
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What is read at once for entries that are looked for.
+
+    Attributes
+    ----------
+    first : tuple of Line
+        The newest.
+    """
+
+    wanted: Wanted
+    n_lines: int
+    first: tuple[Line, ...]
+    names: KnownNames
+
+
+class HistoryReader(QObject):
+    """Reads what is looked for; of what was looked for before, nothing is told.
+
+    Signals
+    -------
+    opened(Opening)
+    block_read(int, object)
+        Number of the first line of the block, and its lines.
+    block_passed(int)
+        A block that is not read any more: others are wanted more.
+    trend_read(Trend)
+    remarks_read(object)
+        Entries that concern the one asked about.
+    due_read(object)
+        The tips in force, each a `DueTip`.
+    failed(str)
+        A sentence to be read.
+    """
+
+    opened = Signal(object)
+    block_read = Signal(int, object)
+    block_passed = Signal(int)
+    trend_read = Signal(object)
+    remarks_read = Signal(object)
+    due_read = Signal(object)
+    failed = Signal(str)
+
+    def __init__(self, logbook: LateLogbook, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._logbook = logbook
+        self._wanted = Wanted()
+        self._jobs: dict[str, Job] = {}
+        self._waiting: list[int] = []
+
+    def open(self, wanted: Wanted) -> None:
+        """Read how many entries there are, and the newest."""
+        self._wanted = wanted
+        self._waiting.clear()
+        self._drop("block")
+        logbook = self._logbook
+
+        def read(_: Report) -> Opening:
+            database = logbook.opened().database
+            return Opening(
+                wanted,
+                n_wanted(database, wanted),
+                lines(database, wanted, 0, BLOCK),
+                known_names(database),
+            )
+
+        self._start("open", read, self.opened.emit)
+
+    def read_block(self, first: int) -> None:
+        """Read the lines of a block, before those that were asked for before."""
+        if first in self._waiting:
+            return
+        self._waiting.append(first)
+        while len(self._waiting) > MOST_WAITING:
+            self.block_passed.emit(self._waiting.pop(0))
+        if "block" not in self._jobs:
+            self._read_next_block()
+
+    def read_trend(self, wanted: Wanted) -> None:
+        """Read the calibrations of a pen and tip."""
+        logbook = self._logbook
+        self._start(
+            "trend",
+            lambda _: trend_of(logbook.opened().database, wanted),
+            self.trend_read.emit,
+        )
+
+    def read_remarks(self, entry: Written) -> None:
+        """Read what concerns an entry."""
+        logbook = self._logbook
+        self._start(
+            "remarks",
+            lambda _: remarks_on(logbook.opened().database, entry),
+            self.remarks_read.emit,
+        )
+
+    def read_due(self, rule: DueRule) -> None:
+        """Read when the tips in force at this station are due."""
+        logbook = self._logbook
+
+        def read(_: Report) -> tuple[DueTip, ...]:
+            opened = logbook.opened()
+            return due_tips(opened.database, opened.chain, rule)
+
+        self._start("due", read, self.due_read.emit)
+
+    def shut_down(self) -> None:
+        """Cancel what is under way."""
+        for what in tuple(self._jobs):
+            self._drop(what)
+
+    def _read_next_block(self) -> None:
+        if not self._waiting:
+            return
+        first = self._waiting.pop()
+        logbook, wanted = self._logbook, self._wanted
+        self._start(
+            "block",
+            lambda _: lines(logbook.opened().database, wanted, first, BLOCK),
+            partial(self._on_block_read, first),
+        )
+
+    def _on_block_read(self, first: int, found: tuple[Line, ...]) -> None:
+        self._jobs.pop("block", None)
+        self.block_read.emit(first, found)
+        self._read_next_block()
+
+    def _start(
+        self,
+        what: str,
+        function: Callable[[Report], T],
+        on_succeeded: Callable[[T], object],
+    ) -> None:
+        self._drop(what)
+        self._jobs[what] = job = Job(function, self)
+
+        # Connections
+        job.succeeded.connect(on_succeeded)
+        job.failed.connect(self.failed)
+        job.ended.connect(partial(self._on_ended, what, job))
+        job.start()
+
+    def _on_ended(self, what: str, job: Job) -> None:
+        if self._jobs.get(what) is job:
+            del self._jobs[what]
+
+    def _drop(self, what: str) -> None:
+        job = self._jobs.pop(what, None)
+        if job is not None:
+            job.cancel()

@@ -1,0 +1,163 @@
+"""What the selected entries come to: two compared, and how well several repeat."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QWidget
+
+from lightpen.archive.entries import Written
+from lightpen.estimation.verdict import Grade
+from lightpen.model.limits import VerificationLimits
+from lightpen.verification.repeatability import Repeatability
+from lightpen.verification.trend import Comparison, compare, has_tip, repeatability_of
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.quantities import AXES, decimals_for, number_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import moment_text
+from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+PAIR = 2
+
+
+class SelectionPanel(Translated, QWidget):
+    """Shows two entries side by side, and the scatter of all that are selected.
+
+    With fewer than two selected, the scatter is that of the whole trend.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._selected: tuple[Written, ...] = ()
+        self._trend: tuple[Written, ...] = ()
+
+        # Widgets
+        self._heads = tuple(text_label(TextSize.LEAD) for _ in range(2))
+        self._compared, self._scattered = NumberTable(), NumberTable()
+        self._change, self._verdict = SignLabel(), SignLabel()
+
+        # Layout
+        layout = QGridLayout(self)
+        layout.setContentsMargins(0, GRID, 0, 0)
+        layout.setHorizontalSpacing(4 * GRID)
+        layout.setVerticalSpacing(GRID // 2)
+        sides = zip(
+            self._heads,
+            (self._compared, self._scattered),
+            (self._change, self._verdict),
+            strict=True,
+        )
+        for column, rows in enumerate(sides):
+            layout.setColumnStretch(column, 1)
+            for row, widget in enumerate(rows):
+                layout.addWidget(widget, row, column)
+        for remark in (self._change, self._verdict):
+            layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
+        layout.setRowStretch(3, 1)
+
+        self._retranslate()
+
+    def set_value(self, selected: Sequence[Written], trend: Sequence[Written]) -> None:
+        """Show other entries: those that are selected, and those of the trend."""
+        self._selected = tuple(filter(has_tip, selected))
+        self._trend = tuple(trend)
+        self._retranslate()
+
+    def comparison(self) -> Comparison | None:
+        """Return what is compared; None unless two tips are selected."""
+        return compare(*self._selected) if len(self._selected) == PAIR else None
+
+    def repeatability(self) -> Repeatability | None:
+        """Return how well the tips repeat; None if they are fewer than two."""
+        entries = self._selected if len(self._selected) >= PAIR else self._trend
+        return repeatability_of(entries, VerificationLimits())
+
+    def words(self) -> tuple[str, ...]:
+        """Return what is said of the selection."""
+        said = (
+            *(head.text() for head in self._heads),
+            *(remark.value().text for remark in (self._change, self._verdict)),
+        )
+        return tuple(filter(None, said))
+
+    def _retranslate(self) -> None:
+        self._show_comparison(self.comparison())
+        self._show_repeatability(self.repeatability())
+
+    def _show_comparison(self, found: Comparison | None) -> None:
+        self._compared.setVisible(found is not None)
+        self._change.set_value(Remark())
+        if found is None:
+            self._heads[0].setText(
+                self.tr("Select two entries with a tip to compare them.")
+            )
+            return
+        dates = [
+            moment_text(each.entry.event.at, "yyyy-MM-dd hh:mm")
+            for each in (found.earlier, found.later)
+        ]
+        self._heads[0].setText(self.tr("{0} and {1}").format(*dates))
+        columns = (
+            *(self.tr("Earlier / mm"), self.tr("Later / mm")),
+            *(self.tr("Change / mm"), self.tr("U (k = 2) / mm")),
+        )
+        cells = tuple(_compared_row(found, axis) for axis in range(3))
+        self._compared.set_value(Figures(columns, AXES, cells))
+        if not found.is_same_tip:
+            text = self.tr("They are not of the same pen and tip.")
+            self._change.set_value(Remark(text, Sign.WARNING, Tone.WARN))
+        elif found.change.is_unexplained:
+            told = worded(found.change.told(dates[0].partition(" ")[0]))
+            self._change.set_value(Remark(told, Sign.WARNING, Tone.WARN))
+        else:
+            text = self.tr("The change is no more than both uncertainties explain.")
+            self._change.set_value(Remark(text, Sign.CHECK, Tone.GOOD))
+
+    def _show_repeatability(self, found: Repeatability | None) -> None:
+        self._scattered.setVisible(found is not None)
+        self._verdict.set_value(Remark())
+        if found is None:
+            self._heads[1].setText(
+                self.tr("Repeatability needs two calibrations of one tip.")
+            )
+            return
+        n_tips = len(found.tips)
+        is_selected = len(self._selected) >= PAIR
+        self._heads[1].setText(
+            self.tr("Repeatability of the {0} that are selected").format(n_tips)
+            if is_selected
+            else self.tr("Repeatability of all {0} of the trend").format(n_tips)
+        )
+        columns = (
+            *(self.tr("Mean / mm"), self.tr("Scatter / mm"), self.tr("Range / mm")),
+            self.tr("Stated U / mm"),
+        )
+        cells = tuple(_scattered_row(found, axis) for axis in range(3))
+        self._scattered.set_value(Figures(columns, AXES, cells))
+        mark = GRADE_MARKS[Grade(found.assessment.grade)]
+        self._verdict.set_value(Remark(worded(found.assessment.reason), *mark))
+
+
+def _compared_row(found: Comparison, axis: int) -> tuple[str, ...]:
+    change = found.change
+    uncertainty = float(change.expanded_uncertainty[axis])
+    decimals = decimals_for(uncertainty)
+    values = []
+    for each in (found.earlier, found.later):
+        tip = each.entry.event.tip_pen_mm
+        assert tip is not None
+        values.append(tip[axis])
+    values += [float(change.difference[axis]), uncertainty]
+    return tuple(number_text(value, decimals) for value in values)
+
+
+def _scattered_row(found: Repeatability, axis: int) -> tuple[str, ...]:
+    points = found.scatter.points[:, axis]
+    deviation = float(found.scatter.deviation[axis])
+    decimals = decimals_for(deviation)
+    stated = sum(float(tip.uncertainty[axis]) for tip in found.tips) / len(found.tips)
+    values = (float(points.mean()), deviation, float(points.max() - points.min()))
+    return tuple(number_text(value, decimals) for value in (*values, stated))

@@ -1,0 +1,81 @@
+"""The words for what entries of the archive tell of."""
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QCoreApplication
+
+from lightpen.archive.entries import Kind
+from lightpen.archive.history import Line, TipState
+from lightpen.estimation.verdict import Grade
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.phrases import grade_text
+from lightpen_app.look.theme import Tone
+
+CONTEXT = "history"
+
+
+if TYPE_CHECKING:
+
+    def QT_TRANSLATE_NOOP(context: str, text: str) -> str:  # noqa: N802 - Qt's
+        """Return the text; PySide6 gives it the type of any object."""
+else:
+    from PySide6.QtCore import QT_TRANSLATE_NOOP
+
+_KINDS: dict[Kind, str] = {
+    Kind.ACCEPTED: QT_TRANSLATE_NOOP("history", "Calibration"),
+    Kind.RESTORED: QT_TRANSLATE_NOOP("history", "Restored"),
+    Kind.REFUSED: QT_TRANSLATE_NOOP("history", "Refused"),
+    Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Set aside"),
+    Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Taking back"),
+    Kind.NOTE: QT_TRANSLATE_NOOP("history", "Note"),
+}
+_STATES: dict[TipState, str] = {
+    TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),
+    TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
+    TipState.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "taken back"),
+}
+_CHANGED = QT_TRANSLATE_NOOP("history", "Changed since it was entered")
+_SIMULATED = QT_TRANSLATE_NOOP("history", "practice")
+
+
+def kind_text(kind: Kind) -> str:
+    """Return what an entry tells of."""
+    return _translated(_KINDS[kind])
+
+
+def what_text(line: Line) -> str:
+    """Return what an entry tells of, and what became of it."""
+    if line.entry is None:
+        return _translated(_CHANGED)
+    event = line.entry.entry.event
+    words = [kind_text(event.kind)]
+    if line.state is not TipState.NONE:
+        words.append(_translated(_STATES[line.state]))
+    if event.is_simulated:
+        words.append(_translated(_SIMULATED))
+    return ", ".join(words)
+
+
+def verdict_text(grade: str) -> str:
+    """Return the word of a verdict; that of a later version as it is."""
+    try:
+        return grade_text(Grade(grade)) if grade else ""
+    except ValueError:
+        return grade
+
+
+def line_tone(line: Line, is_verdict: bool) -> Tone:
+    """Return the colour of the words for what a line tells of, or of its verdict."""
+    if line.entry is None:
+        return Tone.BAD
+    event = line.entry.entry.event
+    if is_verdict:
+        known = {grade.value: tone for grade, (_, tone) in GRADE_MARKS.items()}
+        return known.get(event.grade, Tone.PLAIN)
+    if line.state is TipState.IN_FORCE:
+        return Tone.GOOD
+    return Tone.WARN if event.kind is Kind.REFUSED else Tone.PLAIN
+
+
+def _translated(text: str) -> str:
+    return QCoreApplication.translate(CONTEXT, text)

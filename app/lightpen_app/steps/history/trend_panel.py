@@ -1,0 +1,190 @@
+"""How a tip developed: x, y, z and U over its calibrations, beside their limits."""
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.verification.trend import Trend
+from lightpen_app.look.quantities import AXES
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.words import moment_text, shortened
+from lightpen_app.widgets.plots import Axes, Plot
+from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.translated import Translated
+
+DOT, RING = 6, 13  # px
+N_LINES = 3
+LEAST_HEIGHT = 19 * GRID
+
+
+class TrendPlot(Plot):
+    """A value with its uncertainty over calibrations, between limits."""
+
+    def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
+        self._dots: pg.ScatterPlotItem | None = None
+        super().__init__(axes, parent)
+        self._bars = pg.ErrorBarItem(x=np.zeros(0), y=np.zeros(0), height=np.zeros(0))
+        self._line = pg.PlotCurveItem()
+        self._dots = pg.ScatterPlotItem(size=DOT)
+        self._ring = pg.ScatterPlotItem(size=RING)
+        self._limits = [pg.InfiniteLine(angle=0) for _ in range(N_LINES)]
+        for item in (*self._limits, self._bars, self._line, self._dots, self._ring):
+            self._item.addItem(item)
+        self._restyle()
+
+    def set_data(
+        self, values: FloatArray, uncertainty: FloatArray | None, limits: FloatArray
+    ) -> None:
+        """Show values (N,) with their U (N,), and up to three limits, lowest first."""
+        x = np.arange(1.0, len(values) + 1)
+        bars = np.zeros(len(values)) if uncertainty is None else uncertainty
+        self._bars.setData(x=x, y=values, height=2 * bars)
+        self._line.setData(x, values)
+        assert self._dots is not None
+        self._dots.setData(x, values)
+        self._ring.setData([], [])
+        for i, line in enumerate(self._limits):
+            line.setVisible(i < len(limits))
+            if i < len(limits):
+                line.setValue(float(limits[i]))
+        self._columns = {"calibration": x, "value_mm": values}
+        if uncertainty is not None:
+            self._columns["expanded_uncertainty_mm"] = uncertainty
+        seen = np.concatenate((values - bars, values + bars, limits))
+        self._fit(np.append(x, (0.5, len(x) + 0.5)), seen)
+
+    def mark(self, number: int | None) -> None:
+        """Put a ring about the dot of a calibration, counted from 1, or about none."""
+        values = self._columns.get("value_mm", np.zeros(0))
+        if number is None or not 1 <= number <= len(values):
+            self._ring.setData([], [])
+        else:
+            self._ring.setData([float(number)], [float(values[number - 1])])
+
+    def marked(self) -> int | None:
+        """Return the number of the calibration with the ring."""
+        x, _ = self._ring.getData()
+        return int(x[0]) if len(x) else None
+
+    @override
+    def _restyle(self) -> None:
+        super()._restyle()
+        if self._dots is None:
+            return
+        colors = colors_of(self.palette())
+        self._bars.setOpts(pen=pg.mkPen(colors.edge, width=1))
+        self._line.setPen(pg.mkPen(colors.accent, width=1))
+        self._dots.setPen(pg.mkPen(None))
+        self._dots.setBrush(pg.mkBrush(colors.accent))
+        self._ring.setPen(pg.mkPen(colors.tone(Tone.WARN), width=2))
+        self._ring.setBrush(pg.mkBrush(None))
+        middle = len(self._limits) // 2
+        for i, line in enumerate(self._limits):
+            style = Qt.PenStyle.DotLine if i == middle else Qt.PenStyle.DashLine
+            line.setPen(pg.mkPen(colors.muted, width=1, style=style))
+
+
+class TrendPanel(Rearranged, Translated, QWidget):
+    """Shows the trend of a pen and tip: four plots, in a row where there is room.
+
+    The plots take long to be made, and are when there is something to show.
+    """
+
+    narrow_below = 110 * GRID  # px
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._value = Trend()
+
+        # Widgets
+        self._told = text_label(TextSize.SMALL, Tone.QUIET)
+        self._plots: tuple[TrendPlot, ...] = ()
+
+        # Layout
+        self._grid = QGridLayout()
+        self._grid.setSpacing(GRID)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, GRID, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addWidget(self._told)
+        layout.addLayout(self._grid, 1)
+
+        self._retranslate()
+
+    def plots(self) -> tuple[TrendPlot, ...]:
+        """Return the plots of x, y, z and U; none as long as there was no trend."""
+        return self._plots
+
+    def value(self) -> Trend:
+        """Return the trend that is shown."""
+        return self._value
+
+    def set_value(self, trend: Trend) -> None:
+        """Show another trend."""
+        self._value = trend
+        if trend.entries and not self._plots:
+            self._make_plots()
+        if self._plots:
+            self._show(trend)
+        self._told.setText(self._told_of(trend))
+
+    def _make_plots(self) -> None:
+        self._plots = tuple(TrendPlot(Axes(axis)) for axis in (*AXES, "U"))
+        for plot in self._plots:
+            plot.setMinimumHeight(LEAST_HEIGHT)
+        self._use_room()
+        self._retranslate()
+
+    def _show(self, trend: Trend) -> None:
+        tips = np.array([tip.tip_pen for tip in trend.tips]).reshape(-1, 3)
+        spread = np.array([tip.uncertainty for tip in trend.tips]).reshape(-1, 3)
+        control = trend.control
+        for axis in range(3):
+            limits = np.zeros(0)
+            if control is not None:
+                edges = (control.lower, control.center, control.upper)
+                limits = np.array([edge[axis] for edge in edges])
+            self._plots[axis].set_data(tips[:, axis], spread[:, axis], limits)
+        limit = [] if trend.max_uncertainty is None else [trend.max_uncertainty]
+        self._plots[3].set_data(spread.max(axis=1, initial=0.0), None, np.array(limit))
+
+    def mark(self, sha256: str) -> None:
+        """Mark the calibration of an entry."""
+        found = [i for i, e in enumerate(self._value.entries, 1) if e.sha256 == sha256]
+        for plot in self._plots:
+            plot.mark(found[0] if found else None)
+
+    def words(self) -> str:
+        """Return what is said over the plots."""
+        return self._told.text()
+
+    @override
+    def _use_room(self) -> None:
+        n_columns = 2 if self._room.is_narrow else 4
+        for i, plot in enumerate(self._plots):
+            self._grid.addWidget(plot, *divmod(i, n_columns))
+
+    def _retranslate(self) -> None:
+        for axis, plot in zip(AXES, self._plots, strict=False):
+            title = self.tr("{0} / mm, with U (k = 2)").format(axis)
+            plot.set_axes(Axes(title, self.tr("calibration no.")))
+        for plot in self._plots[3:]:
+            title = self.tr("Largest U (k = 2) / mm")
+            plot.set_axes(Axes(title, self.tr("calibration no.")))
+        self._told.setText(self._told_of(self._value))
+
+    def _told_of(self, trend: Trend) -> str:
+        if not trend.entries:
+            return self.tr("Choose an entry with a tip: its trend is shown here.")
+        days = (trend.entries[0].entry.event.at, trend.entries[-1].entry.event.at)
+        first, last = (moment_text(day, "yyyy-MM-dd") for day in days)
+        return self.tr(
+            "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: three standard "
+            "deviations from their mean, and the limit of U."
+        ).format(
+            *(shortened(trend.pen), shortened(trend.tip)),
+            *(len(trend.entries), first, last),
+        )

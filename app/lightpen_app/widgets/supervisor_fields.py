@@ -1,0 +1,72 @@
+"""The fields in which a supervisor signs."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+from typing_extensions import override
+
+from lightpen.record.supervision import Signature
+from lightpen_app.look.theme import GRID
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.translated import Translated
+
+LONGEST = 100  # characters
+
+
+class SupervisorFields(Translated, QWidget):
+    """Name and password.
+
+    Signals
+    -------
+    value_edited()
+        Something is being typed.
+    entered()
+        The Enter key was pressed in the password.
+    """
+
+    value_edited = Signal()
+    entered = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._name = EnterEdit()
+        self._password = EnterEdit()
+        self._password.setEchoMode(QLineEdit.EchoMode.Password)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._name, 1)
+        layout.addWidget(self._password, 1)
+
+        # Connections
+        for edit in (self._name, self._password):
+            edit.setMaxLength(LONGEST)
+            edit.textChanged.connect(self.value_edited)
+        self._password.returnPressed.connect(self.entered)
+
+        self._retranslate()
+
+    def value(self) -> Signature:
+        """Return who signs."""
+        return Signature(self._name.text().strip(), self._password.text())
+
+    def is_filled(self) -> bool:
+        """Return whether both are typed."""
+        return bool(self.value().name and self.value().password)
+
+    def clear(self) -> None:
+        """Forget what was typed."""
+        self._name.clear()
+        self._password.clear()
+
+    @override
+    def _retranslate(self) -> None:
+        for edit, words in (
+            (self._name, self.tr("Supervisor")),
+            (self._password, self.tr("Supervisor's password")),
+        ):
+            edit.setPlaceholderText(words)
+            edit.setAccessibleName(words)

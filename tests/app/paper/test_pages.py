@@ -1,0 +1,77 @@
+"""Where pieces stand on pages."""
+
+from dataclasses import replace
+
+from PySide6.QtGui import QPainter
+
+from lightpen_app.paper.pages import PlacedPiece, lay_out
+from lightpen_app.paper.pieces import Column, Piece, heading, table
+
+ROOM = 100.0
+
+
+def paint_nothing(_: QPainter) -> None:
+    """Draw nothing: pages are put together without it."""
+
+
+def piece(height: float, space: float = 0.0) -> Piece:
+    return Piece(paint_nothing, height, space)
+
+
+def tops(page: tuple[PlacedPiece, ...]) -> list[float]:
+    return [placed.top for placed in page]
+
+
+def test_pieces_stand_below_each_other_and_go_on_on_the_next_page() -> None:
+    pages = lay_out([piece(40), piece(40, space=10), piece(40, space=10)], ROOM)
+
+    assert [tops(page) for page in pages] == [[0, 50], [0]]
+
+
+def test_what_fills_a_page_to_its_end_stays_on_it() -> None:
+    assert len(lay_out([piece(60), piece(40)], ROOM)) == 1
+    assert len(lay_out([piece(60), piece(41)], ROOM)) == 2
+
+
+def test_a_heading_goes_with_what_follows() -> None:
+    title = replace(piece(20), keeps=True)
+
+    first, second = lay_out([piece(60), title, piece(40)], ROOM)
+
+    assert second[0].piece is title
+    assert len(first) == 1
+
+
+def test_a_piece_higher_than_a_page_has_one_to_itself() -> None:
+    pages = lay_out([piece(10), piece(300), piece(10)], ROOM)
+
+    assert [len(page) for page in pages] == [1, 1, 1]
+
+
+def test_the_head_of_a_table_is_repeated_where_it_goes_on() -> None:
+    rows = table([Column("LED"), Column("rms")], [(str(i), "0.003") for i in range(9)])
+    room = rows[0].height + 5 * rows[1].height
+
+    pages = lay_out(rows, room)
+
+    assert len(pages) == 2
+    assert all(page[0].piece is rows[0] for page in pages)
+    shown = [placed.piece for page in pages for placed in page[1:]]
+    assert shown == list(rows[1:])
+
+
+def test_the_last_row_of_a_table_does_not_stand_alone() -> None:
+    rows = table([Column("LED")], [(str(i),) for i in range(6)])
+
+    pages = lay_out(rows, rows[0].height + 5 * rows[1].height)
+
+    assert [len(page) for page in pages] == [5, 3]
+
+
+def test_no_heading_ends_a_page() -> None:
+    pieces = [piece(10), heading("Images"), replace(piece(20), keeps=True), piece(30)]
+    room = sum(each.height + each.space for each in pieces[:-1])
+
+    _, second = lay_out(pieces, room)
+
+    assert len(second) == 3

@@ -1,0 +1,374 @@
+"""The step History shows what the archive tells, and enters what is added to it."""
+
+import json
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFileDialog,
+    QLineEdit,
+    QMenu,
+    QPushButton,
+    QTabWidget,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from lightpen.archive.chains import append
+from lightpen.archive.entries import Event, Kind
+from lightpen.archive.logbook import ARCHIVE
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.names import Names
+from lightpen.record.results import Result
+from lightpen_app.steps.history.archive_panel import ArchivePanel
+from lightpen_app.steps.history.date_field import DateField
+from lightpen_app.steps.history.due_panel import DuePanel
+from lightpen_app.steps.history.entry_panel import EntryPanel
+from lightpen_app.steps.history.history_table import (
+    PEN,
+    TIP,
+    UNREAD,
+    WHAT,
+    WHEN,
+    WORDS,
+    HistoryTable,
+    X,
+)
+from lightpen_app.steps.history.page import HistoryPage
+from lightpen_app.steps.history.selection_panel import SelectionPanel
+from lightpen_app.steps.history.trend_panel import TrendPanel
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.work.settings import Settings
+from lightpen_app.work.workbench import Workbench
+
+W = TypeVar("W", bound=QWidget)
+NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
+TRENDS, ENTRY, SELECTION, DUE, WHOLE = range(5)
+MANY = 450
+FLAGS = QItemSelectionModel.SelectionFlag
+
+
+def names(tip: str) -> Names:
+    return Names("Hall 2", "Ann", "LP-04", tip, "C-1", 10.0)
+
+
+class Desk:
+    """Somebody at the step History of a data folder."""
+
+    def __init__(self, workbench: Workbench, qtbot: QtBot) -> None:
+        self.workbench, self.qtbot = workbench, qtbot
+        self.page = HistoryPage(workbench)
+        self.notices: list[str] = []
+        self.statuses: list[str] = []
+        self.page.notice_raised.connect(self.notices.append)
+        self.page.status_changed.connect(self.statuses.append)
+        qtbot.addWidget(self.page)
+
+    def enter(self, n_entries: int, tip: str = "T-10", first: int = 0) -> None:
+        """Enter tips of which the x is their number, in mm."""
+        logbook = self.workbench.run.logbook.opened()
+        for n in range(first, first + n_entries):
+            event = Event(
+                kind=Kind.ACCEPTED,
+                at=NOON + timedelta(days=n),
+                names=names(tip),
+                program="lightpen 1",
+                grade="pass",
+                tip_pen_mm=(float(n), 0.0, -1.5),
+                expanded_uncertainty_mm=(0.0031, 0.0041, 0.0061),
+                settings={"max_uncertainty_mm": 0.012},
+            )
+            append(logbook.database, logbook.chain, event)
+
+    def open(self) -> None:
+        self.page.resize(1000, 700)
+        self.page.show()
+        self.page.entered()
+        self.until(lambda: self.statuses)
+
+    def until(self, condition: Callable[[], object]) -> None:
+        self.qtbot.waitUntil(lambda: bool(condition()))
+
+    def child(self, kind: type[W], number: int = 0) -> W:
+        return self.page.findChildren(kind)[number]
+
+    @property
+    def table(self) -> HistoryTable:
+        return self.child(HistoryTable)
+
+    def column(self, column: int) -> list[str]:
+        """Return what is shown in a column, as far as it is read."""
+        model = self.table.model()
+        return [
+            model.index(row, column, QModelIndex()).data()
+            for row in range(model.rowCount())
+        ]
+
+    def select(self, *rows: int) -> None:
+        """Make rows the only ones that are selected, the first of them current."""
+        chosen, model = self.table.selectionModel(), self.table.model()
+        for row in reversed(rows):
+            index = model.index(row, WHEN, QModelIndex())
+            is_last = row == rows[-1]
+            how = FLAGS.ClearAndSelect if is_last else FLAGS.Select
+            chosen.setCurrentIndex(index, how | FLAGS.Rows)
+
+    def show_tab(self, tab: int) -> None:
+        self.child(QTabWidget).setCurrentIndex(tab)
+
+    def click(self, text: str) -> None:
+        """Click a button that is seen, or choose from the menu of one."""
+        for action in (a for m in self.page.findChildren(QMenu) for a in m.actions()):
+            if action.text() == text:
+                action.trigger()
+                return
+        (button,) = [
+            each
+            for each in self.page.findChildren(QPushButton)
+            if each.isVisible() and each.text() == text
+        ]
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+    def type_reason(self, text: str) -> None:
+        (edit,) = [
+            each
+            for each in self.child(EntryPanel).findChildren(QLineEdit)
+            if each.isVisible()
+        ]
+        QTest.keyClicks(edit, text)
+        QTest.keyClick(edit, Qt.Key.Key_Return)
+
+    def wait_idle(self) -> None:
+        """Wait until nothing is under way with the archive as a whole."""
+        buttons = self.child(ArchivePanel).findChildren(QPushButton)
+        self.until(lambda: buttons[0].isEnabled())
+
+    def choose_file(self, path: Path) -> None:
+        dialog = self.page.findChildren(QFileDialog)[-1]
+        dialog.fileSelected.emit(str(path))
+        dialog.close()
+
+
+@pytest.fixture
+def desk(workbench: Workbench, qtbot: QtBot) -> Iterator[Desk]:
+    desk = Desk(workbench, qtbot)
+    yield desk
+    desk.page.shut_down()
+
+
+def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
+    desk: Desk,
+) -> None:
+    desk.enter(3)
+    desk.enter(1, tip="T-11", first=3)
+    desk.open()
+    assert desk.column(TIP) == ["T-11", "T-10", "T-10", "T-10"]
+    assert desk.column(X) == ["3.0000", "2.0000", "1.0000", "0.0000"]
+    assert desk.column(WHAT)[:3] == [
+        *("Calibration, in force", "Calibration, in force", "Calibration, replaced"),
+    ]
+
+    tips = desk.child(QComboBox, 1)
+    tips.setCurrentIndex(tips.findText("T-10"))
+    desk.until(lambda: len(desk.column(TIP)) == 3)
+    QTest.keyClicks(desk.child(DateField), "2026-01-03")
+    desk.until(lambda: desk.column(X) == ["2.0000", "1.0000"])
+    assert desk.statuses[-1] == "2 entries"
+
+
+def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
+    desk.enter(2)
+    desk.open()
+    field = desk.child(DateField, 1)
+    QTest.keyClicks(field, "2026-13")
+
+    assert field.property("tone") == "bad"
+    assert len(desk.column(TIP)) == 2
+
+
+def test_lines_are_read_when_they_are_seen(desk: Desk) -> None:
+    desk.enter(MANY)
+    desk.open()
+    last = desk.table.model().index(MANY - 1, X, QModelIndex())
+    desk.qtbot.wait(20)
+    assert last.data() == UNREAD  # asking for it has it read
+
+    desk.table.scrollToBottom()
+    desk.until(lambda: last.data() == "0.0000")
+
+
+def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
+    desk.enter(4)
+    desk.enter(1, tip="T-11", first=4)
+    desk.open()
+    desk.select(2)
+    panel = desk.child(TrendPanel)
+    desk.until(lambda: len(panel.value().tips) == 4)
+
+    x, _, _, u = panel.plots()
+    assert list(x.columns()["value_mm"]) == [0.0, 1.0, 2.0, 3.0]
+    assert list(u.columns()["value_mm"]) == [0.0061] * 4
+    assert [plot.marked() for plot in panel.plots()] == [3] * 4
+    (left, right), (low, high) = u.ranges()
+    assert left < 1 < 4 < right
+    assert low < 0.0061 < 0.012 < high  # the limit is in sight
+    assert panel.words().startswith("Pen LP-04, tip T-10: 4 calibrations, 2026-01-02")
+
+
+def test_two_that_are_selected_are_compared(desk: Desk) -> None:
+    desk.enter(3)
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel = desk.child(SelectionPanel)
+    assert "Select two entries" in panel.words()[0]
+    desk.until(lambda: panel.repeatability())
+    desk.select(0, 2)
+
+    found = panel.comparison()
+    assert found is not None
+    assert found.change.difference[0] == 2.0
+    assert panel.words()[1] == "Repeatability of the 2 that are selected"
+    assert "The tip lies 2.0000 mm from" in panel.words()[2]
+    assert "scatters by 1.4142 mm along x" in panel.words()[3]
+
+
+def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
+    desk.enter(2)
+    desk.open()
+    desk.show_tab(ENTRY)
+    desk.select(1)
+    desk.click("Add a note...")
+    desk.type_reason("Dropped on the floor.")
+
+    desk.until(lambda: len(desk.column(WHAT)) == 3)
+    assert desk.column(WHAT)[0] == "Note"
+    assert desk.column(WORDS)[0] == "Dropped on the floor."
+    desk.select(2)
+    panel = desk.child(EntryPanel)
+    desk.until(lambda: any("Note" in words for words in panel.words()))
+    assert any("Ann: Dropped on the floor." in words for words in panel.words())
+
+
+def store(folder: Path, n: int) -> Result:
+    """Put a tip in force whose x is n mm."""
+    result = Result(
+        names=names("T-10"),
+        accepted=NOON + timedelta(days=n),
+        grade="pass",
+        record=folder / "records" / "gone",
+        images=None,
+        calibration={
+            "tip_pen_mm": [float(n), 2.0, 3.0],
+            "expanded_uncertainty_mm": [0.1, 0.1, 0.1],
+            "cone_cam_mm": [1.0, 2.0, 3.0],
+            "covariance": [[0.25] * 6] * 6,
+        },
+        origin=Origin.LIVE,
+    )
+    FolderArchive(folder).store(result)
+    return result
+
+
+def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
+    folder = desk.workbench.folder
+    for n in range(2):
+        store(folder, n)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(ENTRY)
+    desk.select(1)
+    desk.click("Put in force again...")
+    desk.type_reason("The new one is bent.")
+
+    desk.until(lambda: len(desk.column(WHAT)) == 3)
+    assert desk.column(WHAT) == [
+        *("Restored, in force", "Calibration, replaced", "Calibration, replaced"),
+    ]
+    found = FolderArchive(folder).in_force("LP-04", "T-10")
+    assert found is not None
+    assert (found.tip_pen[0], found.reason) == (0.0, "The new one is bent.")
+    assert desk.notices == []
+
+
+def test_when_tips_are_due_follows_a_rule_that_is_remembered(
+    desk: Desk, settings: Settings
+) -> None:
+    desk.enter(3)
+    desk.open()
+    panel = desk.child(DuePanel)
+    desk.until(lambda: panel.figures().rows)
+    assert panel.figures().cells[0][:2] == ("2026-01-04", "2026-02-03")
+
+    desk.show_tab(DUE)
+    days = desk.child(NumberField)
+    days.setFocus()
+    days.selectAll()
+    QTest.keyClicks(days, "7")
+    QTest.keyClick(days, Qt.Key.Key_Return)
+    desk.until(lambda: panel.figures().cells[0][1] == "2026-01-11")
+    assert settings.due_rule().max_days == 7
+
+
+def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None:
+    desk.enter(3)
+    path = desk.workbench.folder / ARCHIVE
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(
+            "UPDATE archive_entries SET text = replace(text, 'Ann', 'Bob') "
+            "WHERE number = 2"
+        )
+    desk.open()
+    assert desk.column(WHAT)[1] == "Changed since it was entered"
+    assert desk.column(PEN)[1] == ""
+    assert not desk.page.is_doubtful()
+
+    desk.show_tab(WHOLE)
+    desk.click("Check the archive")
+    desk.until(desk.page.is_doubtful)
+    told = [remark.text for remark in desk.child(ArchivePanel).told()]
+    assert any("Entry 2 of the chain" in text for text in told)
+
+
+def test_entries_are_saved_and_taken_up_at_another_station(
+    desk: Desk, tmp_path: Path
+) -> None:
+    desk.enter(2)
+    desk.open()
+    desk.show_tab(WHOLE)
+    desk.click("Entries shown (JSON)...")
+    desk.choose_file(tmp_path / "shown.json")
+    desk.until(lambda: "2 entries are saved" in desk.statuses[-1])
+    assert len(json.loads((tmp_path / "shown.json").read_text("utf-8"))) == 2
+
+    desk.wait_idle()
+    desk.click("All, for another station...")
+    desk.choose_file(tmp_path / "hall-2.jsonl")
+    desk.until(lambda: "hall-2.jsonl" in desk.statuses[-1])
+    desk.wait_idle()
+    desk.click("Take up another station's...")
+    desk.choose_file(tmp_path / "hall-2.jsonl")
+    desk.until(lambda: "0 entries are new, 2 were" in "".join(desk.statuses[-2:]))
+    assert desk.notices == []
+
+
+def test_a_file_that_is_no_archive_is_refused_in_words(
+    desk: Desk, tmp_path: Path
+) -> None:
+    desk.enter(1)
+    desk.open()
+    (tmp_path / "other.jsonl").write_text("{}\n")
+    desk.show_tab(WHOLE)
+    desk.click("Take up another station's...")
+    desk.choose_file(tmp_path / "other.jsonl")
+
+    desk.until(lambda: desk.notices)
+    assert "is no exported archive" in desk.notices[0]

@@ -1,0 +1,98 @@
+"""Tests of the limits of a station, and of who may change them."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QDialogButtonBox, QLineEdit
+from pytestqt.qtbot import QtBot
+
+from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
+from lightpen.record.supervision import Signature, Supervision
+from lightpen_app.steps.start.limits_dialog import LimitsDialog
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.work.workbench import Workbench
+
+TIGHT = StationLimits(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005))
+
+
+@pytest.fixture
+def dialog(qtbot: QtBot) -> LimitsDialog:
+    dialog = LimitsDialog()
+    qtbot.addWidget(dialog)
+    dialog.show()
+    return dialog
+
+
+def field(dialog: LimitsDialog, name: str) -> NumberField:
+    (found,) = (
+        each
+        for each in dialog.findChildren(NumberField)
+        if each.accessibleName() == name
+    )
+    return found
+
+
+def sign(dialog: LimitsDialog) -> None:
+    for name, text in (("Supervisor", "Eve"), ("Supervisor's password", "secret")):
+        (edit,) = (
+            each
+            for each in dialog.findChildren(QLineEdit)
+            if each.accessibleName() == name
+        )
+        edit.setText(text)
+
+
+def test_the_limits_that_are_shown_are_those_that_were_given(
+    dialog: LimitsDialog,
+) -> None:
+    dialog.set_value(TIGHT, is_guarded=True)
+
+    assert dialog.value() == TIGHT
+
+
+def test_limits_are_laid_down_only_with_a_signature(
+    dialog: LimitsDialog, qtbot: QtBot
+) -> None:
+    dialog.set_value(TIGHT, is_guarded=True)
+    buttons = dialog.findChild(QDialogButtonBox)
+    assert isinstance(buttons, QDialogButtonBox)
+    save = buttons.button(QDialogButtonBox.StandardButton.Save)
+    assert not save.isEnabled()
+    field(dialog, "Length: error").setValue(0.01)
+    sign(dialog)
+    told: list[Any] = []
+    dialog.signed.connect(lambda *what: told.append(what))
+    save.click()
+
+    wanted = replace(TIGHT.verification, length=0.01)
+    expected = replace(TIGHT, verification=wanted), Signature("Eve", "secret"), ""
+    assert told == [expected]
+
+
+def test_what_is_laid_down_counts_for_its_station_alone(workbench: Workbench) -> None:
+    workbench.set_supervision(Supervision("a hash", {"Hall 2": TIGHT}))
+    assert workbench.preparation.limits == TIGHT.swing
+    assert workbench.choices.limits == TIGHT.verification
+
+    workbench.choose_station("Hall 3")
+    assert workbench.preparation.limits == SwingLimits()
+    assert workbench.choices.limits == VerificationLimits()
+
+
+def test_a_supervisor_is_asked_for_name_and_password(qtbot: QtBot) -> None:
+    bar = ReasonBar()
+    qtbot.addWidget(bar)
+    told: list[Any] = []
+    bar.given.connect(lambda *what: told.append(what))
+    bar.ask(of_supervisor=True)
+    reason, name, password = bar.findChildren(QLineEdit)
+    reason.setText("It will do.")
+    password.setText("secret")
+    password.returnPressed.emit()
+    assert told == []
+    name.setText("Eve")
+    password.returnPressed.emit()
+
+    assert told == [("It will do.", Signature("Eve", "secret"))]

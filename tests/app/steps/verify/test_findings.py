@@ -1,0 +1,33 @@
+"""Tests of what the step Verify shows of touches."""
+
+import math
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from lightpen.model.posture import Posture
+from lightpen_app.steps.verify.findings import dial_of
+from lightpen_app.steps.verify.ring_view import RingValue, RingView
+
+
+def test_what_is_covered_begins_behind_the_largest_gap() -> None:
+    ring = RingValue(tuple(math.radians(a) for a in (350.0, 10.0, 100.0)))
+
+    assert ring.start == pytest.approx(math.radians(350.0))
+
+
+def test_a_ring_says_how_much_of_it_is_covered(qtbot: QtBot) -> None:
+    view = RingView()
+    qtbot.addWidget(view)
+    view.set_value(RingValue((0.0, 1.0, 2.0), 114.6))
+
+    assert view.accessibleName() == "Ring: 115 of 270 degrees by 3 touches"
+
+
+def test_a_field_of_the_dial_is_full_that_was_touched_in() -> None:
+    dial = dial_of(
+        [Posture(0.0, 0.0, 0.0), Posture(0.25, 0.0, 0.0), Posture(0.25, 0.0, 0.0)], None
+    )
+
+    assert (dial.n_fields, dial.n_full) == (2, 2)
+    assert dial.n_upright == 1

@@ -1,0 +1,93 @@
+"""The tip in force verified through the whole wizard, as an operator walks it."""
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from PySide6.QtCore import Qt
+from tests.accepted_tip import accept_tip
+
+from lightpen.record.folder_archive import SIMULATED
+from lightpen.simulator.toucher import Artefacts
+from lightpen.verification.choices import TaskKind
+from lightpen.verification.keeping import VERIFICATIONS
+from lightpen_app.work.settings import Settings, Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard, Walker
+
+STATION = "Hall 2"
+TOUCHES = Station(
+    *("Ann", "LP-04", "T-10", "C-1"),
+    ball_diameter=10.0,
+    fixed_point_touches=3,
+    touch_images=2,
+)
+
+
+@pytest.fixture
+def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
+    """The program at a station that is known, with a tip in force."""
+    settings.set_station(STATION, TOUCHES)
+    settings.set_last_station(STATION)
+    walker = open_wizard()
+    walker.until(lambda: not walker.workbench.preparation.lacks())
+    accept_tip(walker.workbench.folder, walker.workbench.preparation)
+    return walker
+
+
+def records(walker: "Walker") -> list[dict[str, Any]]:
+    folder = walker.workbench.folder / SIMULATED / VERIFICATIONS
+    return [json.loads(file.read_bytes()) for file in sorted(folder.glob("*.json"))]
+
+
+def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
+    known: "Walker",
+) -> None:
+    walker = known
+    walker.click_step("Camera")
+    walker.click_step("Start")
+    walker.until_says("Verify it")
+    walker.click("Verify it")
+    assert walker.title() == "Verify"
+    walker.until_says("Touch the cone")
+    assert walker.says("SIMULATED")
+    assert walker.tells("Length: left out")
+    for _ in range(2):
+        walker.press(Qt.Key.Key_Right)
+    walker.click("Touch both ends of a length")
+    walker.until_says("NOT POSSIBLE")
+    assert walker.tells("The length is not known. Enter the certified one.")
+    walker.click_into("Certified length", f"{Artefacts().length:g}")
+    walker.press(Qt.Key.Key_Tab)
+    walker.until_says("Touch the cone")
+    walker.click("Let the simulated operator touch")
+    n_inputs = walker.n_inputs
+    walker.until_says("Tip proven")
+
+    assert walker.n_inputs == n_inputs
+    assert walker.says("PASS")
+    assert walker.says("Fixed point: PASS")
+    assert walker.says("Length: PASS")
+    assert [each["verification"] for each in records(walker)] == [
+        TaskKind.FIXED_POINT,
+        TaskKind.LENGTH,
+    ]
+    assert {each["origin"] for each in records(walker)} == {"simulated"}
+    assert walker.main_button().text() == "Back to Start"
+    assert walker.steps()["Verify"] == "now"
+
+
+def test_without_a_tip_in_force_the_step_says_so(
+    settings: Settings, open_wizard: "OpenWizard"
+) -> None:
+    settings.set_station(STATION, replace(TOUCHES, tip="T-99"))
+    settings.set_last_station(STATION)
+    walker = open_wizard()
+    walker.until(lambda: not walker.workbench.preparation.lacks())
+    walker.click_step("Verify")
+
+    walker.until_tells("No tip is in force for tip T-99 of pen LP-04.")
+    assert walker.says("NOT POSSIBLE")
+    assert not walker.main_button().isEnabled()
