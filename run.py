@@ -198,8 +198,11 @@ def say(text: str) -> None:
 
 
 def _ignore_foreign_settings() -> None:
-    """Keep the user's settings for other Pythons away from this one."""
-    for name in ("PYTHONHOME", "PYTHONPATH"):
+    """Keep the user's settings for other Pythons away from this one.
+
+    Compiled modules are kept: without them the program starts half as fast.
+    """
+    for name in ("PYTHONHOME", "PYTHONPATH", "PYTHONDONTWRITEBYTECODE"):
         os.environ.pop(name, None)
     os.environ["PIP_USER"] = "0"
 

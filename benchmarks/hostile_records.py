@@ -231,7 +231,6 @@ def _read_results(data: Data) -> None:
     data.archive.of_record(data.swing)
     found = data.archive.in_force(NAMES.pen, NAMES.tip)
     if found is not None:
-        found.is_old(NOON)
         found.accepted.astimezone()
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from benchmarks.archive import archive_rows
 from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.guided import guided_rows
@@ -30,7 +31,7 @@ from benchmarks.tips import repeat_rows, tip_rows
 from benchmarks.tracker import tracker_rows
 from benchmarks.verification import verification_rows
 from benchmarks.whole_program import program_rows
-from benchmarks.wizard import idle_rows, soak_rows, start_rows
+from benchmarks.wizard import idle_rows, link_rows, soak_rows, start_rows
 from benchmarks.workers import Workers, one_core_workers
 from benchmarks.wrong_files import wrong_file_rows
 
@@ -54,8 +55,10 @@ SECTIONS: dict[str, Section] = {
     "guided": lambda workers, data: guided_rows(workers),
     "killed": lambda workers, data: killed_rows(),
     "hostile": lambda workers, data: hostile_rows(),
+    "archive": lambda workers, data: archive_rows(),
     "start": lambda workers, data: start_rows(),
     "idle": lambda workers, data: idle_rows(),
+    "link": lambda workers, data: link_rows(),
     "soak": lambda workers, data: soak_rows(),
 }
 

@@ -11,12 +11,16 @@ from pathlib import Path
 
 from benchmarks.rows import Row
 
+from lightpen.cameras.sources import source_named
+
 HERE = Path(__file__).parent
 N_STARTS = 5
 IDLE_SECONDS = 20
 QUIET_LIMIT, WATCHED_LIMIT = 0.05, 0.10  # of one core, without and with a live image
 QUIET = ("start", "minimised")
 START_LIMIT = 2.5  # s
+LINK_SECONDS = 20
+LEAST_LINK_RATE = 20.0  # images/s
 SOAK_SECONDS = 600
 LEAST_RATE = 18.0  # images/s
 MOST_LATE = 50.0  # ms
@@ -68,6 +72,30 @@ def idle_rows(seconds: float = IDLE_SECONDS) -> list[Row]:
                 )
             )
     return rows
+
+
+def link_rows(seconds: float = LINK_SECONDS) -> list[Row]:
+    """Return how many images of a camera on a link a swing takes."""
+    what = (
+        "wizard, swing from Aravis' GigE Vision simulator: 2448 x 2048 Mono8 at 25 "
+        "images a second, packets of 16000"
+    )
+    aravis = source_named("aravis")
+    if aravis is None or aravis.why_absent() is not None:
+        return [Row(what, "needs Aravis")]
+    found = json.loads(
+        _output([sys.executable, str(HERE / "linked_wizard.py"), str(seconds)])
+    )
+    rate = (found["delivered"] - found["skipped"]) / found["seconds"]
+    return [
+        Row(
+            f"{what}: images looked at",
+            f"{rate:.1f} a second; {found['incomplete']} incomplete, "
+            f"{found['missed']} missed, {found['skipped']} skipped, all counted",
+            f">= {LEAST_LINK_RATE:.0f} a second",
+            met=rate >= LEAST_LINK_RATE,
+        )
+    ]
 
 
 def soak_rows(seconds: float = SOAK_SECONDS) -> list[Row]:

@@ -85,6 +85,7 @@ def _png(size: int) -> bytes:
     data = QByteArray()
     buffer = QBuffer(data)
     buffer.open(QBuffer.OpenModeFlag.WriteOnly)
+    # The stub of Qt wants bytes for the format, Qt itself a text.
     image.save(buffer, "PNG")  # type: ignore[call-overload]
     return bytes(data.data())
 

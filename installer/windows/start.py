@@ -13,7 +13,8 @@ QUIET = "LIGHTPEN_NO_DIALOG"  # set where nobody could close a dialog
 
 def start() -> int:
     """Run the program; where it cannot even begin, say so in a window."""
-    # Without a console there are no streams, and what prints must not fail by that.
+    # Without a console there are no streams, and what prints must not fail by that;
+    # those put in their place stay open as long as the program runs.
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             nowhere = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115

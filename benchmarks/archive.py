@@ -1,0 +1,257 @@
+"""The archive with 100,000 entries, killed while it writes, and changed byte by byte.
+
+Usage: python benchmarks/archive.py
+"""
+
+import json
+import os
+import random
+import signal
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from benchmarks.hostile_records import NAMES, make_data
+from benchmarks.machine import description
+from benchmarks.rows import Row, table
+
+from lightpen.archive.chains import append, copy_entries, entries_of, own_chain
+from lightpen.archive.check import check_archive
+from lightpen.archive.database import Database, look_into, open_file
+from lightpen.archive.entries import Event, Head, Kind, chained, text_sha256
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.queries import Wanted, last_accepted, newest
+from lightpen.archive.seal import seal_of
+from lightpen.errors import ArchiveError
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.names import Names
+from lightpen.record.reading import open_record, record_files
+
+N_ENTRIES, N_TIPS = 100_000, 40
+RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images
+SHORT_RECORD = '{"frames": []}'
+BATCH = 5000
+N_TIMED = 50
+N_KILLS, LONGEST_LIFE_S = 50, 0.2
+N_FLIPS = 1000
+SEED = 7
+START = datetime(2026, 1, 2, 8, tzinfo=UTC)
+MAX_APPEND_MS, MAX_LAST_MS, MAX_OPEN_MS, MAX_CHECK_S = 20.0, 5.0, 500.0, 60.0
+MAX_BLOCKED_MS = 50.0
+
+
+def archive_rows() -> list[Row]:
+    """Return how fast the archive is, and what survives and is found."""
+    rows = _speed_rows()
+    if sys.platform == "win32":
+        return [*rows, Row("archive, killed while it writes", "needs SIGKILL")]
+    return [*rows, _killed_row(), _changed_row()]
+
+
+def _event(n: int, record: str) -> Event:
+    return Event(
+        kind=Kind.ACCEPTED,
+        at=START + timedelta(minutes=n),
+        names=Names("Hall 2", "Ann", f"LP-{n % 10:02}", f"T-{n % N_TIPS}", "C-1", 10.0),
+        program="lightpen 1",
+        grade="pass",
+        tip_pen_mm=(float(n), 0.0, 0.0),
+        expanded_uncertainty_mm=(0.001, 0.002, 0.001),
+        record_sha256=text_sha256(record),
+    )
+
+
+def _speed_rows() -> list[Row]:
+    with _folder() as folder, closing(open_file(folder / ARCHIVE)) as database:
+        chain = own_chain(database)
+        _fill(database, chain)
+        records = [RECORD.replace(" ", f'"n": {n}, ', 1) for n in range(N_TIMED)]
+        events = [_event(N_ENTRIES + n, each) for n, each in enumerate(records)]
+        pairs = zip(events, records, strict=True)
+        appended = _milliseconds(
+            partial(append, database, chain, event, record) for event, record in pairs
+        )
+        last = _milliseconds(
+            partial(last_accepted, database, f"LP-{n % 10:02}", f"T-{n}")
+            for n in range(N_TIPS)
+        )
+        shown = _milliseconds([partial(newest, database, Wanted(), 100)] * N_TIPS)
+        history = _history_row(folder)
+        start = time.perf_counter()
+        checked = check_archive(database, folder)
+        check_s = time.perf_counter() - start
+    what = f"archive of {N_ENTRIES:,} entries: "
+    return [
+        _at_most(f"{what}append one with its record", appended, MAX_APPEND_MS),
+        _at_most("- last result of a pen and a tip", last, MAX_LAST_MS),
+        _at_most("- the newest 100", shown, MAX_OPEN_MS),
+        history,
+        Row(
+            "- whole check",
+            f"{check_s:.0f} s, {len(checked.findings)} changes found",
+            f"{MAX_CHECK_S:.0f} s",
+            met=check_s <= MAX_CHECK_S and not checked.findings,
+        ),
+    ]
+
+
+def _history_row(folder: Path) -> Row:
+    """Return how soon the step History opens, and how it scrolls from end to end."""
+    script = Path(__file__).with_name("history_step.py")
+    words = [sys.executable, str(script), str(folder)]
+    outcome = subprocess.run(words, capture_output=True, text=True, check=True)
+    told = json.loads(outcome.stdout.splitlines()[-1])
+    opened, blocked = told["opened_ms"], told["blocked_ms"]
+    return Row(
+        "- the step History: opened; 95 % of scrolls answer again after",
+        f"{opened:.0f} ms; {blocked:.0f} ms",
+        f"{MAX_OPEN_MS:g} ms; {MAX_BLOCKED_MS:g} ms",
+        met=opened <= MAX_OPEN_MS and blocked <= MAX_BLOCKED_MS,
+    )
+
+
+def _fill(database: Database, chain: str) -> None:
+    head = Head(chain)
+    records = {text_sha256(SHORT_RECORD): SHORT_RECORD}
+    for first in range(0, N_ENTRIES, BATCH):
+        entries = []
+        for n in range(first, first + BATCH):
+            entry = chained(head, _event(n, SHORT_RECORD))
+            head = Head(chain, n + 1, entry.sha256, entry.entry.since)
+            entries.append(entry)
+        copy_entries(database, chain, entries, records)
+
+
+def _milliseconds(acts: Iterable[Callable[[], object]]) -> list[float]:
+    times = []
+    for act in acts:
+        start = time.perf_counter()
+        act()
+        times.append(1000 * (time.perf_counter() - start))
+    return times
+
+
+def _at_most(what: str, times: list[float], limit: float) -> Row:
+    median = statistics.median(times)
+    return Row(
+        what,
+        f"{median:.1f} ms, at most {max(times):.1f}",
+        f"{limit:g} ms",
+        met=median <= limit,
+    )
+
+
+def _killed_row() -> Row:
+    """Return what is there after kills at random moments of entering."""
+    rng = random.Random(SEED)
+    n_whole = n_there = n_acknowledged = 0
+    with _folder() as folder:
+        for _ in range(N_KILLS):
+            acknowledged = _enter_until_killed(folder, rng.uniform(0, LONGEST_LIFE_S))
+            n_acknowledged += len(acknowledged)
+            with closing(open_file(folder / ARCHIVE)) as database:
+                entries = entries_of(database, own_chain(database))
+                there = {each.sha256 for each in entries}
+                n_there += len(acknowledged & there)
+                n_whole += not check_archive(database).findings
+    return Row(
+        f"archive, killed {N_KILLS} times while it writes: acknowledged entries there",
+        f"{n_there} of {n_acknowledged}, chain whole {n_whole} times",
+        "all",
+        met=n_there == n_acknowledged > N_KILLS and n_whole == N_KILLS,
+    )
+
+
+def _enter_until_killed(folder: Path, seconds: float) -> set[str]:
+    """Return the hashes of the entries that a process told of before its end."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        with closing(open_file(folder / ARCHIVE)) as database:
+            chain = own_chain(database)
+            os.write(writing, b"\n")  # from now on it may be killed
+            for n in range(N_ENTRIES):
+                entry = append(database, chain, _event(n, RECORD), RECORD)
+                assert entry is not None
+                os.write(writing, f"{entry.sha256}\n".encode())
+        os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading, encoding="ascii") as told:
+        told.readline()
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        return set(told.read().split())
+
+
+def _changed_row() -> Row:
+    """Return how many changes of archive, result, swing or image are found."""
+    rng = random.Random(SEED)
+    n_found = 0
+    with _folder() as folder:
+        files = _data_files(folder)
+        for _ in range(N_FLIPS):
+            path = rng.choices(files, [file.stat().st_size for file in files])[0]
+            whole = path.read_bytes()
+            changed = bytearray(whole)
+            changed[rng.randrange(len(whole))] ^= 1 << rng.randrange(8)
+            path.write_bytes(changed)
+            n_found += _is_found(folder)
+            path.write_bytes(whole)
+    return Row(
+        "- a bit changed anywhere in archive, result, swing or image: found",
+        f"{n_found} of {N_FLIPS}",
+        "all",
+        met=n_found == N_FLIPS,
+    )
+
+
+def _data_files(folder: Path) -> list[Path]:
+    """Enter a result and its swing, and return all files that are vouched for."""
+    data = make_data(folder)
+    swing = open_record(data.swing)
+    images = [{"file": each.file.name, "sha256": each.sha256} for each in swing.images]
+    results = FolderArchive(folder)
+    result = results.in_force(NAMES.pen, NAMES.tip)
+    assert result is not None
+    inputs = {"inputs": {"observations": images}}
+    results.store(replace(result, calibration={**result.calibration, **inputs}))
+    with closing(Logbook(folder)) as logbook:
+        logbook.enter_owed()
+    archive = folder / ARCHIVE
+    return [archive, seal_of(archive), *results.all_files(), *record_files(swing)]
+
+
+def _is_found(folder: Path) -> bool:
+    try:
+        with closing(look_into(folder / ARCHIVE)) as database:
+            return bool(check_archive(database, folder).findings)
+    except ArchiveError:
+        return True
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="lightpen-archive-") as folder:
+        yield Path(folder)
+
+
+def main() -> int:
+    """Measure, print the table, and return the exit status."""
+    rows = archive_rows()
+    print(f"{description()}\n\n{table(rows)}")
+    return 0 if all(row.met for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

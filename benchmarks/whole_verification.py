@@ -1,0 +1,77 @@
+"""A whole verification by the simulated operator, timed by its own clock."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lightpen.cameras.clock import SkippingClock
+from lightpen.detection.observations import observe_centers
+from lightpen.detection.sighting import look
+from lightpen.estimation.calibrate import calibrate
+from lightpen.estimation.instrument import Instrument
+from lightpen.formats.observation_files import Centers
+from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.scenes import Scene
+from lightpen.simulator.swings import simulate_centers, swing_poses
+from lightpen.simulator.toucher import Artefacts, Toucher
+from lightpen.verification.choices import TaskKind, VerificationChoices
+from lightpen.verification.session import SessionSetup, SessionState, advance
+
+N_IMAGES = 60  # of the swing that the tip is by
+SIGMA = 0.03  # px
+LED_SIGMA = 0.002  # mm
+GIVE_UP = 300.0  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Verified:
+    """A verification, and how long it took.
+
+    Attributes
+    ----------
+    seconds : float
+        Of the operator's time, from the first touch to the verdict.
+    """
+
+    state: SessionState
+    seconds: float
+    is_done: bool
+
+
+def verified(seed: int = 1) -> Verified:
+    """Verify a tip by fixed point, ring and length; nothing but the hand is moved."""
+    scene = Scene(seed=seed)
+    artefacts = Artefacts()
+    choices = VerificationChoices(
+        tuple(TaskKind), radius=artefacts.ring_radius, length=artefacts.length
+    )
+    instrument = _instrument(scene, np.random.default_rng(seed))
+    setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)
+    clock = SkippingClock()
+    camera = SimulatedCamera(scene, clock)
+    camera.open()
+    camera.start()
+    toucher, state = Toucher(camera.operator, artefacts), SessionState()
+    first, before = 0, None
+    while state.task(setup) is not None and clock.now_ns() < GIVE_UP * 1e9:
+        toucher.follow(setup, state)
+        frame = camera.read(1.0)
+        before = look(frame.image, instrument.camera, instrument.pen, None, before)
+        transition = advance(setup, state, str(frame.seq), before)
+        state = transition.state
+        if transition.events and not first:
+            first = clock.now_ns()
+    camera.close()
+    is_done = state.task(setup) is None
+    return Verified(state, (clock.now_ns() - first) * 1e-9, is_done)
+
+
+def _instrument(scene: Scene, rng: np.random.Generator) -> Instrument:
+    """Return what a swing leaves to measure with."""
+    camera, pen = scene.camera, replace(scene.pen, led_sigma=LED_SIGMA)
+    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
+    poses = swing.rotations, swing.translations
+    pixels = simulate_centers(camera, pen, *poses, SIGMA, rng)
+    centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("simulated.csv"))
+    return calibrate(camera, pen, observe_centers(centers, camera, pen)).instrument
