@@ -88,6 +88,8 @@ class GigeSimulator:
     def _on_fill(
         self, buffer: int, _: int, exposure_us: int, gain: int, pixel_format: int
     ) -> None:
+        if self._simulator is None:  # it is being unplugged
+            return
         assert self._scene is not None
         image = np.ascontiguousarray(self._scene(exposure_us, gain))
         library = self._library

@@ -186,10 +186,11 @@ class Live:
             while not self._stopping.is_set():
                 captured = self._captured()
                 rest = self._rest()
-                for worker in self._workers:
-                    worker.set_rest(rest)
+                is_paired = self._measures and len(self._workers) > 1
+                for worker in self._workers:  # two that rest rarely meet a moment
+                    worker.set_rest(0.0 if is_paired and rest is not None else rest)
                 if self._measures:
-                    self._take_next(captured)
+                    self._take_next(captured, rest if is_paired else None)
                 else:
                     self._take_newest()
         finally:
@@ -269,11 +270,21 @@ class Live:
                 self._hand_over(frame, image.sighting, None)
             self._listener.on_image(image)
 
-    def _take_next(self, captured: SwingSetup | Aim | None) -> None:
-        """Look at the next image, of two cameras at those of the next moment."""
+    def _take_next(
+        self, captured: SwingSetup | Aim | None, rest: float | None
+    ) -> None:
+        """Look at the next image, of two cameras at those of the next moment.
+
+        Parameters
+        ----------
+        rest : float or None
+            Moments within this time of the last one are passed over, s.
+        """
         wanted = captured or self._aim
         frame = self._next_frame()
         if frame is None:
+            return
+        if rest is not None and frame.host_ts_ns - self._seen_ns < rest * 1e9:
             return
         frames = (frame, *frame.others)[: len(wanted.aims)]
         images = [self._look(each, wanted, c) for c, each in enumerate(frames)]

@@ -23,7 +23,7 @@ from lightpen.cameras.worker import (
     WorkerEvent,
 )
 from lightpen.formats.decoding import encode_png
-from lightpen.live.looking import Live, LiveImage
+from lightpen.live.looking import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.sample_rigs import beside
@@ -67,6 +67,10 @@ class Screen:
         """Wait until so many more images of the second camera were shown."""
         wanted = len(self.images[1]) + n_moments
         self.wait_until(lambda: len(self.images[1]) >= wanted)
+
+    def shown_ns(self) -> list[int]:
+        """When the images of the first camera came that were shown."""
+        return [image.frame.host_ts_ns for image in self.images[0]]
 
     def moments(self) -> list[tuple[LiveImage, LiveImage]]:
         return list(zip(*self.images, strict=True))
@@ -169,6 +173,29 @@ def gige_pair(
         simulator.serve(lambda exposure_us, gain, image=image: image)  # type: ignore[misc]
     yield gige, second
     second.unplug()
+
+
+def test_two_cameras_are_still_paired_when_nothing_has_moved_for_long(
+    gige_pair: tuple[GigeSimulator, GigeSimulator],
+    make_live: MakeLive,
+    screen: Screen,
+) -> None:
+    places = (ADDRESS, SECOND_ADDRESS)
+    make_live([DeviceCamera(AravisDevice(place)) for place in places])
+    screen.wait_for_moments(1)
+    began_ns = screen.shown_ns()[0]
+    screen.wait_until(lambda: screen.shown_ns()[-1] - began_ns > LIVELY_NS)
+    gige_pair[1].unplug()  # so that its rest ends at another time than the first's
+    screen.wait_until(lambda: Connection.LOST in screen.connections[1])
+    gige_pair[1].plug_in()
+    screen.wait_until(lambda: screen.connections[1][-1] is Connection.STREAMING)
+    back_ns = MachineClock().now_ns()
+    screen.wait_for_moments(4)
+
+    assert screen.shown_ns()[-4] - back_ns < 5e9
+    gaps = np.diff(screen.shown_ns()[-4:]) * 1e-9
+    assert np.all(gaps > 0.9 * UNHURRIED)
+    assert np.all(gaps < 2 * UNHURRIED)
 
 
 def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
