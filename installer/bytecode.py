@@ -15,7 +15,7 @@ SCRIPT = "compile_modules.py"
 
 
 def compile_modules(folder: Path) -> None:
-    """Compile the modules of an installed folder, beside their sources."""
+    """Compile the modules of an installed folder, into one file."""
     shutil.copyfile(INSTALLER / "windows" / SCRIPT, folder / SCRIPT)
     python = folder / "runtime" / "python.exe"
     words = [str(python), "-I", "-B", SCRIPT]

@@ -54,7 +54,8 @@ def promote_cpp_runtime(folder: Path) -> None:
 
 def add_start(folder: Path) -> None:
     """Add what the launchers run."""
-    shutil.copyfile(INSTALLER / "windows" / "start.py", folder / "start.py")
+    for name, place in (("start.py", "."), ("compiled_modules.py", "runtime")):
+        shutil.copyfile(INSTALLER / "windows" / name, folder / place / name)
 
 
 def write_file_list(folder: Path) -> None:

@@ -1,11 +1,14 @@
 """What the launchers run, within the runtime that lies beside it."""
 
 import ctypes
+import multiprocessing
 import os
 import sys
 import traceback
 from contextlib import suppress
 from pathlib import Path
+
+import compiled_modules
 
 LOG = Path(os.environ.get("LOCALAPPDATA", ".")) / "lightpen" / "crashes"
 QUIET = "LIGHTPEN_NO_DIALOG"  # set where nobody could close a dialog
@@ -22,6 +25,14 @@ def start() -> int:
     if sys.platform == "win32":
         # Packages find the C++ library there that they are linked with.
         os.add_dll_directory(sys.prefix)
+    sys.dont_write_bytecode = True  # no file comes to those that were installed
+    compiled_modules.install()
+    # Processes that it begins are the program itself, which is no python.exe.
+    sys.frozen = True  # type: ignore[attr-defined]
+    if sys.argv[1:2] == ["--multiprocessing-fork"]:
+        multiprocessing.freeze_support()  # works, and does not return
+    if sys.argv[1:3] == ["-m", "lightpen_app"]:
+        del sys.argv[1:3]
     try:
         from lightpen_app.__main__ import main
     except (ImportError, OSError, SyntaxError, ValueError, EOFError):
