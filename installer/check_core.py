@@ -53,7 +53,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         paths.write_text(runtime.PATHS + "\r\n".join([*places, ""]), newline="")
         python = machine.windows_path(folder / "runtime" / "python.exe")
         plugins = () if IS_WINDOWS else ("-p", "installer.wine.without_copyfile2")
-        words = [python, "-B", "-m", "pytest", *plugins, *(options.words or USUAL)]
+        # Without start.py each process finds its modules in the folders, and the first
+        # leaves their compiled form there, in this copy.
+        words = [python, "-m", "pytest", *plugins, *(options.words or USUAL)]
         process = machine.start(words, ROOT)
         if process.stdout is not None:
             for line in process.stdout:  # told as it comes: it takes many minutes

@@ -75,8 +75,9 @@ def try_self_test(trial: Trial, platform: str) -> dict[str, Any]:
         found = {check["name"]: check["found"] for check in report["checks"]}
         drawn = found["window system"]
         trial.expect(f"it draws through {platform}", drawn == platform, drawn)
-        cameras = "harvesters.core" in found["imports"]
-        trial.expect("libraries of cameras load", cameras, found["imports"])
+        for name in ("harvesters.core", "psycopg"):  # for cameras, and for archives
+            loads = name in found["imports"]
+            trial.expect(f"{name} loads", loads, found["imports"])
         program = report["executable"]
         trial.expect("it is Lightpen.exe that runs", program.endswith(IMAGE), program)
     return report
@@ -91,17 +92,22 @@ def try_entry_points(trial: Trial, version: str) -> None:
     made = trial.console("simulate", "set 校", "--images", "20", folder=work)
     trial.expect("console simulates", made.status == 0, made)
     files = ("--camera", "set 校/camera.yaml", "--pen", "set 校/leds.csv")
-    found = trial.console("calibrate", "set 校/images", *files, folder=work)
+    record = ("--json", "record.json")
+    found = trial.console("calibrate", "set 校/images", *files, *record, folder=work)
     has_tip = re.search(r"^ *joint .*[0-9]", found.output, re.MULTILINE) is not None
     trial.expect("console calibrates", found.status == 0 and has_tip, found)
+    trials = ("record.json", *files, "--monte-carlo", "4", "--workers", "2")
+    again = trial.console("recalculate", *trials, folder=work)
+    is_done = again.status == 0 and "4 trials" in again.output
+    trial.expect("console computes in processes of its own", is_done, again)
     unknown = trial.console("calibrate", "nothing", *files, folder=work)
     trial.expect("console hands its exit status on", unknown.status == 2, unknown)
     shutil.rmtree(work)
 
 
 def try_demo(trial: Trial) -> None:
-    """Play the whole demo unseen."""
-    played = trial.console("--demo")
+    """Play the whole demo unseen, by the words that its button goes by."""
+    played = trial.console("-m", "lightpen_app", "--demo")
     tip = re.search(r"^ *joint .*[0-9]", played.output, re.MULTILINE)
     is_accepted = played.status == 0 and tip is not None
     shown = "" if tip is None else tip[0].strip()

@@ -21,7 +21,8 @@ NEAR = 0.005  # mm from the true tip
 MODULES = ("numpy", "cv2", "msgspec", "yaml", "argon2", "PySide6.QtWidgets",
            "PySide6.QtSvg", "pyqtgraph", "lightpen.cli", "lightpen_app.application",
            "lightpen_app.wizard_pages")  # fmt: skip
-OPTIONAL = ("harvesters.core", "pypylon.pylon")  # drive cameras
+# Drive cameras, and reach an archive on a server.
+OPTIONAL = ("harvesters.core", "pypylon.pylon", "psycopg")
 
 
 def test_program(file: Path) -> int:
