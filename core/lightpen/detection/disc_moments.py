@@ -243,11 +243,16 @@ def _measure_window(
     regions, soft = _separate(soft, box, frame)
     if not regions:
         return None
-    moments = _moments(soft, frame, (high - low) / contrast)
+    region, *others = regions
+    # Beside its region soft is 0; half as many pixels take half the time.
+    near = region.moved(-frame.left, -frame.top).grown(1, soft.shape)
+    soft = soft[near.top : near.bottom, near.left : near.right]
+    window = window[near.top : near.bottom, near.left : near.right]
+    around = near.moved(frame.left, frame.top)
+    moments = _moments(soft, around, (high - low) / contrast)
     if moments is None:
         return None
-    moments = _unshaded(moments, window, soft, frame, levels)
-    region, *others = regions
+    moments = _unshaded(moments, window, soft, around, levels)
     height, width = image.shape
     leaves_image = (
         region.left == 0
@@ -264,9 +269,9 @@ def _measure_window(
     is_inside = not (leaves_image or leaves_window)
     is_whole = is_inside and _is_ellipse(moments, noise / contrast)
     if is_inside and not (
-        is_whole and _is_even(moments, window, soft, frame, levels, noise / contrast)
+        is_whole and _is_even(moments, window, soft, around, levels, noise / contrast)
     ):
-        rim = _rim(image, soft, frame)
+        rim = _rim(image, soft, around)
         if rim is not None and rim.is_whole:
             is_whole = True
             moments = _moments_of(rim)

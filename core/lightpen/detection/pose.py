@@ -24,7 +24,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.model.camera import Camera
-from lightpen.model.ellipse import ellipse_centers
+from lightpen.model.ellipse import ellipse_centers_with_jacobian
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import nearest_rotation, rotation_from_vector
 
@@ -234,9 +234,6 @@ def disc_residuals(
 ) -> tuple[FloatArray, FloatArray]:
     """Return reprojection errors of discs and the derivative of their images.
 
-    The derivative is that of the projected centre: the ellipse's centre lies within
-    some 0.1 px of it and moves with it to a part in a thousand.
-
     Parameters
     ----------
     lever : (N, L, 3) array
@@ -256,20 +253,15 @@ def disc_residuals(
         Of the modelled centres, by a rotation vector about the centre of rotation,
         rad, and a translation, mm.
     """
-    projected = camera.project_with_jacobian(centers_cam)
-    modelled = (
-        ellipse_centers(camera, centers_cam, normals_cam, radius)
-        if radius > 0
-        else projected.points
-    )
-    A = projected.jacobian
+    imaged = ellipse_centers_with_jacobian(camera, centers_cam, normals_cam, radius)
+    A = imaged.jacobian
     J = np.empty((*A.shape[:-1], 6))
     x, y, z = (lever[..., None, k] for k in range(3))
     J[..., 0] = y * A[..., 2] - z * A[..., 1]
     J[..., 1] = z * A[..., 0] - x * A[..., 2]
     J[..., 2] = x * A[..., 1] - y * A[..., 0]
     J[..., 3:] = A
-    return pixels - modelled, J
+    return pixels - imaged.points, J
 
 
 def robust_sigma(residuals: FloatArray, n_unknowns_per_image: float) -> float:

@@ -147,12 +147,15 @@ class Camera:
 
     def pixels(self, normalised: FloatArray) -> FloatArray:
         """Return the pixels of undistorted normalised points, both (..., 2)."""
-        x, y = normalised[..., 0], normalised[..., 1]
-        r2 = x * x + y * y
-        return self._distorted_pixels(x, y, r2, _radial_gain(self.distortion, r2))
+        r2 = np.einsum("...i,...i->...", normalised, normalised)
+        factor = _radial_gain(self.distortion, r2) + normalised @ self._slopes
+        return self._distorted_pixels(normalised, r2, factor)
 
     def pixels_with_jacobian(self, normalised: FloatArray) -> PointMap:
         """Return the pixels of undistorted normalised points, and the derivative.
+
+        With n the point, r its distance from the axis and p = (p2, p1), Brown's model
+        is ``n (gain(r^2) + 2 p n) + r^2 p``.
 
         Parameters
         ----------
@@ -164,32 +167,32 @@ class Camera:
         PointMap
             ``points`` in px, ``jacobian`` (..., 2, 2) in px.
         """
-        x, y = normalised[..., 0], normalised[..., 1]
-        r2 = x * x + y * y
-        p1, p2 = self.distortion[2:4].tolist()
+        slopes = self._slopes
+        r2 = np.einsum("...i,...i->...", normalised, normalised)
         gain = _radial_gain(self.distortion, r2)
+        factor = gain + normalised @ slopes
         slope = 2 * _radial_slope(self.distortion, r2, gain)
-        pixels = self._distorted_pixels(x, y, r2, gain)
-        J = np.empty((*normalised.shape, 2))
-        cross = x * y * slope + 2 * (p1 * x + p2 * y)
-        J[..., 0, 0] = self.fx * (gain + x * x * slope + 2 * p1 * y + 6 * p2 * x)
-        J[..., 0, 1] = self.fx * cross
-        J[..., 1, 0] = self.fy * cross
-        J[..., 1, 1] = self.fy * (gain + y * y * slope + 6 * p1 * y + 2 * p2 * x)
-        return PointMap(pixels, J)
+        of_factor = normalised * slope[..., None] + slopes
+        J = normalised[..., :, None] * of_factor[..., None, :]
+        J += slopes[:, None] * normalised[..., None, :]
+        J[..., 0, 0] += factor
+        J[..., 1, 1] += factor
+        J *= np.array([[self.fx], [self.fy]])
+        return PointMap(self._distorted_pixels(normalised, r2, factor), J)
+
+    @property
+    def _slopes(self) -> FloatArray:
+        """Change of the tangential factor by the normalised point, (2,)."""
+        return np.asarray(2 * self.distortion[3:1:-1])
 
     def _distorted_pixels(
-        self, x: FloatArray, y: FloatArray, r2: FloatArray, gain: FloatArray
+        self, normalised: FloatArray, r2: FloatArray, factor: FloatArray
     ) -> FloatArray:
-        p1, p2 = self.distortion[2:4].tolist()
-        pixels = np.empty((*x.shape, 2))
-        pixels[..., 0] = (
-            self.fx * (x * gain + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + self.cx
-        )
-        pixels[..., 1] = (
-            self.fy * (y * gain + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + self.cy
-        )
-        return pixels
+        distorted = normalised * factor[..., None]
+        distorted += r2[..., None] * self.distortion[3:1:-1]
+        distorted *= np.array([self.fx, self.fy])
+        distorted += np.array([self.cx, self.cy])
+        return distorted
 
     def intrinsics_jacobian(self, normalised: FloatArray) -> FloatArray:
         """Return the derivative of the pixels by the intrinsics.

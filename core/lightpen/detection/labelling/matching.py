@@ -14,7 +14,7 @@ import numpy.typing as npt
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import Constellation
 from lightpen.detection.labelling.spot_arrays import SpotArrays
-from lightpen.model.ellipse import disc_images, ellipse_centers
+from lightpen.model.ellipse import conic_centers, disc_images
 from lightpen.model.rigid import rotation_from_vector
 
 MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the camera
@@ -84,7 +84,14 @@ class Candidates:
 
     def of(self, which: IntArray | BoolArray) -> "Candidates":
         """Return some of the candidates."""
-        return Candidates(*(getattr(self, f.name)[which] for f in fields(self)))
+        return Candidates(
+            self.image[which],
+            self.R[which],
+            self.t[which],
+            self.spot[which],
+            self.residuals[which],
+            self.area_ratio[which],
+        )
 
 
 def join(parts: Sequence[Candidates]) -> Candidates:
@@ -161,7 +168,7 @@ def fit(
     R_t = np.swapaxes(candidates.R, 1, 2)
     leds = pen.leds @ R_t + candidates.t[:, None]
     # How far ellipse centres lie from LED centres hardly depends on the pose.
-    eccentric = ellipse_centers(sight.pinhole, leds, pen.normals @ R_t, pen.radius)
+    eccentric = conic_centers(leds, pen.normals @ R_t, pen.radius) * sight.pinhole.fx
     eccentric -= _project(sight, leds)
     even = np.ones_like(candidates.residuals)
     offsets = _offsets(sight, pen, candidates, eccentric)
