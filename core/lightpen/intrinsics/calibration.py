@@ -23,7 +23,7 @@ from lightpen.intrinsics.distortion import (
     folds,
     rms_together,
 )
-from lightpen.intrinsics.start import start_camera
+from lightpen.intrinsics.start import start_camera, start_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
@@ -125,7 +125,11 @@ def calibrate_camera(
         The views do not determine the camera; the text says what is missing.
     """
     require_views(views)
-    first = fit_camera(views, tolerances, start_camera(views, FEW))
+    start = start_camera(views, FEW)
+    placed = np.isfinite(start_poses(start, views).translations[:, 0])
+    views, unplaced = _parted(views, placed)
+    require_views(views)
+    first = fit_camera(views, tolerances, start)
     kept, left_out = _without_outliers(views, first)
     fitted = fit_camera(kept, tolerances, first.state.cameras[0])
     denied = _denied(fitted, tolerances)
@@ -151,7 +155,7 @@ def calibrate_camera(
         camera=camera,
         views=kept,
         adjustment=fitted,
-        left_out=left_out,
+        left_out=unplaced + left_out,
         n_points_left_out=_n_points_left_out(views, kept),
         choice=choice,
         held_out=held_out,
@@ -213,11 +217,14 @@ def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str,
                 board=views.board.name,
             )
         )
-    names = tuple(
-        name for name, keep in zip(views.names, kept, strict=True) if not keep
-    )
     require_views(left)
-    return left, names
+    return left, _parted(views, kept)[1]
+
+
+def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:
+    """Return some of the views, and the names of the others."""
+    others = zip(views.names, kept, strict=True)
+    return views.chosen(kept), tuple(name for name, keep in others if not keep)
 
 
 def _n_points_left_out(views: Views, kept: Views) -> int:

@@ -97,6 +97,15 @@ def test_a_view_that_fits_no_other_is_left_out(make_views: MakeViews) -> None:
     assert found.left_out == ("view_04.png",)
 
 
+def test_a_view_that_shows_one_row_is_left_out(make_views: MakeViews) -> None:
+    views = make_views()
+    pixels = views.pixels.copy()
+    pixels[3, :, 9:] = np.nan
+    found = calibrate_camera(replace(views, pixels=pixels), BoardTolerances())
+
+    assert found.left_out == (views.names[3],)
+
+
 def test_a_misplaced_point_is_left_out(make_views: MakeViews) -> None:
     views = make_views()
     pixels = views.pixels.copy()
