@@ -114,6 +114,11 @@ class BoardFit:
         """Return where the intrinsics of a camera stand among the unknowns."""
         return _intrinsics_at(self.state.cameras)[camera]
 
+    def prior_of(self, camera: int) -> FloatArray:
+        """Return the information that was assumed of a camera's intrinsics."""
+        at = self.of_intrinsics(camera)
+        return self.prior[at, at]
+
     @property
     def correlation(self) -> float:
         """How many times the variance of independent noise the views vary by.

@@ -14,12 +14,14 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust,
-    fit_poses,
+from lightpen.intrinsics.adjustment import N_SHAPE, BoardFit
+from lightpen.intrinsics.distortion import (
+    FEW,
+    Choice,
+    choose_distortion,
+    fit_camera,
+    folds,
+    rms_together,
 )
 from lightpen.intrinsics.start import start_camera, start_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
@@ -27,14 +29,9 @@ from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 from lightpen.sentences import Sentence, sentence
 
-FEW, MANY = 5, 8  # distortion coefficients
-K3 = 8  # its place among the intrinsics
-HELD = 1e20  # information of what is held
-N_FOLDS = 5
 MIN_VIEWS = 5
 ENOUGH_VIEWS = 15
-WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
-SIGMAS = 2.0  # of the mean gain
+SIGMAS = 2.0  # of the correlation by chance
 OFF_POINT = 6.0  # robust standard deviations
 OFF_VIEW = 4.0  # times the median rms of the views
 FINEST = 1e-3  # px; exact points are off by rounding alone
@@ -46,61 +43,6 @@ CONTRADICTED = 3.0  # standard deviations
 STRETCHED = 1e-3  # relative: less is no printer's doing
 LET_GO, LET_GO_MM = 0.1, 5.0  # of a board that is not what it was said to be
 MAD = 1.4826
-
-
-@dataclass(frozen=True)
-class Choice:
-    """Why so many distortion coefficients.
-
-    Attributes
-    ----------
-    n_coefficients : int
-    held_out : float
-        Distance of points in views that were not fitted to, with 5 coefficients, px
-        rms.
-    held_out_more : float or None
-        The same with 8; None where the views do not tell so many.
-    k3_held : bool
-        Whether k3 is held at 0, as it folded the image.
-    """
-
-    n_coefficients: int
-    held_out: float
-    held_out_more: float | None
-    k3_held: bool = False
-
-    @property
-    def sentence(self) -> Sentence:
-        """It in words."""
-        if self.k3_held:
-            return sentence(
-                "intrinsics.k3-held",
-                "k3 is held at 0: the views do not reach the corners, where it would "
-                "fold the image. Error in views left out: {held_out:.4f} px.",
-                held_out=self.held_out,
-            )
-        if self.held_out_more is None:
-            return sentence(
-                "intrinsics.five-only",
-                "5 coefficients, as the views do not tell 8 apart. Error in views left "
-                "out: {held_out:.4f} px.",
-                held_out=self.held_out,
-            )
-        if self.n_coefficients == MANY:
-            return sentence(
-                "intrinsics.eight",
-                "8 coefficients, as they lessen the error in views left out from "
-                "{held_out:.4f} to {held_out_more:.4f} px.",
-                held_out=self.held_out,
-                held_out_more=self.held_out_more,
-            )
-        return sentence(
-            "intrinsics.five",
-            "5 coefficients, as 8 do not lessen the error in views left out: "
-            "{held_out:.4f} px with 5, {held_out_more:.4f} px with 8.",
-            held_out=self.held_out,
-            held_out_more=self.held_out_more,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +102,7 @@ class CameraCalibration:
     @property
     def held_out_rms(self) -> float:
         """Distance of points in views that were not fitted to, px rms."""
-        return _together(self.held_out, self.views)
+        return rms_together(self.held_out, self.views)
 
     @property
     def worst_first(self) -> list[int]:
@@ -183,18 +125,23 @@ def calibrate_camera(
         The views do not determine the camera; the text says what is missing.
     """
     require_views(views)
-    first = _fit(views, tolerances, start_camera(views, FEW))
+    start = start_camera(views, FEW)
+    placed = np.isfinite(start_poses(start, views).translations[:, 0])
+    views, unplaced = _parted(views, placed)
+    require_views(views)
+    first = fit_camera(views, tolerances, start)
     kept, left_out = _without_outliers(views, first)
-    fitted = _fit(kept, tolerances, first.state.cameras[0])
+    fitted = fit_camera(kept, tolerances, first.state.cameras[0])
     denied = _denied(fitted, tolerances)
-    remarks: tuple[Sentence, ...] = ()
+    stated = tolerances
     if denied.any():  # then the views tell how it is, and not what was said of it
-        let_go = BoardTolerances(LET_GO_MM, LET_GO, tolerances.scale)
-        fitted = _fit(kept, let_go, fitted.state.cameras[0])
-        remarks = _remarks_on_board(fitted, denied, tolerances)
-        tolerances = let_go
+        tolerances = BoardTolerances(LET_GO_MM, LET_GO, stated.scale)
+        fitted = fit_camera(kept, tolerances, fitted.state.cameras[0])
     report(0.2)
-    choice, fitted, held_out = _chosen(kept, tolerances, fitted, report)
+    choice, fitted, held_out = choose_distortion(kept, tolerances, fitted, report)
+    remarks = _remarks_on_board(fitted, denied, stated)
+    if choice.remark is not None:
+        remarks = (*remarks, choice.remark)
     _require_determined(fitted)
     correlation = _significant(fitted)
     at = fitted.of_intrinsics(0)
@@ -208,7 +155,7 @@ def calibrate_camera(
         camera=camera,
         views=kept,
         adjustment=fitted,
-        left_out=left_out,
+        left_out=unplaced + left_out,
         n_points_left_out=_n_points_left_out(views, kept),
         choice=choice,
         held_out=held_out,
@@ -238,30 +185,6 @@ def require_views(views: Views) -> None:
                 enough=ENOUGH_VIEWS,
             )
         )
-
-
-def _fit(
-    views: Views,
-    tolerances: BoardTolerances,
-    near: Camera,
-    *,
-    k3_held: bool = False,
-) -> BoardFit:
-    """Return the fit of all, from a camera on; k3 is held at 0, or is not."""
-    known = None
-    if k3_held:
-        distortion = np.where(np.arange(len(near.distortion)) == K3 - 4, 0.0, 1.0)
-        near = replace(near, distortion=distortion * near.distortion)
-        known = np.zeros((len(near.intrinsics),) * 2)
-        known[K3, K3] = HELD
-    state = BoardState(
-        (near,),
-        np.eye(3)[None],
-        np.zeros((1, 3)),
-        start_poses(near, views),
-        np.zeros(N_SHAPE),
-    )
-    return adjust(views, state, tolerances, (known,))
 
 
 def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str, ...]]:
@@ -294,11 +217,14 @@ def _without_outliers(views: Views, fitted: BoardFit) -> tuple[Views, tuple[str,
                 board=views.board.name,
             )
         )
-    names = tuple(
-        name for name, keep in zip(views.names, kept, strict=True) if not keep
-    )
     require_views(left)
-    return left, names
+    return left, _parted(views, kept)[1]
+
+
+def _parted(views: Views, kept: BoolArray) -> tuple[Views, tuple[str, ...]]:
+    """Return some of the views, and the names of the others."""
+    others = zip(views.names, kept, strict=True)
+    return views.chosen(kept), tuple(name for name, keep in others if not keep)
 
 
 def _n_points_left_out(views: Views, kept: Views) -> int:
@@ -348,69 +274,8 @@ def _remarks_on_board(
     return tuple(remarks)
 
 
-def _chosen(
-    views: Views,
-    tolerances: BoardTolerances,
-    fitted: BoardFit,
-    report: Callable[[float], None],
-) -> tuple[Choice, BoardFit, FloatArray]:
-    """Return how many coefficients, the fit with them, and the held-out errors."""
-    held = _folds(fitted.state.cameras[0])
-    if held:
-        fitted = _fit(views, tolerances, fitted.state.cameras[0], k3_held=True)
-    camera = fitted.state.cameras[0]
-    errors = _held_out(views, tolerances, camera, k3_held=held)
-    report(0.5)
-    rms, rms_more = _together(errors, views), None
-    try:
-        richer = replace(camera, distortion=np.append(camera.distortion, np.zeros(3)))
-        more = _fit(views, tolerances, richer)
-        errors_more = _held_out(views, tolerances, more.state.cameras[0])
-        rms_more = _together(errors_more, views)
-        gains = errors**2 - errors_more**2
-        chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
-        is_better = rms_more < (1 - WORTH) * rms and gains.mean() > SIGMAS * chance
-        if is_better and not _folds(more.state.cameras[0]):
-            return Choice(MANY, rms, rms_more), more, errors_more
-    except CalibrationError:  # so many are not told apart
-        pass
-    report(0.8)
-    return Choice(FEW, rms, rms_more, k3_held=held), fitted, errors
-
-
-def _held_out(
-    views: Views, tolerances: BoardTolerances, near: Camera, *, k3_held: bool = False
-) -> FloatArray:
-    """Return the error of each view by a fit of the others, (V,), px rms."""
-    errors = np.full(views.n_views, np.nan)
-    fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
-    for fold in range(int(fold_of.max()) + 1):
-        others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
-        fitted = _fit(others, tolerances, near, k3_held=k3_held).state
-        poses = start_poses(fitted.cameras[0], own)
-        residuals = fit_poses(own, replace(fitted, poses=poses))
-        squares = np.square(residuals).sum(axis=-1)
-        errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
-    return errors
-
-
-def _together(errors: FloatArray, views: Views) -> float:
-    """Return the error of all points, px rms, from that of each view."""
-    counts = views.seen.sum(axis=(1, 2))
-    return float(np.sqrt(np.average(errors**2, weights=counts)))
-
-
-def _folds(camera: Camera) -> bool:
-    """Tell whether the distortion turns the image over before its corners."""
-    try:
-        error_fields(camera)
-    except CalibrationError:
-        return True
-    return False
-
-
 def _require_no_fold(camera: Camera) -> None:
-    if _folds(camera):
+    if folds(camera):
         raise CalibrationError(
             sentence(
                 "intrinsics.folds",
@@ -458,7 +323,7 @@ def _halves(
     is_even = np.arange(views.n_views) % 2 == 0
     try:
         one, other = (
-            _fit(views.chosen(which), tolerances, near, k3_held=choice.k3_held)
+            fit_camera(views.chosen(which), tolerances, near, choice.pull)
             for which in (is_even, ~is_even)
         )
         first, second = one.state.cameras[0], other.state.cameras[0]

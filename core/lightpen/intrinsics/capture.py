@@ -9,8 +9,9 @@ from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
 from lightpen.intrinsics.adjustment import N_SHAPE, BoardState, adjust
 from lightpen.intrinsics.boards import Board
-from lightpen.intrinsics.calibration import FEW, MIN_VIEWS
+from lightpen.intrinsics.calibration import MIN_VIEWS
 from lightpen.intrinsics.coverage import cells_of
+from lightpen.intrinsics.distortion import FEW
 from lightpen.intrinsics.next_view import choose_next_view, first_views
 from lightpen.intrinsics.start import start_camera, start_poses
 from lightpen.intrinsics.views import BoardTolerances, Views

@@ -164,7 +164,10 @@ def calibrate_pair(
             calibrate_camera(views.of_camera(c), tolerances) for c in range(2)
         )
         cameras = tuple(each.camera for each in alone)
-        stated: tuple[FloatArray | None, ...] = (None, None)
+        # With what keeps their images from folding.
+        stated: tuple[FloatArray | None, ...] = tuple(
+            each.adjustment.prior_of(0) for each in alone
+        )
     else:
         stated = tuple(
             None if camera.covariance is None else stated_information(camera.covariance)

@@ -26,6 +26,7 @@ from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_diction
 
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
 SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
+ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
 REFINED = 0.4  # of the distance of neighbours: no other edge is that near
 MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
 REFINING = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 60, 1e-4)
@@ -63,7 +64,7 @@ def find_points(
     if board.kind.is_circles:
         return _circles(image, grey, board, quick=quick)
     if board.kind.has_markers:
-        points = _marked(grey, board)
+        points = _marked(grey, board, quick=quick)
     else:
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
         points = None if points is None else _from_front(points, board)
@@ -74,12 +75,16 @@ def find_points(
 
 
 def _is_spread(points: FloatArray, board: Board) -> bool:
-    """Tell whether the points seen fix a pose: enough, and not in one row."""
+    """Tell whether the points seen fix a pose: enough, not all but one in one row."""
     seen = board.points[np.isfinite(points[:, 0]), :2]
-    if len(seen) < FEWEST:
+    n_seen = len(seen)
+    if n_seen < FEWEST:
         return False
-    across = float(np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)[1])
-    return bool(across > SPREAD * board.pitch * float(np.sqrt(len(seen))))
+    away = seen - seen.mean(axis=0)
+    of_each = n_seen / (n_seen - 1) * away[:, :, None] * away[:, None, :]
+    without = away.T @ away - of_each  # as the scatter is about their own mean
+    across = np.sqrt(np.maximum(np.linalg.eigvalsh(without)[:, 0].min(), 0.0))
+    return bool(across > SPREAD * board.pitch * np.sqrt(n_seen))
 
 
 def _from_front(points: FloatArray, board: Board) -> FloatArray:
@@ -159,7 +164,25 @@ def _is_even(points: Any, corners: tuple[int, int]) -> bool:
     return True
 
 
-def _marked(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
+def _marked(
+    grey: npt.NDArray[np.uint8], board: Board, *, quick: bool
+) -> FloatArray | None:
+    points = _by_markers(grey, board)
+    is_whole = points is not None and bool(np.isfinite(points).all())
+    if quick or is_whole or grey.size > ENLARGED:
+        return points
+    larger = cv2.resize(grey, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+    again = _by_markers(np.asarray(larger, dtype=np.uint8), board)
+    if again is None or _n_seen(again) <= _n_seen(points):
+        return points
+    return _whole(again, 2.0)
+
+
+def _n_seen(points: FloatArray | None) -> int:
+    return 0 if points is None else int(np.isfinite(points[:, 0]).sum())
+
+
+def _by_markers(grey: npt.NDArray[np.uint8], board: Board) -> FloatArray | None:
     points = np.full((board.n_points, 2), np.nan)
     size, dictionary = (board.columns, board.rows), marker_dictionary(board)
     if board.kind is BoardKind.MARKERS:

@@ -21,7 +21,7 @@ class ImageRow:
     misfit : float
         Root mean square residual with the tip in the cone, px; NaN without the pen.
     n_leds : int
-        LEDs that were seen.
+        LEDs that were seen, by all cameras together.
     reason : Reason
         Why it does not take part; `Reason.NONE` where it does.
     is_taken_out : bool
@@ -48,7 +48,8 @@ def worst_first(solution: Solution) -> tuple[ImageRow, ...]:
     of the fit.
     """
     misfits = solution.misfits
-    n_leds = np.isfinite(solution.observations.seen_pixels[..., 0]).sum(axis=1)
+    seen = (solution.observations, *solution.others)
+    n_leds = sum(np.isfinite(each.seen_pixels[..., 0]).sum(axis=1) for each in seen)
     order = np.argsort(-np.nan_to_num(misfits, nan=np.inf), kind="stable")
     return tuple(
         ImageRow(

@@ -26,7 +26,7 @@ from lightpen.estimation.camera_path import steadied
 from lightpen.estimation.joint import ContactModel, reduce
 from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
 from lightpen.formats.pairing import Pairing
-from lightpen.model.rig import rig_of
+from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.reading import Record, RecordSource, source
 from lightpen.sentences import sentence
@@ -48,10 +48,10 @@ class Solution:
         What those of the other cameras of a rig show, of the same moments.
     taken_out : mapping of int to str
         Numbers of images that do not take part, and why.
-    residuals : (N, L, 2) array
-        Observed minus modelled LED centres with the tip in the cone, px. An image that
-        is left out is turned as fits it best. NaN for LEDs that were not seen, and for
-        images that do not show the pen.
+    residuals : (N, C, L, 2) array
+        Observed minus modelled LED centres in each camera with the tip in the cone, px.
+        An image that is left out is turned as fits it best. NaN for LEDs that were not
+        seen, and for images that do not show the pen.
     """
 
     source: RecordSource
@@ -62,18 +62,24 @@ class Solution:
     residuals: FloatArray
     others: tuple[Observations, ...] = ()
 
+    def seen_by(self, camera: int) -> Observations:
+        """Return what the images of a camera show, the first being 0."""
+        return (self.observations, *self.others)[camera]
+
     @property
     def misfits(self) -> FloatArray:
         """Root mean square residual of each image, px, (N,); NaN without the pen.
 
-        Of an image that takes part, over the LEDs that do; else over all.
+        Of an image that takes part, over the LEDs that do; else over all. Of a rig,
+        over the images of all cameras.
         """
         calibration = self.calibration
-        squares = np.sum(self.residuals**2, axis=2)
+        squares = np.sum(self.residuals**2, axis=3)
         seen = np.isfinite(squares)
-        counted = np.where(calibration.used[:, None], calibration.leds_used, seen)
-        n_leds = counted.sum(axis=1)
-        total = np.sum(squares, axis=1, where=counted)
+        in_fit = np.stack([each.leds_used for each in calibration.cameras], axis=1)
+        counted = np.where(calibration.used[:, None, None], in_fit, seen)
+        n_leds = counted.sum(axis=(1, 2))
+        total = np.sum(squares, axis=(1, 2), where=counted)
         rms = np.sqrt(total / np.maximum(n_leds, 1))
         return np.where(n_leds > 0, rms, np.nan)
 
@@ -138,8 +144,8 @@ def solve_again(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
     return _solved(solution.source, solution.numbers, seen, taken_out)
 
 
-def load_image(solution: Solution, number: int) -> Image:
-    """Read an image of a solved record again, (H, W), by its number.
+def load_image(solution: Solution, number: int, camera: int = 0) -> Image:
+    """Read an image of a solved record again, (H, W), by its number and camera.
 
     Raises
     ------
@@ -147,7 +153,9 @@ def load_image(solution: Solution, number: int) -> Image:
         The image is missing or damaged.
     """
     index = int(np.searchsorted(solution.numbers, number))
-    load = next(islice(solution.source.images.open(), index, None))
+    source = solution.source
+    images = (source.images, *source.other_images)[camera]
+    load = next(islice(images.open(), index, None))
     return load()
 
 
@@ -197,29 +205,46 @@ def _solved(
         observations=seen[0],
         taken_out=dict(taken_out),
         calibration=calibration,
-        residuals=_all_residuals(source, seen[0], calibration),
+        residuals=_all_residuals(source, seen, calibration),
         others=seen[1:],
     )
 
 
 def _all_residuals(
-    source: RecordSource, observations: Observations, calibration: Calibration
+    source: RecordSource, seen: tuple[Observations, ...], calibration: Calibration
 ) -> FloatArray:
-    """Return the residuals of all images, (N, L, 2), as `Solution` has them."""
-    joint = calibration.joint
-    own = joint.of_camera(0, source.pen.n_leds)
-    pixels = steadied(source.camera, observations, calibration.cameras[0].path).pixels
+    """Return the residuals of all images, (N, C, L, 2), as `Solution` has them."""
+    joint, fitted = calibration.joint, calibration.bundle.state
+    cameras = (source.rig or rig_of(source.camera)).cameras
+    pixels = np.stack(
+        [
+            steadied(camera, each, images.path).pixels
+            for camera, each, images in zip(
+                cameras, seen, calibration.cameras, strict=True
+            )
+        ],
+        axis=1,
+    )
     residuals = np.full_like(pixels, np.nan)
-    residuals[calibration.used] = own.residuals[joint.used.any(axis=1)]
-    shows_pen = np.isfinite(observations.translations[:, 0])
+    in_fit = joint.residuals[joint.used.any(axis=1)]
+    residuals[calibration.used] = in_fit.reshape(-1, *pixels.shape[1:])
+    rotations = _rough_rotations(fitted.rig, seen)
+    shows_pen = np.isfinite(rotations[:, 0, 0])
     others = np.flatnonzero(~calibration.used & shows_pen)
     if len(others):
-        fitted = calibration.bundle.state
-        model = ContactModel.of(fitted.rig.cameras[0], fitted.pen, pixels[others])
-        residuals[others] = _turned_to_fit(
-            model, observations.rotations[others], joint.tip_pen, joint.cone_cam
-        )
+        model = ContactModel(fitted.rig, fitted.pen, pixels[others])
+        turned = _turned_to_fit(model, rotations[others], joint.tip_pen, joint.cone_cam)
+        residuals[others] = turned.reshape(-1, *pixels.shape[1:])
     return residuals
+
+
+def _rough_rotations(rig: Rig, seen: tuple[Observations, ...]) -> FloatArray:
+    """Return rig_from_pen by the first camera that shows the pen, (N, 3, 3)."""
+    found = seen[0].rotations
+    for R, each in zip(rig.rotations[1:], seen[1:], strict=True):
+        missing = np.isnan(found[:, 0, 0])[:, None, None]
+        found = np.where(missing, R.T @ each.rotations, found)
+    return found
 
 
 def _turned_to_fit(

@@ -17,10 +17,10 @@ import numpy as np
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import certain_leds
 from lightpen.estimation.joint import ContactModel, reduce
-from lightpen.model.camera import Camera
 from lightpen.model.coverage import N_DIRECTIONS
 from lightpen.model.pen import Pen
 from lightpen.model.posture import Posture, angles_between, rotations_of
+from lightpen.model.rig import Rig
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 
 TILTS = (np.radians(14.0), np.radians(28.0))  # in the middle of the rings of the dial
@@ -36,6 +36,8 @@ class Outlook:
 
     Attributes
     ----------
+    rig : Rig
+        All cameras. The first must see the pen, the others tell what they see.
     tip_pen, cone_cam : (3,) array
         mm.
     information : (6, 6) array
@@ -48,7 +50,7 @@ class Outlook:
         Angle by which a new posture must differ from all of these, rad.
     """
 
-    camera: Camera
+    rig: Rig
     pen: Pen
     tip_pen: FloatArray
     cone_cam: FloatArray
@@ -104,18 +106,30 @@ def image_information(outlook: Outlook, rotations: FloatArray) -> FloatArray:
     rotations : (N, 3, 3) array
         cam_from_pen.
     """
-    none = np.zeros((len(rotations), outlook.pen.n_leds, 2))
-    model = ContactModel.of(outlook.camera, outlook.pen, none)
+    rig, pen = outlook.rig, outlook.pen
+    none = np.zeros((len(rotations), rig.n_cameras, pen.n_leds, 2))
+    model = ContactModel(rig, pen, none)
     state = model.at(rotations, outlook.tip_pen, outlook.cone_cam)
     seen = usable_leds(outlook, rotations).astype(float)
     return np.asarray(reduce(state, seen).S / outlook.sigma**2)
 
 
 def usable_leds(outlook: Outlook, rotations: FloatArray) -> BoolArray:
-    """Return which LEDs would show whole, apart and face on enough, (N, L)."""
-    camera, pen = outlook.camera, outlook.pen
-    turned = np.swapaxes(rotations, 1, 2)
-    leds = (pen.leds - outlook.tip_pen) @ turned + outlook.cone_cam
+    """Return which LEDs would show whole, apart and face on enough, (N, C L).
+
+    The LEDs in one camera after those in the other.
+    """
+    rig = outlook.rig
+    each = [_usable_leds(outlook, rotations, c) for c in range(rig.n_cameras)]
+    return np.concatenate(each, axis=1)
+
+
+def _usable_leds(outlook: Outlook, rotations: FloatArray, c: int) -> BoolArray:
+    """Return which LEDs the c-th camera would show so, (N, L)."""
+    camera, pen = outlook.rig.cameras[c], outlook.pen
+    R, t = outlook.rig.rotations[c], outlook.rig.translations[c]
+    turned = np.swapaxes(R @ rotations, 1, 2)
+    leds = (pen.leds - outlook.tip_pen) @ turned + R @ outlook.cone_cam + t
     cosines = -np.einsum("nli,nli->nl", leds, pen.normals @ turned)
     cosines /= np.linalg.norm(leds, axis=2)
     pixels = camera.project(leds)
@@ -147,8 +161,8 @@ def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
 
 
 def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
-    """Return in which postures enough LEDs show."""
-    n_seen = usable_leds(outlook, rotations).sum(axis=1)
+    """Return in which postures the first camera shows enough LEDs."""
+    n_seen = _usable_leds(outlook, rotations, 0).sum(axis=1)
     return np.asarray(n_seen >= certain_leds(outlook.pen))
 
 

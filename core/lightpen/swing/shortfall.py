@@ -215,7 +215,7 @@ def _outlook(setup: SwingSetup, state: SwingState, seat: Seat) -> Outlook:
     if not state.n_kept and sighting is not None:
         sigma = sighting.sigma
     return Outlook(
-        camera=setup.camera,
+        rig=setup.rig,
         pen=setup.pen,
         tip_pen=seat.tip_pen,
         cone_cam=seat.cone_cam,

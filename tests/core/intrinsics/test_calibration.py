@@ -21,6 +21,7 @@ from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
 
 MakeViews = Callable[..., Views]
+NOISE = 0.03  # px, of `make_views`
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +95,15 @@ def test_a_view_that_fits_no_other_is_left_out(make_views: MakeViews) -> None:
     found = calibrate_camera(replace(views, pixels=pixels), BoardTolerances())
 
     assert found.left_out == ("view_04.png",)
+
+
+def test_a_view_that_shows_one_row_is_left_out(make_views: MakeViews) -> None:
+    views = make_views()
+    pixels = views.pixels.copy()
+    pixels[3, :, 9:] = np.nan
+    found = calibrate_camera(replace(views, pixels=pixels), BoardTolerances())
+
+    assert found.left_out == (views.names[3],)
 
 
 def test_a_misplaced_point_is_left_out(make_views: MakeViews) -> None:
@@ -194,3 +204,21 @@ def test_residuals_are_told_by_region(found: CameraCalibration) -> None:
         np.nansum(regions.n_points * regions.rms**2) / regions.n_points.sum(),
         found.adjustment.rms**2,
     )
+
+
+def test_a_wide_lens_is_fitted_though_no_view_reaches_the_corners(
+    make_views: MakeViews,
+) -> None:
+    """A polynomial that fits the middle folds the corners; the image stays whole."""
+    lens = Camera(
+        *(640, 480, 282.0, 282.0, 325.0, 249.0),
+        distortion=np.array([-0.23, 0.052, 0, 0, 0.0156, 0.033, -0.051, 0.045]),
+    )
+    views = make_views(of=lens, n_views=24)
+    off = np.linalg.norm(views.pixels - [325.0, 249.0], axis=-1, keepdims=True)
+    inner = replace(views, pixels=np.where(off < 300.0, views.pixels, np.nan))
+    found = calibrate_camera(inner, BoardTolerances())
+
+    assert found.adjustment.rms < 1.1 * NOISE * 2**0.5
+    assert np.isfinite(map_uncertainty(found.camera, np.eye(12)).worst)
+    assert any("the corners are a guess" in str(each) for each in found.remarks)

@@ -37,14 +37,14 @@ def place(board: Board, filled: float = 0.6) -> FloatArray:
     return np.array([3.0, -2.0, SMALL.fx * longer / (filled * SMALL.width)])
 
 
-def image_of(board: Board, bits: int = 8, seed: int = 1) -> Image:
-    light = render_board(SMALL, board, TILT, place(board))
+def image_of(board: Board, bits: int = 8, seed: int = 1, filled: float = 0.6) -> Image:
+    light = render_board(SMALL, board, TILT, place(board, filled))
     sensor = Sensor(bits=12) if bits == 12 else Sensor()
     return expose_board(light, sensor, np.random.default_rng(seed))
 
 
-def truth(board: Board) -> FloatArray:
-    points = board.points @ TILT.T + place(board)
+def truth(board: Board, filled: float = 0.6) -> FloatArray:
+    points = board.points @ TILT.T + place(board, filled)
     if not board.kind.is_circles:
         return SMALL.project(points)
     normals = np.broadcast_to(TILT[:, 2], points.shape)
@@ -93,6 +93,16 @@ def test_a_charuco_board_that_is_partly_hidden_is_found() -> None:
     seen = np.isfinite(points[:, 0])
     assert 6 <= seen.sum() < board.n_points
     assert error_of(points, board) < 0.06
+
+
+def test_markers_of_a_few_pixels_are_read() -> None:
+    board = parse_board("charuco:7x5:20:15:DICT_6X6_250")
+    points = find_points(image_of(board, filled=0.3), board)
+
+    assert points is not None
+    seen = np.isfinite(points[:, 0])
+    assert seen.mean() > 0.8
+    assert np.abs(points[seen] - truth(board, 0.3)[seen]).max() < 0.3
 
 
 def test_rows_numbered_in_a_mirror_are_put_right() -> None:

@@ -9,6 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.estimation.joint import fit_joint
 from lightpen.model.posture import Posture, angles_between, rotations_of
+from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector, vector_from_rotation
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -43,7 +44,7 @@ def rotation(tilt: float, direction: float, turn: float = 0.0) -> FloatArray:
 def outlook(rotations: FloatArray) -> Outlook:
     """Return what images of these postures leave to be known."""
     blind = Outlook(
-        CAMERA, PEN, PAPER_TIP, PAPER_CONE, PRIOR, SIGMA, rotations, SPACING
+        rig_of(CAMERA), PEN, PAPER_TIP, PAPER_CONE, PRIOR, SIGMA, rotations, SPACING
     )
     known = image_information(blind, rotations).sum(axis=0)
     return replace(blind, information=PRIOR + known)
@@ -130,6 +131,17 @@ def test_only_wanted_fields_are_chosen() -> None:
     assert next_posture(known, rotation(0, 0), np.zeros((3, 8), dtype=bool)) is None
 
 
+def test_what_a_second_camera_would_see_counts() -> None:
+    alone = swung((0, 0, 0), (20, 0, 0), (20, 120, 0))
+    rotations = alone.rotations
+    beside = Rig((CAMERA, CAMERA), np.stack([np.eye(3)] * 2), np.zeros((2, 3)))
+    both = replace(alone, rig=beside)
+
+    np.testing.assert_allclose(
+        image_information(both, rotations), 2 * image_information(alone, rotations)
+    )
+
+
 def test_postures_the_camera_cannot_see_are_left_out() -> None:
     known = swung((10.0, 0.0, 0.0), (10.0, 90.0, 0.0))
     assert visible_fields(known)[1:].all()
@@ -161,7 +173,9 @@ def test_leds_cut_by_the_border_are_not_counted_on(axis: int, sign: int) -> None
         shift = np.zeros(2)
         shift[axis] = border - sign * room - pixels[outermost, axis]
         moved = replace(CAMERA, cx=CAMERA.cx + shift[0], cy=CAMERA.cy + shift[1])
-        usable.append(usable_leds(replace(known, camera=moved), known.rotations)[0])
+        usable.append(
+            usable_leds(replace(known, rig=rig_of(moved)), known.rotations)[0]
+        )
 
     assert not usable[0][outermost]
     assert usable[1].all()

@@ -16,7 +16,7 @@ from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.camera.camera_switch import CameraSwitch
+from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import led_numbers, live_markers
 from lightpen_app.widgets.sign_label import Remark, SignLabel

@@ -22,6 +22,7 @@ from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.plot_card import PlotCard
 from lightpen_app.steps.review.residual_plots import MisfitPlot
 from lightpen_app.steps.review.residual_view import NO_ARROWS, Arrows, ResidualView
+from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import Marker
 from lightpen_app.widgets.plots import Axes
 from lightpen_app.widgets.push_button import PushButton
@@ -41,6 +42,7 @@ class _Decoded:
 
     source: RecordSource
     number: int
+    camera: int
     half: Image
     size: QSize
 
@@ -68,8 +70,8 @@ class ImagesPanel(Translated, QWidget):
         self._solution: Solution | None = None
         self._why_locked = ""
         self._job: Job | None = None
-        self._loading: tuple[RecordSource, int] | None = None
-        self._shown: int | None = None
+        self._loading: tuple[RecordSource, int, int] | None = None
+        self._shown: tuple[int, int] | None = None  # number and camera
         self._steps = QUndoStack(self)
         self._is_awaited = False  # whether the last step has no solution yet
 
@@ -82,6 +84,8 @@ class ImagesPanel(Translated, QWidget):
         self._view = ResidualView()
         self._view.setMinimumHeight(LEAST_HEIGHT)
         self._caption = text_label(TextSize.SMALL, Tone.QUIET)
+        self._switch = CameraSwitch()
+        self._switch.hide()
         self._misfits = MisfitPlot(Axes(""))
         self._card = PlotCard(self._misfits, "misfit-of-images")
 
@@ -90,6 +94,10 @@ class ImagesPanel(Translated, QWidget):
         buttons.setSpacing(GRID)
         buttons.addWidget(self._take_out, 1)
         buttons.addWidget(self._put_back, 1)
+        below = QHBoxLayout()
+        below.setSpacing(GRID)
+        below.addWidget(self._caption, 1)
+        below.addWidget(self._switch)
         layout = QGridLayout(self)
         layout.setContentsMargins(0, GRID, 0, 0)
         layout.setSpacing(GRID)
@@ -98,7 +106,7 @@ class ImagesPanel(Translated, QWidget):
         layout.addLayout(buttons, 4, 0)
         layout.addWidget(self._undo, 5, 0)
         layout.addWidget(self._view, 0, 1)
-        layout.addWidget(self._caption, 1, 1)
+        layout.addLayout(below, 1, 1)
         layout.addWidget(self._card, 2, 1, 4, 1)
         layout.setColumnMinimumWidth(0, TABLE_WIDTH)
         layout.setColumnStretch(1, 1)
@@ -108,6 +116,7 @@ class ImagesPanel(Translated, QWidget):
         # Connections
         self._table.number_changed.connect(self._on_number_changed)
         self._table.selection_changed.connect(self._refresh_buttons)
+        self._switch.value_changed.connect(self._on_camera_changed)
         self._misfits.number_chosen.connect(self._table.choose)
         self._misfits.limit_set.connect(self._leave_out)
         self._take_out.clicked.connect(self._on_take_out_clicked)
@@ -136,6 +145,9 @@ class ImagesPanel(Translated, QWidget):
             self._steps.clear()
             self.shut_down()
             self._clear_view()
+        if not self._is_of_rig():
+            self._switch.set_value(0)
+        self._switch.setVisible(self._is_of_rig() and not self._view.isHidden())
         rows = () if solution is None else worst_first(solution)
         self._table.set_value(rows)
         self._refresh_misfits()
@@ -241,14 +253,16 @@ class ImagesPanel(Translated, QWidget):
             self._caption.clear()
             return
         index = int(np.searchsorted(solution.numbers, number))
-        points = solution.observations.seen_pixels[index]
-        residuals = solution.residuals[index]
+        camera = self._switch.value()
+        seen_by = solution.seen_by(camera)
+        points = seen_by.seen_pixels[index]
+        residuals = solution.residuals[index, camera]
         seen = np.isfinite(points[:, 0])
         fitted = np.isfinite(residuals[:, 0])
         extent = np.ptp(points[seen], axis=0).max() if seen.any() else 1.0
         scale = arrow_scale(residuals[fitted], 2 * float(extent))
-        if number == self._shown:
-            used = solution.calibration.leds_used[index]
+        if (number, camera) == self._shown:
+            used = solution.calibration.cameras[camera].leds_used[index]
             takes_part = bool(solution.calibration.used[index])
             self._view.set_markers(
                 [
@@ -259,7 +273,7 @@ class ImagesPanel(Translated, QWidget):
             )
             arrows = Arrows(points[fitted], residuals[fitted], scale)
             self._view.set_arrows(arrows)
-        detail = solution.observations.details[index]
+        detail = seen_by.details[index]
         if fitted.any():
             text = self.tr("Image {0}; arrows: residuals \xd7 {1}")
             self._caption.setText(text.format(number, f"{scale:g}"))
@@ -272,13 +286,18 @@ class ImagesPanel(Translated, QWidget):
         if self._job is None:
             self._load_wanted()
 
+    def _on_camera_changed(self) -> None:
+        self._mark()
+        if self._job is None:
+            self._load_wanted()
+
     def _load_wanted(self) -> None:
         """Read the image that is chosen off the thread of the GUI, one at a time."""
         self._loading = self._wanted()
         if self._loading is None or self._solution is None:
             return
-        number = self._loading[1]
-        self._job = job = Job(partial(_decoded, self._solution, number), self)
+        _, number, camera = self._loading
+        self._job = job = Job(partial(_decoded, self._solution, number, camera), self)
 
         # Connections
         job.succeeded.connect(self._on_decoded)
@@ -288,10 +307,10 @@ class ImagesPanel(Translated, QWidget):
 
     def _on_decoded(self, image: _Decoded) -> None:
         self._job = None
-        if (image.source, image.number) != self._wanted():
+        if (image.source, image.number, image.camera) != self._wanted():
             self._load_wanted()
             return
-        self._shown = image.number
+        self._shown = image.number, image.camera
         self._view.set_half(image.half, image.size)
         self._mark()
         rings = [(ring.x, ring.y) for ring in self._view.markers()]
@@ -308,12 +327,15 @@ class ImagesPanel(Translated, QWidget):
     def _on_crashed(self) -> None:
         self._on_undecoded(self.tr("The image cannot be shown."))
 
-    def _wanted(self) -> tuple[RecordSource, int] | None:
-        """Return the image that is chosen, and whose it is."""
+    def _wanted(self) -> tuple[RecordSource, int, int] | None:
+        """Return whose image is chosen, its number and its camera."""
         number = self._table.number()
         if self._solution is None or number is None:
             return None
-        return self._solution.source, number
+        return self._solution.source, number, self._switch.value()
+
+    def _is_of_rig(self) -> bool:
+        return self._solution is not None and self._solution.source.rig is not None
 
     def _clear_view(self) -> None:
         self._shown = None
@@ -327,6 +349,7 @@ class ImagesPanel(Translated, QWidget):
             *(self._undo, self._view, self._caption),
         ):
             widget.setVisible(not enlarged)
+        self._switch.setVisible(not enlarged and self._is_of_rig())
         layout = self.layout()
         assert isinstance(layout, QGridLayout)
         layout.setColumnMinimumWidth(0, 0 if enlarged else TABLE_WIDTH)
@@ -352,13 +375,13 @@ class ImagesPanel(Translated, QWidget):
         )
 
 
-def _decoded(solution: Solution, number: int, report: Report) -> _Decoded:
+def _decoded(solution: Solution, number: int, camera: int, report: Report) -> _Decoded:
     report(0.0)
-    image = load_image(solution, number)
+    image = load_image(solution, number, camera)
     height, width = image.shape
     bits = 8 * image.dtype.itemsize
     half = pooled(image, bits)
-    return _Decoded(solution.source, number, half, QSize(width, height))
+    return _Decoded(solution.source, number, camera, half, QSize(width, height))
 
 
 def _ring(x: float, y: float, led: int, fits: bool, takes_part: bool) -> Marker:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -21,6 +21,7 @@ from lightpen_app.steps.review.residual_plots import (
     Histogram,
 )
 from lightpen_app.steps.review.series_plots import BarPlot, LinePlot, PosturePlot
+from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.plots import Axes, Curve
 from lightpen_app.widgets.translated import Translated
@@ -101,18 +102,36 @@ class ResidualsPanel(PlotsPanel):
             parent,
         )
         self._advice = text_label(TextSize.SMALL, Tone.QUIET)
+        self._switch = CameraSwitch()
 
         # Layout
-        self._layout.addWidget(self._advice)
+        below = QHBoxLayout()
+        below.addWidget(self._advice, 1)
+        below.addWidget(self._switch)
+        self._layout.addLayout(below)
+
+        # Connections
+        self._switch.value_changed.connect(self._on_camera_changed)
 
         self._retranslate()
 
+    def _on_camera_changed(self) -> None:
+        if self._solution is not None:
+            self._show(self._solution)
+
     @override
     def _show(self, solution: Solution) -> None:
-        calibration, camera = solution.calibration, solution.source.camera
-        used = calibration.leds_used & calibration.used[:, None]
-        points = calibration.observations.seen_pixels[used]
-        residuals = solution.residuals[used]
+        rig = solution.source.rig
+        self._switch.setVisible(rig is not None)
+        if rig is None:
+            self._switch.set_value(0)
+        c = self._switch.value()
+        camera = solution.source.camera if rig is None else rig.cameras[c]
+        calibration = solution.calibration
+        images = calibration.cameras[c]
+        used = images.leds_used & calibration.used[:, None]
+        points = images.observations.seen_pixels[used]
+        residuals = solution.residuals[:, c][used]
         self._arrows.set_data(camera.image_size, points, residuals)
         self._dots.set_data(residuals[:, 0], residuals[:, 1])
         self._histogram.set_data(residuals.ravel())

@@ -1,0 +1,226 @@
+"""How many distortion coefficients views of a board tell, and the fit with them.
+
+What more coefficients gain is asked of views that they were not fitted to. Where no
+view reaches the corners of the image the coefficients that are told may fold it there;
+then those that do are drawn towards 0, as little as keeps the image whole.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.intrinsics.adjustment import (
+    FINEST,
+    N_SHAPE,
+    BoardFit,
+    BoardState,
+    adjust,
+    fit_poses,
+)
+from lightpen.intrinsics.start import BoardPoses, start_poses
+from lightpen.intrinsics.uncertainty_map import error_fields
+from lightpen.intrinsics.views import BoardTolerances, Views
+from lightpen.model.camera import Camera
+from lightpen.sentences import Sentence, sentence
+
+FEW, MANY = 5, 8  # distortion coefficients
+FOLDING = {FEW: [4], MANY: [5, 6, 7]}  # which of them fold: k3, and the denominator's
+PULLS = (0.1, 0.03, 0.01, 0.003, 0.001, 1e-4, 1e-10)  # the weakest first
+N_FOLDS = 5
+WORTH = 0.01  # by which 8 coefficients must lessen the held-out error
+SIGMAS = 2.0  # of the mean gain of a view
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Why so many distortion coefficients.
+
+    Attributes
+    ----------
+    n_coefficients : int
+    held_out : float
+        Distance of points in views that were not fitted to, with 5 coefficients, px
+        rms.
+    held_out_more : float or None
+        The same with 8; None where the views do not tell so many.
+    pull : float or None
+        Standard deviation about 0 that was assumed of k3, or of k4 k5 k6, as they
+        folded the image; None where they did not.
+    """
+
+    n_coefficients: int
+    held_out: float
+    held_out_more: float | None
+    pull: float | None = None
+
+    @property
+    def sentence(self) -> Sentence:
+        """It in words."""
+        if self.held_out_more is None:
+            return sentence(
+                "intrinsics.five-only",
+                "5 coefficients, as the views do not tell 8 apart. Error in views left "
+                "out: {held_out:.4f} px.",
+                held_out=self.held_out,
+            )
+        if self.n_coefficients == MANY:
+            return sentence(
+                "intrinsics.eight",
+                "8 coefficients, as they lessen the error in views left out from "
+                "{held_out:.4f} to {held_out_more:.4f} px.",
+                held_out=self.held_out,
+                held_out_more=self.held_out_more,
+            )
+        return sentence(
+            "intrinsics.five",
+            "5 coefficients, as 8 do not lessen the error in views left out: "
+            "{held_out:.4f} px with 5, {held_out_more:.4f} px with 8.",
+            held_out=self.held_out,
+            held_out_more=self.held_out_more,
+        )
+
+    @property
+    def remark(self) -> Sentence | None:
+        """That the corners of the image are not known, where they are not."""
+        if self.pull is None:
+            return None
+        return sentence(
+            "intrinsics.drawn-in",
+            "The views do not reach the corners of the image, and the distortion that "
+            "they tell would fold it there. {coefficients} is drawn towards 0, just so "
+            "far that it does not: the corners are a guess. Add views with the board "
+            "in each of them, or keep the pen out of them.",
+            coefficients="k3" if self.n_coefficients == FEW else "(k4, k5, k6)",
+        )
+
+
+def choose_distortion(
+    views: Views,
+    tolerances: BoardTolerances,
+    fitted: BoardFit,
+    report: Callable[[float], None],
+) -> tuple[Choice, BoardFit, FloatArray]:
+    """Return how many coefficients, the fit with them, and the held-out errors."""
+    few = _Drawn(fitted, None)
+    if folds(few.camera):
+        few = _unfolded(views, tolerances, few.camera) or few
+    errors = _held_out(views, tolerances, few)
+    report(0.5)
+    rms, rms_more = rms_together(errors, views), None
+    many = _richer(views, tolerances, few)
+    if many is not None:
+        with suppress(CalibrationError):  # a part of the views does not tell so many
+            errors_more = _held_out(views, tolerances, many)
+            rms_more = rms_together(errors_more, views)
+            # By how many times, so that no one view decides alone.
+            gains = np.log(np.maximum(errors, FINEST) / np.maximum(errors_more, FINEST))
+            chance = float(gains.std(ddof=1)) / len(gains) ** 0.5
+            if rms_more < (1 - WORTH) * rms and gains.mean() > SIGMAS * chance:
+                return Choice(MANY, rms, rms_more, many.pull), many.fitted, errors_more
+    report(0.8)
+    return Choice(FEW, rms, rms_more, few.pull), few.fitted, errors
+
+
+def fit_camera(
+    views: Views,
+    tolerances: BoardTolerances,
+    near: Camera,
+    pull: float | None = None,
+) -> BoardFit:
+    """Return the fit of all, from a camera on; see `Choice` for the pull."""
+    known = None
+    poses = _rough_poses(near, views)
+    if pull is not None:
+        distortion = near.distortion.copy()
+        folding = FOLDING[len(distortion)]
+        distortion[folding] = 0.0
+        near = replace(near, distortion=distortion)
+        known = np.zeros((len(near.intrinsics),) * 2)
+        at = 4 + np.array(folding)
+        known[at, at] = pull**-2
+    state = BoardState(
+        *((near,), np.eye(3)[None], np.zeros((1, 3)), poses, np.zeros(N_SHAPE))
+    )
+    return adjust(views, state, tolerances, (known,))
+
+
+def folds(camera: Camera) -> bool:
+    """Tell whether the distortion turns the image over before its corners."""
+    try:
+        error_fields(camera)
+    except CalibrationError:
+        return True
+    return False
+
+
+def rms_together(errors: FloatArray, views: Views) -> float:
+    """Return the error of all points, px rms, from that of each view."""
+    counts = views.seen.sum(axis=(1, 2))
+    return float(np.sqrt(np.average(errors**2, weights=counts)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A fit, and the pull that it was found with."""
+
+    fitted: BoardFit
+    pull: float | None
+
+    @property
+    def camera(self) -> Camera:
+        return self.fitted.state.cameras[0]
+
+
+def _unfolded(views: Views, tolerances: BoardTolerances, near: Camera) -> _Drawn | None:
+    """Return the fit with the weakest pull that keeps the image whole, if any does."""
+    for pull in PULLS:
+        try:
+            drawn = _Drawn(fit_camera(views, tolerances, near, pull), pull)
+        except CalibrationError:  # so weakly it does not settle
+            continue
+        if not folds(drawn.camera):
+            return drawn
+    return None
+
+
+def _richer(views: Views, tolerances: BoardTolerances, few: _Drawn) -> _Drawn | None:
+    """Return the fit with all coefficients, if the views tell so many apart."""
+    camera = few.camera
+    near = replace(
+        camera, distortion=np.append(camera.distortion, np.zeros(MANY - FEW))
+    )
+    try:
+        free = _Drawn(fit_camera(views, tolerances, near), None)
+        if not folds(free.camera):
+            return free
+    except CalibrationError:
+        if few.pull is None:
+            return None
+    return _unfolded(views, tolerances, near)
+
+
+def _held_out(views: Views, tolerances: BoardTolerances, found: _Drawn) -> FloatArray:
+    """Return the error of each view by a fit of the others, (V,), px rms."""
+    errors = np.full(views.n_views, np.nan)
+    fold_of = np.arange(views.n_views) % min(N_FOLDS, views.n_views)
+    for fold in range(int(fold_of.max()) + 1):
+        others, own = views.chosen(fold_of != fold), views.chosen(fold_of == fold)
+        fitted = fit_camera(others, tolerances, found.camera, found.pull).state
+        poses = _rough_poses(found.camera, own)
+        residuals = fit_poses(own, replace(fitted, poses=poses))
+        squares = np.square(residuals).sum(axis=-1)
+        errors[fold_of == fold] = np.sqrt(np.nanmean(squares, axis=(1, 2)))
+    return errors
+
+
+def _rough_poses(near: Camera, views: Views) -> BoardPoses:
+    """Return the poses of the views, also by a camera that folds them."""
+    try:
+        return start_poses(near, views)
+    except CalibrationError:
+        straight = replace(near, distortion=np.zeros_like(near.distortion))
+        return start_poses(straight, views)
