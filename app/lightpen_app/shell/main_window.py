@@ -143,6 +143,10 @@ class MainWindow(Rearranged, QMainWindow):
         self._refresh()
         self._focus_page()
 
+    def pages(self) -> tuple[Page, ...]:
+        """Return the pages in the order of the steps."""
+        return self._pages
+
     def page(self) -> Page:
         """Return the page that is shown."""
         return self._pages[self._now]
