@@ -89,7 +89,7 @@ class BarPlot(NamedPlot):
         self._restyle()
 
     def labels(self) -> tuple[str, ...]:
-        """Return the labels as they are drawn, each behind the ends of lines above it."""
+        """Return the labels as they are drawn, each with the ends of lines above it."""
         return self._labels_on_lines
 
     def set_data(self, labels: Sequence[str], *values: FloatArray) -> None:
