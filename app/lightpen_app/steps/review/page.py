@@ -175,7 +175,9 @@ class ReviewPage(Rearranged, Page):
         text = worded(next_step.sentence)
         if next_step is NextStep.CAPTURE_MORE and self._is_recording:
             text = self.tr("Next: record more images, and read them all again.")
-        if next_step is NextStep.ACCEPT:
+        assessment = self._run.status.assessment
+        has_last = assessment is not None and assessment.last is not None
+        if next_step is NextStep.ACCEPT and has_last:
             text = self.tr("{0} The old one stays in force until then.").format(text)
         return text
 
