@@ -34,14 +34,18 @@ def test_two_windows_on_one_data_folder_both_say_so_until_one_closes(
 @pytest.mark.qt_log_ignore(
     "^This plugin does not support (raise|grabbing)", extend=True
 )
-def test_the_data_folder_is_shown_and_chosen_in_the_options(
-    walker: "Walker", settings: Settings, tmp_path: Path
+@pytest.mark.parametrize("way", ["options", "button"])
+def test_the_data_folder_is_shown_and_chosen(
+    walker: "Walker", settings: Settings, tmp_path: Path, way: str
 ) -> None:
     shown = [text.replace("\u200b", "") for text in walker.texts()]
     assert str(walker.workbench.folder) in shown
 
-    walker.press(Qt.Key.Key_F10)
-    walker.choose("Data folder...")
+    if way == "options":
+        walker.press(Qt.Key.Key_F10)
+        walker.choose("Data folder...")
+    else:
+        walker.click("Choose another data folder")
     (dialog,) = walker.window.findChildren(QFileDialog)
     other = tmp_path / "elsewhere"
     other.mkdir()

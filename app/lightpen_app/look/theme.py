@@ -262,9 +262,19 @@ def text_label(size: TextSize = TextSize.BODY, tone: Tone = Tone.PLAIN) -> QLabe
 
 def set_tone(widget: QWidget, tone: Tone) -> None:
     """Let a widget's words say something else by their colour."""
-    if widget.property("tone") == tone.value:
+    _set_styled(widget, "tone", tone.value)
+
+
+def set_size(label: QLabel, size: TextSize) -> None:
+    """Let a label have another place of the type scale."""
+    _set_styled(label, "scale", size.name.lower())
+
+
+def _set_styled(widget: QWidget, name: str, value: str) -> None:
+    """Change a property that the style sheet goes by."""
+    if widget.property(name) == value:
         return
-    widget.setProperty("tone", tone.value)
+    widget.setProperty(name, value)
     widget.style().unpolish(widget)
     widget.style().polish(widget)
 

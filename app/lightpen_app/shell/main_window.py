@@ -143,6 +143,10 @@ class MainWindow(Rearranged, QMainWindow):
         self._refresh()
         self._focus_page()
 
+    def pages(self) -> tuple[Page, ...]:
+        """Return the pages in the order of the steps."""
+        return self._pages
+
     def page(self) -> Page:
         """Return the page that is shown."""
         return self._pages[self._now]
@@ -296,6 +300,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.status_changed.connect(self._set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.operator_value_changed.connect(self._operator_view.set_value)
+        page.data_folder_requested.connect(self._on_data_folder_asked)
 
     def _make_actions(self) -> None:
         """Make the actions whose keys work wherever the focus is."""

@@ -19,7 +19,6 @@ from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.workbench import Subject
 
-NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH, NARROW_WIDTH = 30 * GRID, 18 * GRID
 
 
@@ -33,7 +32,7 @@ class Sidebar(Translated, QFrame):
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
     subject_told(str)
-        `subject` is different.
+        What is calibrated, and what its images are of, in one line.
     """
 
     step_chosen = Signal(int)
@@ -99,7 +98,7 @@ class Sidebar(Translated, QFrame):
         self._steps.set_steps(steps)
 
     def subject(self) -> str:
-        """Return what is being calibrated, in words."""
+        """Return what is being calibrated, in words, a line for each name."""
         return self._subject.text()
 
     def set_subject(self, subject: Subject) -> None:
@@ -115,11 +114,11 @@ class Sidebar(Translated, QFrame):
             (self.tr("Cone {0}"), names.cone),
         )
         parts = [words.format(shortened(name)) for words, name in told if name]
-        text = PARTED.join(part.replace(" ", NO_BREAK) for part in parts)
-        self._subject.setText(text)
-        self._subject.setVisible(bool(text))
-        self.subject_told.emit(text)
-        self._origin.set_value(origin_remark(self._value.origin))
+        self._subject.setText("\n".join(parts))
+        self._subject.setVisible(bool(parts))
+        origin = origin_remark(self._value.origin)
+        self._origin.set_value(origin)
+        self.subject_told.emit(PARTED.join(filter(None, (*parts, origin.text))))
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""

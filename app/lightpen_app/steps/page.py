@@ -60,6 +60,8 @@ class Page(Translated, QWidget):
         it away, and so does another page.
     operator_value_changed(OperatorValue)
         What the operator view shows.
+    data_folder_requested()
+        Another data folder is to be chosen.
     """
 
     key = ""
@@ -70,6 +72,7 @@ class Page(Translated, QWidget):
     status_changed = Signal(str)
     notice_raised = Signal(str)
     operator_value_changed = Signal(object)
+    data_folder_requested = Signal()
 
     def title(self) -> str:
         """Return the name of the step, one to three words."""

@@ -1,13 +1,14 @@
 """A question in the page that waits for an answer, and stops nothing else."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
-from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.widgets.asking_bar import AskingBar
 from lightpen_app.widgets.push_button import PushButton
 
 
-class QuestionBar(QFrame):
+class QuestionBar(AskingBar):
     """Hidden until it asks; either answer hides it again.
 
     Signals
@@ -21,9 +22,6 @@ class QuestionBar(QFrame):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setProperty("area", "notice")
-        set_tone(self, Tone.WARN)
-
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._decline = PushButton()

@@ -1,8 +1,9 @@
-"""Widgets that are arranged otherwise where they have little room."""
+"""Widgets that are arranged otherwise where they have little room, or much."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import QSize
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
@@ -17,10 +18,11 @@ else:  # a class of Qt's cannot be a base twice
 
 @dataclass(frozen=True)
 class Room:
-    """Whether a widget is short of room, in width and in height."""
+    """Whether a widget is short of room, in width and in height, or has plenty."""
 
     is_narrow: bool = False
     is_low: bool = False
+    is_large: bool = False
 
     @property
     def margin(self) -> int:
@@ -40,10 +42,13 @@ class Rearranged(_Base):
     ----------
     narrow_below, low_below : int
         px; with less width or height it is short of room.
+    large_from : QSize or None
+        From this on it has plenty; None where more room changes nothing.
     """
 
     narrow_below = 0
     low_below = 0
+    large_from: QSize | None = None
     _room = Room()
 
     def _use_room(self) -> None:
@@ -54,7 +59,12 @@ class Rearranged(_Base):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         size = event.size()
-        room = Room(size.width() < self.narrow_below, size.height() < self.low_below)
+        large = self.large_from
+        room = Room(
+            is_narrow=size.width() < self.narrow_below,
+            is_low=size.height() < self.low_below,
+            is_large=large is not None and large.boundedTo(size) == large,
+        )
         if room != self._room:
             self._room = room
             self._use_room()

@@ -1,9 +1,10 @@
 """A question in the page that takes a reason, and a signature, for an answer."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
-from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, text_label
+from lightpen_app.widgets.asking_bar import AskingBar
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -11,7 +12,7 @@ from lightpen_app.widgets.supervisor_fields import SupervisorFields
 LONGEST_REASON = 200  # characters
 
 
-class ReasonBar(QFrame):
+class ReasonBar(AskingBar):
     """Hidden until it asks; either answer hides it again.
 
     Signals
@@ -27,9 +28,6 @@ class ReasonBar(QFrame):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setProperty("area", "notice")
-        set_tone(self, Tone.WARN)
-
         # Widgets
         self._text = text_label(TextSize.BODY)
         self._edit = EnterEdit()

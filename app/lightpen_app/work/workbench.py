@@ -274,10 +274,12 @@ class Workbench(QObject):
         self._follow(before)
 
     def try_out(self) -> None:
-        """Choose a simulated pen with its files, and names for it."""
+        """Choose a simulated pen, names for it, and its files once they are read."""
         now = replace(
             self._preparation,
             names=TRIAL,
+            camera_file=None,
+            pen_file=None,
             nominal_tip=None,
             limits=SwingLimits(),
             assumptions=USUAL,

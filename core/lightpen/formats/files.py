@@ -306,6 +306,16 @@ def quoted(text: str) -> str:
     return f'"{printable(start)}{"..." if len(text) > len(start) else ""}"'
 
 
+def why_unwritten(error: OSError) -> Sentence:
+    """Return why a file cannot be written, and what to do, as a whole sentence."""
+    other = sentence(
+        "write.other-reason",
+        "{reason}. Choose another folder or name.",
+        reason=strerror(error),
+    )
+    return _REASONS.get(error.errno or 0, other)
+
+
 def strerror(error: OSError) -> str:
     """Return what the system says of an error."""
     return error.strerror or type(error).__name__
@@ -407,16 +417,11 @@ def _rename_anew(part: Path, target: Path) -> None:
 
 
 def _unwritten(path: Path, error: OSError) -> FileError:
-    other = sentence(
-        "write.other-reason",
-        "{reason}. Choose another folder or name.",
-        reason=strerror(error),
-    )
     return FileError(
         sentence(
             "write.failed",
             "{path} cannot be written: {reason} What was there before is unchanged.",
             path=printable(str(path)),
-            reason=_REASONS.get(error.errno or 0, other),
+            reason=why_unwritten(error),
         )
     )

@@ -20,7 +20,7 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.cameras.protocol import Stats
 from lightpen.errors import FileError
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.files import printable, strerror, sync_folder, write_whole
+from lightpen.formats.files import printable, sync_folder, why_unwritten, write_whole
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.journal import (
@@ -408,10 +408,9 @@ def _unwritable(path: Path, error: OSError) -> FileError:
     return FileError(
         sentence(
             "record.unwritable",
-            "{path} cannot be written: {reason}. Free some space or choose another "
-            "folder; the images recorded so far are safe.",
+            "{path} cannot be written: {reason} The images recorded so far are safe.",
             path=printable(str(path)),
-            reason=strerror(error),
+            reason=why_unwritten(error),
         )
     )
 

@@ -412,17 +412,18 @@ def test_the_operator_view_goes_nowhere_behind_the_operators_back(shell: Shell) 
     assert shell.shown == "Start"
 
 
-def test_the_operator_view_names_pen_and_notice_and_the_key_that_leaves_it(
+def test_the_operator_view_names_pen_origin_notice_and_the_key_that_leaves_it(
     shell: Shell,
 ) -> None:
     QTest.keyClick(shell.window, Key.Key_F11)
     view = shell.window.operator_view()
 
-    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.LIVE))
+    shell.window.set_subject(Subject(Names(pen="LP-04", tip="T-10"), Origin.RECORDED))
     shell.window.show_notice("The disk is full.")
 
     words = [text.text() for text in view.findChildren(FittedText) if text.isVisible()]
-    assert {"Pen\xa0LP-04  \u00b7  Tip\xa0T-10", "The disk is full."} <= set(words)
+    subject = "Pen LP-04  \u00b7  Tip T-10  \u00b7  RECORDED"
+    assert {subject, "The disk is full."} <= set(words)
     assert any("Esc" in text for text in words)
     shell.window.drop_notice("The disk is full.")
     assert not any(
@@ -496,7 +497,7 @@ def test_a_page_speaks_through_the_window(shell: Shell) -> None:
 
     assert {
         "21 images a second",
-        "Pen\xa0LP-04  \u00b7  Tip\xa0T-10",
+        "Pen LP-04\nTip T-10",
         "The file holds no LED.",
     } <= set(words)
     assert shell.window.operator_view().value().instruction == "Lean right"

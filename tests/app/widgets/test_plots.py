@@ -294,6 +294,23 @@ def test_bars_stand_at_their_labels_and_are_saved_with_them(
     ]
 
 
+def test_labels_that_have_no_room_beside_each_other_stand_on_lines(
+    qtbot: QtBot,
+) -> None:
+    plot = BarPlot(Axes("Parts"), [Curve("x_um", "x")], "part")
+    show(qtbot, plot)
+    parts = ["noise", "ball, cone *", "warmth *", "camera", "all"]
+
+    plot.resize(900, 300)
+    plot.set_data(parts, np.ones(5))
+    assert plot.labels() == tuple(parts)
+
+    plot.resize(300, 300)
+    qtbot.waitUntil(lambda: plot.labels() != tuple(parts))
+
+    assert plot.labels() == ("noise", "\nball, cone *", "warmth *", "\ncamera", "all")
+
+
 def test_series_are_renamed_with_the_language(qtbot: QtBot) -> None:
     plot = LinePlot(Axes("Tip"), [Curve("x_um", "x"), Curve("y_um", "y")], "iteration")
     show(qtbot, plot)

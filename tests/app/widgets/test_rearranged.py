@@ -1,5 +1,6 @@
 """Tests of widgets that are arranged otherwise where they have little room."""
 
+from PySide6.QtCore import QSize
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
@@ -9,6 +10,7 @@ from lightpen_app.widgets.rearranged import Rearranged, Room
 
 class Arranged(Rearranged, QWidget):
     narrow_below, low_below = 300, 200
+    large_from = QSize(600, 500)
 
     def __init__(self) -> None:
         super().__init__()
@@ -32,3 +34,14 @@ def test_a_widget_is_arranged_anew_only_when_its_room_changes(qtbot: QtBot) -> N
         Room(is_narrow=True, is_low=True),
         Room(),
     ]
+
+
+def test_plenty_of_room_is_told_where_there_is_plenty_both_ways(qtbot: QtBot) -> None:
+    widget = Arranged()
+    qtbot.addWidget(widget)
+    widget.resize(300, 200)
+    widget.show()
+    for size in ((900, 499), (600, 500), (599, 900)):
+        widget.resize(*size)
+
+    assert widget.arranged_for == [Room(is_large=True), Room()]

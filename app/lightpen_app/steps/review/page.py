@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, QTimer, QUrl, Slot
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QApplication,
+    QBoxLayout,
     QFileDialog,
     QHBoxLayout,
     QProgressBar,
@@ -66,7 +67,7 @@ if TYPE_CHECKING:
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
-TAB_WIDTH = 64 * GRID  # of the result in a tab
+ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 # What the sentence of a verdict has in it whose cause is the intrinsics file.
 OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
 Read: TypeAlias = tuple[Statement, Retraced | None, Entered | None]
@@ -174,7 +175,9 @@ class ReviewPage(Rearranged, Page):
         text = worded(next_step.sentence)
         if next_step is NextStep.CAPTURE_MORE and self._is_recording:
             text = self.tr("Next: record more images, and read them all again.")
-        if next_step is NextStep.ACCEPT:
+        assessment = self._run.status.assessment
+        has_last = assessment is not None and assessment.last is not None
+        if next_step is NextStep.ACCEPT and has_last:
             text = self.tr("{0} The old one stays in force until then.").format(text)
         return text
 
@@ -318,13 +321,19 @@ class ReviewPage(Rearranged, Page):
         buttons.addWidget(self._accept, 1)
         buttons.addWidget(self._verify, 1)
         buttons.addWidget(self._take_back, 1)
-        column = QVBoxLayout(self._result_side)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(GRID)
-        column.addWidget(self._scroll, 1)
-        column.addWidget(self._tools)
-        column.addLayout(buttons)
-        column.addWidget(self._next_tips)
+        below = QVBoxLayout()
+        below.setSpacing(GRID)
+        below.addWidget(self._tools)
+        below.addLayout(buttons)
+        below.addWidget(self._next_tips)
+        below.addStretch(0)
+        self._result_box = QBoxLayout(
+            QBoxLayout.Direction.TopToBottom, self._result_side
+        )
+        self._result_box.setContentsMargins(0, 0, 0, 0)
+        self._result_box.setSpacing(GRID)
+        self._result_box.addWidget(self._scroll, 1)
+        self._result_box.addLayout(below)
 
         self._columns = columns = QHBoxLayout()
         columns.setSpacing(2 * GRID)
@@ -343,12 +352,15 @@ class ReviewPage(Rearranged, Page):
     @override
     def _use_room(self) -> None:
         """Put the result beside the tabs, or make it the first of a narrow page."""
-        side = self._result_side
+        side, direction = self._result_side, QBoxLayout.Direction
         if self._room.is_narrow:
-            side.setFixedWidth(TAB_WIDTH)
+            self._result_box.setDirection(direction.LeftToRight)
+            side.setMinimumWidth(0)
+            side.setMaximumWidth(ANY_WIDTH)
             self._tabs.insertTab(0, side, self.tr("Result"))
             self._tabs.setCurrentIndex(0)
         else:
+            self._result_box.setDirection(direction.TopToBottom)
             side.setFixedWidth(RESULT_WIDTH)
             self._columns.insertWidget(0, side)
             if side.parentWidget() is not None:  # else it would be a window

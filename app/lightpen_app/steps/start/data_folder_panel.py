@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QUrl
+from PySide6.QtCore import QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
 
@@ -21,7 +21,14 @@ class DataFolderPanel(Translated, QGroupBox):
     ----------
     folder : Path
         The data folder.
+
+    Signals
+    -------
+    change_requested()
+        Another one is to be chosen.
     """
+
+    change_requested = Signal()
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -32,6 +39,7 @@ class DataFolderPanel(Translated, QGroupBox):
         self._path = text_label(TextSize.SMALL, Tone.QUIET)
         self._path.setText(breakable(str(folder)))
         self._open = PushButton()
+        self._change = PushButton()
         self._others = SignLabel()
 
         # Layout
@@ -39,6 +47,7 @@ class DataFolderPanel(Translated, QGroupBox):
         row.setSpacing(2 * GRID)
         row.addWidget(self._path, 1)
         row.addWidget(self._open)
+        row.addWidget(self._change)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
@@ -47,6 +56,7 @@ class DataFolderPanel(Translated, QGroupBox):
 
         # Connections
         self._open.clicked.connect(self._on_open_clicked)
+        self._change.clicked.connect(self.change_requested)
 
         self._retranslate()
 
@@ -62,8 +72,11 @@ class DataFolderPanel(Translated, QGroupBox):
         self.setTitle(self.tr("Data folder"))
         self._open.setText(self.tr("Open folder"))
         self._open.setAccessibleName(self.tr("Open the data folder"))
-        self._open.setToolTip(
-            self.tr("Swings and results are kept here. Options choose another folder.")
+        self._open.setToolTip(self.tr("Swings and results are kept here."))
+        self._change.setText(self.tr("Change..."))
+        self._change.setAccessibleName(self.tr("Choose another data folder"))
+        self._change.setToolTip(
+            self.tr("Keep swings and results elsewhere from the next start on.")
         )
         remark = Remark()
         if self._n_others:

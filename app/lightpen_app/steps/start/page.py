@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QSize, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -54,6 +54,7 @@ class StartPage(Rearranged, Page):
 
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
+    large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
 
     def __init__(
         self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
@@ -134,6 +135,7 @@ class StartPage(Rearranged, Page):
         self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
+        self._folder.change_requested.connect(self.data_folder_requested)
         workbench.others_counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.swing_wanted.connect(self._on_swing_wanted)
@@ -201,6 +203,7 @@ class StartPage(Rearranged, Page):
         # What waits for an answer comes first.
         column = self._left if is_narrow else self._right
         column.insertWidget(0, self._interrupted)
+        self._last.set_large(self._room.is_large)
 
     @override
     def showEvent(self, event: QShowEvent) -> None:

@@ -22,7 +22,7 @@ from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.push_button import PushButton
@@ -91,6 +91,7 @@ class LastResultPanel(Translated, QGroupBox):
         self._when = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = QWidget()
         self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
+        self._axes = [text_label(TextSize.BODY) for _ in AXES]
         self._tip = [_cell() for _ in AXES]
         self._uncertainty = [_cell(tone=Tone.QUIET) for _ in AXES]
         self._origin = SignLabel()
@@ -108,7 +109,8 @@ class LastResultPanel(Translated, QGroupBox):
         for column, head in enumerate(self._heads):
             table.addWidget(head, 0, column)
         for row, axis in enumerate(AXES, start=1):
-            table.addWidget(QLabel(axis), row, 0)
+            self._axes[row - 1].setText(axis)
+            table.addWidget(self._axes[row - 1], row, 0)
             table.addWidget(self._tip[row - 1], row, 1)
             table.addWidget(self._uncertainty[row - 1], row, 2)
         table.setColumnStretch(3, 1)
@@ -141,6 +143,15 @@ class LastResultPanel(Translated, QGroupBox):
         self._question.declined.connect(self._take_back.setFocus)
 
         self._retranslate()
+
+    def set_large(self, large: bool) -> None:
+        """Show its figures larger, where there is the room, or no longer."""
+        set_size(self._age, TextSize.DISPLAY if large else TextSize.TITLE)
+        set_size(self._when, TextSize.BODY if large else TextSize.SMALL)
+        for head in self._heads:
+            set_size(head, TextSize.BODY if large else TextSize.SMALL)
+        for cell in (*self._axes, *self._tip, *self._uncertainty):
+            set_size(cell, TextSize.TITLE if large else TextSize.BODY)
 
     def value(self) -> LastResult:
         """Return what is shown."""

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
+ROW_SHARES = (1, 2)  # of the height: these, plots
+LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -50,6 +52,7 @@ class SwingFace(Rearranged, Translated, QWidget):
     """
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
+    large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
 
     def __init__(
         self, buttons: Sequence[QPushButton], parent: QWidget | None = None
@@ -96,9 +99,6 @@ class SwingFace(Rearranged, Translated, QWidget):
         side.setSpacing(2 * GRID)
         side.addLayout(numbers, 0, 0)
         side.addWidget(self._pen, 0, 1)
-        for column, share in enumerate(SIDE_SHARES):
-            side.setColumnStretch(column, share)
-        side.setRowStretch(0, 1)
         self._content = Squeezed()
         self._body = QGridLayout(self._content)
         self._body.setContentsMargins(0, 0, 0, 0)
@@ -190,8 +190,7 @@ class SwingFace(Rearranged, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
-        self._side.setColumnStretch(2, 0 if is_small else SIDE_SHARES[2])
-        self._side.setRowStretch(1, 0 if is_small else 2)
+        self._share_room()
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
         policy = QSizePolicy.Policy
@@ -202,7 +201,23 @@ class SwingFace(Rearranged, Translated, QWidget):
             each.setMinimumHeight(PLOTS_HEIGHT if is_small else 0)
             each.setMaximumHeight(PLOTS_HEIGHT if is_small else ANY_HEIGHT)
         self._content.set_squeezed(not is_small)
-        self._instruction.setMinimumHeight((5 if is_small else 7) * GRID)
+        is_large = self._room.is_large
+        self._instruction.setMinimumHeight(
+            (5 if is_small else 9 if is_large else 7) * GRID
+        )
+        self._count.set_largest(TextSize.HUGE if is_large else TextSize.DISPLAY)
+
+    def _share_room(self) -> None:
+        """Divide the room beside the dial among numbers, pen, image and plots."""
+        columns, rows = SIDE_SHARES, ROW_SHARES
+        if self._is_small:
+            columns, rows = (*columns[:2], 0), (1, 0)
+        elif self._room.is_large:
+            columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
+        for column, share in enumerate(columns):
+            self._side.setColumnStretch(column, share)
+        for row, share in enumerate(rows):
+            self._side.setRowStretch(row, share)
 
     def _hold_first_row(self, height: int) -> None:
         """Let the dial and what is beside it be seen whole above the plots."""

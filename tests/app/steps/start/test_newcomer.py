@@ -23,6 +23,7 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
 
     walker.click("Try it with a simulated pen")
 
+    assert walker.workbench.preparation.lacks()  # no swing begins with other files
     walker.until_shows("Swing")
     walker.click("Let the simulated operator swing")
     walker.until(lambda: walker.workbench.run.status.state is not None)

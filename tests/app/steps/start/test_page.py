@@ -40,7 +40,7 @@ from lightpen.swing.preparation import (
     SourceKind,
 )
 from lightpen_app.look.sounds import Mute, Silence, Sound, Sounds
-from lightpen_app.look.theme import Tone
+from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
@@ -634,6 +634,27 @@ def test_the_tip_in_force_is_shown_with_age_verdict_and_uncertainty(
     assert (age, verdict) == ("12 days ago", "PASS")
     assert when.endswith("  \u00b7  Ann")
     assert table == ["x -1.3182 0.0031", "y -90.410 0.012", "z -23.85 0.10"]
+
+
+def test_on_a_large_screen_the_tip_in_force_is_told_in_larger_figures(
+    show: Callable[[Workbench], Opened], workbench: Workbench
+) -> None:
+    accepted(workbench, timedelta(days=12))
+    page = show(workbench).page
+
+    def letters(text: str) -> int:
+        labels = page.findChildren(QLabel)
+        (label,) = (label for label in labels if label.text() == text)
+        label.ensurePolished()
+        return label.fontInfo().pixelSize()
+
+    page.resize(1000, 640)
+    small = letters("12 days ago"), letters("-1.3182")
+    page.resize(1616, 870)
+    large = letters("12 days ago"), letters("-1.3182")
+
+    assert small == (TextSize.TITLE, TextSize.BODY)
+    assert large == (TextSize.DISPLAY, TextSize.TITLE)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,30 @@
+"""What bars that ask something in the page have in common."""
+
+from PySide6.QtWidgets import QFrame, QWidget
+from shiboken6 import isValid
+from typing_extensions import override
+
+from lightpen_app.look.theme import Tone, set_tone
+
+
+class AskingBar(QFrame):
+    """Hidden until it asks; what had the focus before has it again afterwards.
+
+    Else it would go to whatever comes next, such as a button that Enter then presses.
+    """
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._had_focus: QWidget | None = None
+        self.setProperty("area", "notice")
+        set_tone(self, Tone.WARN)
+
+    @override
+    def setVisible(self, visible: bool) -> None:
+        focused, before = self.window().focusWidget(), self._had_focus
+        is_inside = focused is not None and self.isAncestorOf(focused)
+        if visible and not is_inside:
+            self._had_focus = focused
+        elif not visible and is_inside and before is not None and isValid(before):
+            before.setFocus()
+        super().setVisible(visible)
