@@ -26,10 +26,8 @@ from lightpen.commands.console import (
 )
 from lightpen.commands.pen_health import add_verify_pen
 from lightpen.estimation.instrument import Instrument
-from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.camera import Camera
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
@@ -42,8 +40,14 @@ from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import measure_circle
 from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
+from lightpen.verification.keeping import file_entry, viewer_entries
 from lightpen.verification.length import measure_length
-from lightpen.verification.places import TouchPlace, touch_place
+from lightpen.verification.places import (
+    TouchPlace,
+    Viewers,
+    read_viewers,
+    touch_place,
+)
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
@@ -61,6 +65,7 @@ from lightpen.verification.texts import (
     fixed_point_text,
     length_text,
 )
+from lightpen.verification.tip_in_force import cone_before
 from lightpen.verification.touch import Touch
 from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
 
@@ -153,6 +158,13 @@ def _add_certified(parser: argparse.ArgumentParser, option: str) -> None:
 
 def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
     parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help="several cameras and where they stand, in place of --camera; what is "
+        "given is then a folder that holds one for each camera, named as in this file",
+    )
     parser.add_argument("--pen", type=Path, metavar="FILE")
     add_pen_options(parser)
     parser.add_argument(
@@ -197,7 +209,7 @@ class _Measured:
     instrument: Instrument
     runs: tuple[TouchRun, ...]
     files: tuple[Path, ...]
-    camera_file: Path
+    viewers: Viewers
     pen_file: Path
     nominal_tip: FloatArray | None
     cone_cam: FloatArray | None
@@ -284,44 +296,39 @@ def _drift(options: argparse.Namespace) -> None:
 def _measure(
     options: argparse.Namespace, places: Sequence[tuple[str, ...]]
 ) -> _Measured:
-    require_other_file(options.json, options.camera, options.pen, options.tip)
+    inputs = options.camera, options.rig, options.pen, options.tip
+    require_other_file(options.json, *inputs)
     calibration = read_calibration(options.tip)
-    found = [touch_place(each) for each in places]
-    camera, camera_file = _camera(options, found[0])
+    given = read_viewers(options.camera, options.rig)
+    rig = None if given is None else given.rig
+    found = [touch_place(each, rig) for each in places]
+    viewers = given or found[0].viewers
+    if viewers is None:
+        raise lacking("--camera or --rig")
     pen, pen_file = _pen(options, found[0])
     for place in found:
-        require_other_file(options.json, *place.images.files)
-    instrument = instrument_of(calibration, camera, camera_file, pen, pen_file)
+        require_other_file(options.json, *place.files)
+    instrument = instrument_of(calibration, viewers, pen, pen_file)
     settling = 0 if options.frames == 1 else SETTLING
     rules = TouchRules(options.frames, settling)
     runs = []
     with progress("Finding LEDs") as report:
         for place in found:
-            images = place.name, place.images
-            runs.append(touch_run(*images, instrument, rules, place.mask))
+            runs.append(touch_run(place, instrument, rules))
             report(len(runs) / len(found))
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
-    is_same_camera = hashed(camera_file).sha256 == calibration.camera_sha256
     return _Measured(
         calibration=calibration,
         instrument=instrument,
         runs=tuple(runs),
-        files=tuple(file for place in found for file in place.images.files),
-        camera_file=camera_file,
+        files=tuple(file for place in found for file in place.files),
+        viewers=viewers,
         pen_file=pen_file,
         nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
-        cone_cam=calibration.cone_cam if is_same_camera else None,
+        cone_cam=cone_before(calibration, viewers),
     )
-
-
-def _camera(options: argparse.Namespace, place: TouchPlace) -> tuple[Camera, Path]:
-    if options.camera is not None:
-        return read_camera(options.camera), options.camera
-    if place.camera is None or place.camera_file is None:
-        raise lacking("--camera")
-    return place.camera, place.camera_file
 
 
 def _pen(options: argparse.Namespace, place: TouchPlace) -> tuple[Pen, Path]:
@@ -368,18 +375,10 @@ def _tell(
         assessment,
         {name: limits[name] for name in limits if hasattr(options, f"limit_{name}")},
         {
-            "tip": file_entry(options.tip),
-            "camera": file_entry(measured.camera_file),
-            "pen": file_entry(measured.pen_file),
-            "images": [
-                {"file": file.path.name, "sha256": file.sha256}
-                for file in all_hashed(measured.files)
-            ],
+            "tip": file_entry(hashed(options.tip)),
+            **viewer_entries(measured.viewers),
+            "pen": file_entry(hashed(measured.pen_file)),
+            "images": [file_entry(file) for file in all_hashed(measured.files)],
         },
     )
     write_record(options.json, record)
-
-
-def file_entry(path: Path) -> dict[str, str]:
-    """Return a file with its hash."""
-    return {"file": path.name, "sha256": hashed(path).sha256}

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
 from lightpen.detection.fixed_lamps import masked_lights
+from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.verdict import Grade
@@ -270,7 +271,8 @@ class VerificationCourse:
         if state.touching.phase is TouchPhase.HOLDING and sighting.has_pose:
             masked = masked_lights(frame.image, aim.mask, frame.full_scale)
             self._lamps = self._lamps.with_image(sighting, masked)
-        self._become(advance(setup, state, str(frame.seq), sighting))
+        together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
+        self._become(advance(setup, state, str(frame.seq), together))
 
     def _become(self, transition: SessionTransition) -> None:
         before, state = self._status.state, transition.state
@@ -446,17 +448,18 @@ def _read_runs(
     report: Report,
 ) -> _Done:
     """Return what recorded images have found."""
-    places = [touch_place((run,)) for run in runs_at(place)]
+    rig = tip.viewers.rig
+    places = [touch_place((run,), rig) for run in runs_at(place, rig)]
     tip = tip_at(tip, places[0])
     setup = replace(setup, instrument=tip.instrument, cone_cam=tip.cone_cam)
     runs = []
     for i, each in enumerate(places, start=1):
-        runs.append(touch_run(each.name, each.images, tip.instrument, rules, each.mask))
+        runs.append(touch_run(each, tip.instrument, rules))
         report(i / len(places))
     found = measure(setup, task, [(run.name, run.touches) for run in runs])
     images = TouchedImages(
         origin=places[0].origin,
-        files=all_hashed([file for each in places for file in each.images.files]),
+        files=all_hashed([file for each in places for file in each.files]),
         rejected=tuple(image for run in runs for image in run.rejected),
     )
     return _Done(task, found, tip, images)

@@ -20,6 +20,7 @@ from lightpen.record.numbered_files import add_numbered
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
 from lightpen.verification.fixed_point import FixedPoint
+from lightpen.verification.places import Viewers
 from lightpen.verification.records import (
     circle_entries,
     fixed_point_entries,
@@ -124,10 +125,10 @@ def task_record(
         found.assessment,
         {name: limits[name] for name in LIMITS[task]},
         {
-            "tip": _entry(tip.tip_file),
-            "camera": _entry(tip.camera_file),
-            "pen": _entry(tip.pen_file),
-            "images": [_entry(file) for file in images.files],
+            "tip": file_entry(tip.tip_file),
+            **viewer_entries(tip.viewers),
+            "pen": file_entry(tip.pen_file),
+            "images": [file_entry(file) for file in images.files],
         },
     )
 
@@ -158,8 +159,16 @@ def acceptance_record(
         "grade": acceptance.grade.value,
         "supervisor": acceptance.supervisor,
         "reason": acceptance.reason,
-        "accepts": [_entry(file) for file in files],
+        "accepts": [file_entry(file) for file in files],
     }
+
+
+def viewer_entries(viewers: Viewers) -> dict[str, Any]:
+    """Return the files of cameras, as inputs of a record."""
+    first, *others = (file_entry(file) for file in viewers.files)
+    if not others:
+        return {"camera": first}
+    return {"camera": others[0], "rig": first, "cameras": others}
 
 
 def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
@@ -170,5 +179,6 @@ def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
     return length_entries(found, tip.instrument)
 
 
-def _entry(file: InputFile) -> dict[str, str]:
+def file_entry(file: InputFile) -> dict[str, str]:
+    """Return a file with its hash, as an entry of a record."""
     return {"file": file.path.name, "sha256": file.sha256}

@@ -26,6 +26,7 @@ from lightpen.detection.sighting import Sighting
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
+from lightpen.model.rig import rig_of
 from lightpen.record.folder_archive import SIMULATED, FolderArchive
 from lightpen.record.supervision import Signature, set_password
 from lightpen.sentences import Sentence
@@ -95,9 +96,11 @@ class Verifier:
         self.runner = VerificationRunner(
             FolderArchive(folder), folder, self.ear, lambda: NOON
         )
-        assert prepared.camera is not None
-        assert prepared.pen is not None
-        self.holder = Holder(prepared.camera, prepared.pen)
+        camera, pen, rig_file = prepared.camera, prepared.pen, prepared.rig_file
+        assert camera is not None
+        assert pen is not None
+        rig = rig_of(camera) if rig_file is None else rig_file.rig
+        self.holder = Holder(rig, pen)
 
     @property
     def status(self) -> VerificationStatus:
@@ -173,6 +176,32 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     assert point["verdict"]["limits_mm"] == {"across": 0.01, "along": 0.03}
     assert abs(circle["mean_error_mm"]) < 0.01
     assert abs(length["runs"][0]["error_mm"]) < 0.02
+
+
+def test_two_cameras_verify_a_tip_together(
+    verifier: Verifier, prepared_by_two: Preparation
+) -> None:
+    verifier.preparation = prepared_by_two
+    assert prepared_by_two.rig_file is not None
+    rig = prepared_by_two.rig_file.rig
+    verifier.holder = Holder(rig, verifier.holder.pen)
+    accept_tip(verifier.folder, prepared_by_two)
+    verifier.come()
+    aim = verifier.status.aim
+    assert aim is not None
+    assert len(aim.aims) == 2
+    verifier.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+
+    assert verifier.ear.troubles == []
+    assert verifier.ear.events[-1] is SessionHappening.DONE
+    point, circle, length = verifier.records
+    depths = [each["noise_covariance"][2][2] for each in point["touches"]]
+    assert max(depths) ** 0.5 < 0.008  # 0.02 by one camera alone
+    assert abs(circle["mean_error_mm"]) < 0.005
+    assert abs(length["runs"][0]["error_mm"]) < 0.02
+    assert point["inputs"]["rig"]["file"] == "rig.json"
+    names = [each["file"] for each in point["inputs"]["cameras"]]
+    assert names == ["camera.yaml", "camera-2.yaml"]
 
 
 def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
@@ -362,7 +391,7 @@ def doubted(verifier: Verifier) -> Verifier:
     """A verification that the tip has failed, as it was bent."""
     accept_tip(verifier.folder, verifier.preparation)
     verifier.holder = Holder(
-        *(verifier.holder.camera, verifier.holder.pen),
+        *(verifier.holder.rig, verifier.holder.pen),
         PAPER_TIP + np.array([0.3, 0.0, 0.0]),
     )
     verifier.come(replace(CHOICES, kinds=(TaskKind.FIXED_POINT,)))
