@@ -19,6 +19,7 @@ from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
 from lightpen.record.reading import (
+    Record,
     RecordSource,
     is_record,
     open_record,
@@ -58,6 +59,9 @@ class TouchPlace:
         Of each camera.
     masks : tuple of (M, 3) array or None
         Circles of stray light before each camera: centre x, y and radius, px.
+    touches : tuple of int or None
+        Which touch each image is of, from 1, or 0 where it takes no part; None of
+        images of which nobody said so.
     """
 
     name: str
@@ -67,6 +71,7 @@ class TouchPlace:
     pen: Pen | None = None
     pen_file: Path | None = None
     masks: tuple[FloatArray | None, ...] = (None,)
+    touches: tuple[int, ...] | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -125,6 +130,7 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> TouchPlace:
             pen=own.pen,
             pen_file=own.pen_file,
             masks=own.masks,
+            touches=_recorded_touches(record),
         )
     is_simulated = is_simulated_recording(where[0])
     origin = Origin.SIMULATED if is_simulated else Origin.RECORDED
@@ -132,6 +138,14 @@ def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> TouchPlace:
         return TouchPlace(where[0], (find_images(*where),), origin)
     images = tuple(map(find_images, _of_each_camera(where, rig)))
     return TouchPlace(where[0], images, origin, masks=(None,) * rig.n_cameras)
+
+
+def _recorded_touches(record: Record) -> tuple[int, ...] | None:
+    """Return which touches the images of a verification are of; None of a swing."""
+    if not any(image.touch for image in record.images):
+        return None
+    out = record.taken_out
+    return tuple(0 if i.number in out else i.touch for i in record.images)
 
 
 def _recorded_viewers(own: RecordSource) -> Viewers:

@@ -125,7 +125,8 @@ def touch_run(place: TouchPlace, instrument: Instrument, rules: TouchRules) -> T
     """Find the touches in images.
 
     With one image a touch, and none to settle, each image is a touch; else the pen must
-    be held still through as many as the rules say.
+    be held still through as many as the rules say. Images of which it is recorded what
+    touch they are of need no rules.
 
     Raises
     ------
@@ -140,20 +141,27 @@ def touch_run(place: TouchPlace, instrument: Instrument, rules: TouchRules) -> T
     if rig.n_cameras == 1:
         images, mask = place.images[0], place.masks[0]
         alone = observe_images(images, instrument.camera, pen, mask=mask)
-        return touches_of(place.name, [alone], instrument, rules)
+        return touches_of(place.name, [alone], instrument, rules, place.touches)
     pairing = pair_images([each.names for each in place.images], rig.names)
     seen = observe_rig_images(place.images, pairing, rig, pen, masks=place.masks)
-    return touches_of(place.name, seen, instrument, rules)
+    return touches_of(place.name, seen, instrument, rules, place.touches)
 
 
 def touches_of(
-    name: str, seen: Sequence[Observations], instrument: Instrument, rules: TouchRules
+    name: str,
+    seen: Sequence[Observations],
+    instrument: Instrument,
+    rules: TouchRules,
+    touches_known: Sequence[int] | None = None,
 ) -> TouchRun:
     """Return the touches in what the images of each camera show; see `touch_run`."""
     images = _sightings(seen, instrument)
     if not any(sighting.has_pose for _, sighting in images):
         raise _no_pen(name, seen[0])
-    held = _held(images, instrument, rules)
+    if touches_known is None:
+        held = _held(images, instrument, rules)
+    else:
+        held = _held_as_recorded(images, touches_known)
     if not held:
         raise CalibrationError(
             sentence(
@@ -207,6 +215,28 @@ def _held(
         for name, sighting in images
         if sighting.has_pose
     )
+
+
+def _held_as_recorded(
+    images: Sequence[tuple[str, Sighting]], touches: Sequence[int]
+) -> tuple[StillFrames, ...]:
+    """Return the images of each touch; 0 of those that are of none."""
+    by_touch: dict[int, list[tuple[str, Sighting]]] = {}
+    for image, touch in zip(images, touches, strict=True):
+        if touch:
+            by_touch.setdefault(touch, []).append(image)
+    held = (
+        StillFrames(
+            tuple(touch_frame(*image) for image in own if image[1].has_pose),
+            tuple(
+                RejectedFrame(name, seen.reason)
+                for name, seen in own
+                if not seen.has_pose
+            ),
+        )
+        for own in by_touch.values()
+    )
+    return tuple(still for still in held if still.frames)
 
 
 def _sightings(
