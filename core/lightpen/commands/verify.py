@@ -25,6 +25,7 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
+from lightpen.commands.verifications import read_drift
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.pen_files import read_pen
@@ -66,7 +67,7 @@ from lightpen.verification.texts import (
     length_text,
 )
 from lightpen.verification.tip_in_force import cone_before
-from lightpen.verification.touch import Touch
+from lightpen.verification.touch import NO_DRIFT, Touch
 from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
 
 
@@ -96,6 +97,7 @@ def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
+    _add_drift_share(parser)
     _add_common(parser, "across", "along")
 
 
@@ -110,6 +112,7 @@ def _add_circle(parser: argparse.ArgumentParser) -> None:
         help="of the probe, where it touched a bore or a boss and not a groove",
     )
     parser.add_argument("--surface", choices=("bore", "boss"), default="bore")
+    _add_drift_share(parser)
     _add_common(parser, "radius", "form")
 
 
@@ -117,6 +120,7 @@ def _add_length(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_length)
     _add_runs(parser, "both ends of the length at one place")
     _add_certified(parser, "--length")
+    _add_drift_share(parser)
     _add_common(parser, "length")
 
 
@@ -153,6 +157,15 @@ def _add_certified(parser: argparse.ArgumentParser, option: str) -> None:
         default=0.0,
         metavar="MM",
         help="U (k = 2) of what is certified",
+    )
+
+
+def _add_drift_share(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--drift",
+        type=Path,
+        metavar="DRIFT.json",
+        help="what verify drift wrote of the same session: U counts it",
     )
 
 
@@ -203,6 +216,8 @@ class _Measured:
     ----------
     cone_cam : (3,) array or None
         Of the calibration; None before another camera.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
     """
 
     calibration: CalibrationFile
@@ -213,6 +228,7 @@ class _Measured:
     pen_file: Path
     nominal_tip: FloatArray | None
     cone_cam: FloatArray | None
+    drift: FloatArray
 
     @property
     def touches(self) -> list[tuple[str, Sequence[Touch]]]:
@@ -228,6 +244,7 @@ def _fixed_point(options: argparse.Namespace) -> None:
         _limits(options),
         measured.nominal_tip,
         measured.cone_cam,
+        measured.drift,
     )
     _tell(
         *(options, measured, fixed_point_text, found, "fixed point"),
@@ -246,6 +263,7 @@ def _circle(options: argparse.Namespace) -> None:
         _limits(options),
         certified_uncertainty=options.certified_uncertainty,
         ball_offset=inwards * (options.ball_diameter or 0.0) / 2,
+        drift=measured.drift,
     )
     _tell(
         *(options, measured, circle_text, found, "circle"),
@@ -262,6 +280,7 @@ def _length(options: argparse.Namespace) -> None:
         options.length,
         _limits(options),
         certified_uncertainty=options.certified_uncertainty,
+        drift=measured.drift,
     )
     _tell(
         *(options, measured, length_text, found, "length"),
@@ -296,7 +315,8 @@ def _drift(options: argparse.Namespace) -> None:
 def _measure(
     options: argparse.Namespace, places: Sequence[tuple[str, ...]]
 ) -> _Measured:
-    inputs = options.camera, options.rig, options.pen, options.tip
+    drift: Path | None = getattr(options, "drift", None)
+    inputs = options.camera, options.rig, options.pen, options.tip, drift
     require_other_file(options.json, *inputs)
     calibration = read_calibration(options.tip)
     given = read_viewers(options.camera, options.rig)
@@ -328,6 +348,7 @@ def _measure(
         pen_file=pen_file,
         nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
         cone_cam=cone_before(calibration, viewers),
+        drift=NO_DRIFT if drift is None else read_drift(drift),
     )
 
 
@@ -379,6 +400,12 @@ def _tell(
             **viewer_entries(measured.viewers),
             "pen": file_entry(hashed(measured.pen_file)),
             "images": [file_entry(file) for file in all_hashed(measured.files)],
+            **_drift_entry(options),
         },
     )
     write_record(options.json, record)
+
+
+def _drift_entry(options: argparse.Namespace) -> dict[str, Any]:
+    drift: Path | None = getattr(options, "drift", None)
+    return {} if drift is None else {"drift": file_entry(hashed(drift))}

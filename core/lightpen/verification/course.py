@@ -114,7 +114,7 @@ class VerificationCourse:
         self._unwritten: tuple[_Kept, ...] = ()
         self._trouble: Sentence | None = None
         self._task: Task | None = None
-        self._lamps = LampImages()
+        self._lamps: tuple[LampImages, ...] = ()  # of each camera
         self._images = TouchImages(self._new_record)
         self._unkept: Sentence | None = None  # why images are not kept now
 
@@ -269,14 +269,13 @@ class VerificationCourse:
         assert state is not None
         if status.began is None:
             self._status = replace(status, began=self._now())
-            self._lamps = LampImages()
-        if state.touching.phase is TouchPhase.HOLDING and sighting.has_pose:
-            masked = masked_lights(frame.image, aim.mask, frame.full_scale)
-            self._lamps = self._lamps.with_image(sighting, masked)
+            self._lamps = (LampImages(),) * len(aim.aims)
+        if state.touching.phase is TouchPhase.HOLDING:
+            self._note_lamps(frame, sighting, aim)
         together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
         try:
             name = self._name(frame, together, setup, state)
-            transition = advance(setup, state, name, together)
+            transition = advance(self._with_drift(setup, state), state, name, together)
             self._images.follow(state, transition)
         except FileError as error:  # an image that is not kept does not count
             self._unkept = error.sentence
@@ -286,6 +285,30 @@ class VerificationCourse:
             self._relieve()
         self._unkept = None
         self._become(transition)
+
+    def _note_lamps(self, frame: Frame, sighting: Sighting, aim: Aim) -> None:
+        views = zip(
+            *(self._lamps, (frame, *frame.others), (sighting, *sighting.others)),
+            aim.aims,
+            strict=False,
+        )
+        self._lamps = tuple(
+            lamps.with_image(seen, masked_lights(own.image, of.mask, own.full_scale))
+            if seen.has_pose
+            else lamps
+            for lamps, own, seen, of in views
+        )
+
+    def _with_drift(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
+        """Return it with how far the camera has moved, where that is asked for next."""
+        task, tip = state.task(setup), self._status.tip
+        if task is None or tip is None:
+            return setup
+        rules = rules_of(setup, task)
+        if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
+            return setup
+        witness = self._witness(tip)
+        return setup if witness is None else replace(setup, drift=witness.share)
 
     def _name(
         self, frame: Frame, seen: Sighting, setup: SessionSetup, state: SessionState
@@ -337,8 +360,14 @@ class VerificationCourse:
         self._publish(self._status, *happened)
 
     def _witness(self, tip: TipInForce) -> LampWitness | None:
-        camera = tip.instrument.camera
-        return witnessed(self._lamps, camera.fx, self._choices.limits)
+        """Return what lamps tell of the camera that moved farthest."""
+        limits, cameras = self._choices.limits, tip.instrument.rig.cameras
+        told = [
+            witnessed(lamps, camera.fx, limits)
+            for lamps, camera in zip(self._lamps, cameras, strict=False)
+        ]
+        known = [each for each in told if each is not None]
+        return max(known, key=lambda each: each.moved, default=None)
 
     # The tip
 

@@ -27,6 +27,7 @@ from lightpen.model.rigid import nearest_rotation, skew
 
 KNOWN_FREEDOM = 30  # degrees, that the noise of the calibration counts for
 POSE_UNKNOWNS = 6
+NO_DRIFT = np.zeros(3)  # mm
 UPRIGHT_AXIS = np.array([0.0, 1.0, 0.0])  # of the pen, away from its tip
 
 

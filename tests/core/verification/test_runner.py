@@ -19,10 +19,12 @@ from tests.accepted_tip import (
     round_a_ring,
 )
 
-from lightpen.cameras.protocol import Frame, sealed
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings, Frame, sealed
 from lightpen.commands.verifications import read_fixed_point, read_scale
 from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.sighting import Sighting, look
+from lightpen.estimation.verdict import Grade
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
@@ -33,9 +35,11 @@ from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.record.supervision import Signature, set_password
 from lightpen.sentences import Sentence
+from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
+from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
 from lightpen.verification.conclusion import CONCLUSION
@@ -470,6 +474,58 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
     at_it.touch(leant(4)[2])
     assert at_it.ear.reliefs
     assert len(at_it.status.state.touches) == 1
+
+
+# A camera that moves
+
+
+@pytest.mark.parametrize("turn", [0.0, 3.0])
+def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
+    verifier: Verifier, turn: float
+) -> None:
+    """It turns by so many px a minute, of which the touches take a tenth or so."""
+    accept_tip(verifier.folder, verifier.preparation)
+    few = replace(CHOICES, kinds=(TaskKind.FIXED_POINT,), n_touches=3, n_frames=8)
+    verifier.come(few)
+    assert verifier.preparation.camera is not None
+    clock = SkippingClock()
+    camera = SimulatedCamera(
+        Scene(camera=verifier.preparation.camera, has_lamp=True, camera_turn=turn),
+        clock,
+    )
+    camera.open()
+    camera.configure(CameraSettings(frame_rate=10.0))
+    camera.start()
+    toucher, seen = Toucher(camera.operator), None
+    while verifier.status.task is not None and clock.now_ns() < TIMEOUT * 1e9:
+        status = verifier.status
+        assert status.setup is not None
+        assert status.state is not None
+        assert status.aim is not None
+        assert status.aim.camera is not None
+        assert status.aim.pen is not None
+        toucher.follow(status.setup, status.state)
+        frame = camera.read(1.0)
+        seen = look(frame.image, status.aim.camera, status.aim.pen, None, seen)
+        verifier.runner.take(frame, seen, status.aim)
+    camera.close()
+    status = verifier.status
+    witness = status.witness
+    assert witness is not None
+    assert status.assessment is not None
+    assert status.state is not None
+    assert status.state.fixed_point is not None
+    (record,) = verifier.records
+    told = record["witness"]
+    assert told["moved_mm"] == witness.moved
+    U = status.state.fixed_point.uncertainty
+    assert U[0] >= 2 * witness.share[0]
+    if turn:
+        assert status.assessment.reason.code == "witness.moved"
+        assert 0.02 < witness.moved < 0.3
+    else:
+        assert witness.assessment.grade is Grade.PASS
+        assert witness.moved < 0.006
 
 
 # What became of it
