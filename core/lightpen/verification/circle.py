@@ -267,6 +267,14 @@ def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
         return None
 
 
+def residuals_of(fit: CircleFit, points_cam: Sequence[FloatArray]) -> FloatArray:
+    """Return how far points are off a circle outwards and off its plane, (N, 2), mm."""
+    ways = np.reshape(points_cam, (-1, 3)) - fit.center_cam
+    axial = ways @ fit.normal_cam
+    spokes = ways - axial[:, None] * fit.normal_cam
+    return np.column_stack([np.linalg.norm(spokes, axis=1) - fit.radius, axial])
+
+
 def _across(normal: FloatArray) -> FloatArray:
     """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
     axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
