@@ -52,7 +52,8 @@ def covered_share(n_calibrations: int, n_touches: int, seed: int) -> float:
             t = np.repeat(held.translations, N_FRAMES, axis=0)
             images = simulate_centers(camera, pen, R, t, SIGMA, rng)
             frames = tuple(
-                TouchFrame(str(i), each, R[i], t[i]) for i, each in enumerate(images)
+                TouchFrame(str(i), each[None], R[i], t[i])
+                for i, each in enumerate(images)
             )
             (touch,) = measure_touches(instrument, [StillFrames(frames)])
             error = touch.point_cam - place

@@ -18,6 +18,7 @@ from lightpen.formats.pen_files import read_pen
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.circle import measure_circle
 from lightpen.verification.fixed_point import measure_fixed_point
+from lightpen.verification.places import touch_place
 from lightpen.verification.sources import touch_run
 from lightpen.verification.touching import TouchRules
 
@@ -71,8 +72,7 @@ def _of_sets(data: Path) -> list[Row]:
 
     point = measure_fixed_point(
         touch_run(
-            "fixed-point",
-            find_images(str(data / "fixed-point" / "images")),
+            touch_place((str(data / "fixed-point" / "images"),)),
             instrument,
             ONE_IMAGE,
         ).touches,
@@ -82,8 +82,7 @@ def _of_sets(data: Path) -> list[Row]:
     )
     runs = [
         touch_run(
-            f"run {i}",
-            find_images(str(data / "circle" / f"run_{i:02d}")),
+            touch_place((str(data / "circle" / f"run_{i:02d}"),)),
             instrument,
             ONE_IMAGE,
         )

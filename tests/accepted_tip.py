@@ -1,7 +1,7 @@
 """A tip in force that no images were needed for, and what is seen of it touching."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -12,16 +12,17 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, sight_centers, unseen
-from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.calibrate import Calibration, calibrate_rig
 from lightpen.estimation.report import calibration_record
 from lightpen.formats.camera_files import read_camera
-from lightpen.formats.hashes import Inputs, hashed
+from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed
 from lightpen.formats.observation_files import Centers
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.camera import Camera
+from lightpen.formats.rig_files import read_rig
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.posture import rotations_of
+from lightpen.model.rig import Rig, rig_of
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.results import Result
 from lightpen.simulator.swings import (
@@ -39,12 +40,24 @@ ACCEPTED = datetime(2031, 4, 30, 12, tzinfo=UTC)
 
 def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
     """Put a tip in force by a simulated swing; return the file of its result."""
-    camera, pen = preparation.camera_file, preparation.pen_file
-    assert camera is not None
+    pen, rig_file = preparation.pen_file, preparation.rig_file
     assert pen is not None
-    found = _calibrated(camera.path, pen.path, seed)
     origin = preparation.origin
-    inputs = Inputs(hashed(camera.path), hashed(pen.path), (), None, origin=origin)
+    if rig_file is None:
+        assert preparation.camera_file is not None
+        camera_file, rig_inputs = preparation.camera_file.path, None
+    else:
+        camera_file = rig_file.camera_files[0]
+        files = all_hashed(rig_file.camera_files)
+        rig_inputs = RigInputs(hashed(rig_file.path), files)
+    found = _calibrated(
+        camera_file, pen.path, seed, None if rig_file is None else rig_file.path
+    )
+    inputs = Inputs(
+        *(hashed(camera_file), hashed(pen.path), (), None),
+        origin=origin,
+        rig=rig_inputs,
+    )
     archive, names = FolderArchive(data), preparation.names
     archive.store(
         Result(
@@ -65,14 +78,39 @@ def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
 
 
 @cache
-def _calibrated(camera_file: Path, pen_file: Path, seed: int) -> Calibration:
-    camera, pen = read_camera(camera_file), read_pen(pen_file)
-    rng = np.random.default_rng(seed)
-    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=camera)
-    poses = swing.rotations, swing.translations
-    pixels = simulate_centers(camera, pen, *poses, SIGMA, rng)
-    centers = Centers(np.arange(1, N_IMAGES + 1), pixels, Path("swing.csv"))
-    return calibrate(camera, pen, observe_centers(centers, camera, pen))
+def _calibrated(
+    camera_file: Path, pen_file: Path, seed: int, rig_file: Path | None
+) -> Calibration:
+    rig = (
+        rig_of(read_camera(camera_file)) if rig_file is None else read_rig(rig_file).rig
+    )
+    pen, rng = read_pen(pen_file), np.random.default_rng(seed)
+    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=rig.cameras[0])
+    pixels = seen_by(rig, pen, swing.rotations, swing.translations, rng)
+    seen = [
+        observe_centers(
+            Centers(np.arange(1, N_IMAGES + 1), each, Path("swing.csv")), camera, pen
+        )
+        for each, camera in zip(pixels, rig.cameras, strict=True)
+    ]
+    return calibrate_rig(rig, pen, seen)
+
+
+def seen_by(
+    rig: Rig,
+    pen: Pen,
+    rotations: FloatArray,
+    translations: FloatArray,
+    rng: np.random.Generator,
+    sigma: float = SIGMA,
+) -> list[FloatArray]:
+    """Return LED centres (N, L, 2) in each camera of poses rig_from_pen, px."""
+    return [
+        simulate_centers(camera, pen, R @ rotations, translations @ R.T + t, sigma, rng)
+        for camera, R, t in zip(
+            rig.cameras, rig.rotations, rig.translations, strict=True
+        )
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +131,8 @@ class Holder:
         Where the tip really is, mm.
     """
 
-    def __init__(
-        self, camera: Camera, pen: Pen, tip_pen: FloatArray = PAPER_TIP
-    ) -> None:
-        self.camera, self.pen, self._tip_pen = camera, pen, tip_pen
+    def __init__(self, rig: Rig, pen: Pen, tip_pen: FloatArray = PAPER_TIP) -> None:
+        self.rig, self.pen, self._tip_pen = rig, pen, tip_pen
         self._rng = np.random.default_rng(7)
 
     def still(self, hold: Hold, n_images: int = 10) -> Iterator[Sighting]:
@@ -107,8 +143,16 @@ class Holder:
         )
         t = PAPER_CONE + np.array(hold.place) - R @ self._tip_pen
         for _ in range(n_images):
-            (pixels,) = simulate_centers(self.camera, self.pen, R, t, SIGMA, self._rng)
-            yield sight_centers(self.camera, self.pen, pixels, R[0], t[0])
+            pixels = seen_by(self.rig, self.pen, R, t, self._rng)
+            first, *others = (
+                sight_centers(camera, self.pen, seen, turn @ R[0], turn @ t[0] + shift)
+                for camera, (seen,), turn, shift in zip(
+                    *(self.rig.cameras, pixels),
+                    *(self.rig.rotations, self.rig.translations),
+                    strict=True,
+                )
+            )
+            yield replace(first, others=tuple(others))
 
     def away(self, n_images: int = 8) -> Iterator[Sighting]:
         """Yield what is seen while the pen is out of the image."""

@@ -55,13 +55,42 @@ def fields(
     outcome = calibrate(lightpen, station, "--json", file)
     assert outcome.returncode == 0, outcome.stderr
     found: dict[str, Any] = json.loads(file.read_text())
-    return found | {"text": outcome.stdout}
+    return found | {"text": outcome.stdout, "path": file}
+
+
+def test_a_tip_is_verified_by_both_cameras(
+    station: Path, fields: dict[str, Any], lightpen: Run, tmp_path: Path
+) -> None:
+    files = "--rig", station / "rig.json", "--pen", station / "leds.csv"
+    tip, out = ("--tip", fields["path"]), tmp_path / "point.json"
+    outcome = lightpen("verify", "fixed-point", station, *files, *tip, "--json", out)
+    assert outcome.returncode == 0, outcome.stderr
+    record = json.loads(out.read_text())
+
+    assert len(record["touches"]) == 12
+    assert max(record["calibrated"]["std_mm"]) < 0.003  # along the view, too
+    assert [each["file"] for each in record["inputs"]["cameras"]] == [
+        "left.yaml",
+        "right.yaml",
+    ]
+    assert record["inputs"]["rig"]["sha256"] == fields["inputs"]["rig"]["sha256"]
+
+
+def test_images_of_one_camera_are_not_verified_by_two(
+    station: Path, fields: dict[str, Any], lightpen: Run
+) -> None:
+    files = "--rig", station / "rig.json", "--pen", station / "leds.csv"
+    tip = "--tip", fields["path"]
+    outcome = lightpen("verify", "fixed-point", station / "left", *files, *tip)
+    assert_refused(outcome, "holds no images of two cameras", 2)
 
 
 def test_the_record_of_two_cameras_is_as_the_schema_says(
     validator: Draft202012Validator, fields: dict[str, Any]
 ) -> None:
-    written = {name: entry for name, entry in fields.items() if name != "text"}
+    written = {
+        name: entry for name, entry in fields.items() if name not in ("text", "path")
+    }
 
     assert [error.message for error in validator.iter_errors(written)] == []
 

@@ -11,6 +11,7 @@ from tests.accepted_tip import accept_tip
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.simulator.toucher import Artefacts
 from lightpen.verification.choices import TaskKind
+from lightpen.verification.conclusion import CONCLUSION
 from lightpen.verification.keeping import VERIFICATIONS
 from lightpen_app.work.settings import Settings, Station
 
@@ -73,6 +74,7 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert [each["verification"] for each in records(walker)] == [
         TaskKind.FIXED_POINT,
         TaskKind.LENGTH,
+        CONCLUSION,
     ]
     assert {each["origin"] for each in records(walker)} == {"simulated"}
     assert walker.main_button().text() == "Back to Start"

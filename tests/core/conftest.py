@@ -12,6 +12,7 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.formats.rig_files import read_rig
 from lightpen.model.limits import SwingLimits
 from lightpen.record.folder_archive import RESULTS, SIMULATED, FolderArchive
 from lightpen.record.names import Names
@@ -27,7 +28,7 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
-from lightpen.swing.preparation import Preparation
+from lightpen.swing.preparation import Preparation, SecondCamera
 from lightpen.swing.resuming import read_resumable
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingState
@@ -243,6 +244,19 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Preparation:
         image_size=(scene.camera.width, scene.camera.height),
         limits=SHORT,
     )
+
+
+@pytest.fixture(scope="session")
+def prepared_by_two(
+    tmp_path_factory: pytest.TempPathFactory, prepared: Preparation
+) -> Preparation:
+    """All that a swing before two cameras needs."""
+    assert prepared.camera is not None
+    scene = Scene(camera=prepared.camera)
+    files = write_sample_files(scene, tmp_path_factory.mktemp("files_of_two"))
+    rig_file = read_rig(files.rig)
+    second = SecondCamera(rig_file=rig_file, image_size=prepared.image_size)
+    return replace(prepared, pen_file=PenFile.read(files.pen), second=second)
 
 
 @pytest.fixture

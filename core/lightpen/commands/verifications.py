@@ -37,6 +37,10 @@ class _Length(Struct):
     scale: _Scale
 
 
+class _Drift(Struct):
+    standard_uncertainty_share_mm: Vector
+
+
 def read_fixed_point(path: Path) -> FloatArray:
     """Read the points of a fixed point that was verified, (N, 3), mm."""
     found = _read(path, _FixedPoint, "fixed-point")
@@ -49,6 +53,12 @@ def read_scale(path: Path) -> Scale:
     return Scale(
         scale.factor, scale.expanded_uncertainty, scale.expanded_uncertainty_before
     )
+
+
+def read_drift(path: Path) -> FloatArray:
+    """Read the standard uncertainty that a drift is for what was touched meanwhile."""
+    found = _read(path, _Drift, "drift")
+    return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
 
 
 def _read(path: Path, shape: type[T], kind: str) -> T:

@@ -25,11 +25,10 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
+from lightpen.commands.verifications import read_drift
 from lightpen.estimation.instrument import Instrument
-from lightpen.formats.camera_files import read_camera
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.pen_files import read_pen
-from lightpen.model.camera import Camera
 from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
@@ -42,8 +41,14 @@ from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import measure_circle
 from lightpen.verification.drift import measure_drift
 from lightpen.verification.fixed_point import measure_fixed_point
+from lightpen.verification.keeping import file_entry, viewer_entries
 from lightpen.verification.length import measure_length
-from lightpen.verification.places import TouchPlace, touch_place
+from lightpen.verification.places import (
+    TouchPlace,
+    Viewers,
+    read_viewers,
+    touch_place,
+)
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
@@ -61,7 +66,8 @@ from lightpen.verification.texts import (
     fixed_point_text,
     length_text,
 )
-from lightpen.verification.touch import Touch
+from lightpen.verification.tip_in_force import cone_before
+from lightpen.verification.touch import NO_DRIFT, Touch
 from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
 
 
@@ -91,6 +97,7 @@ def _add_fixed_point(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--nominal-tip", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="mm"
     )
+    _add_drift_share(parser)
     _add_common(parser, "across", "along")
 
 
@@ -105,6 +112,7 @@ def _add_circle(parser: argparse.ArgumentParser) -> None:
         help="of the probe, where it touched a bore or a boss and not a groove",
     )
     parser.add_argument("--surface", choices=("bore", "boss"), default="bore")
+    _add_drift_share(parser)
     _add_common(parser, "radius", "form")
 
 
@@ -112,6 +120,7 @@ def _add_length(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_length)
     _add_runs(parser, "both ends of the length at one place")
     _add_certified(parser, "--length")
+    _add_drift_share(parser)
     _add_common(parser, "length")
 
 
@@ -151,8 +160,24 @@ def _add_certified(parser: argparse.ArgumentParser, option: str) -> None:
     )
 
 
+def _add_drift_share(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--drift",
+        type=Path,
+        metavar="DRIFT.json",
+        help="what verify drift wrote of the same session: U counts it",
+    )
+
+
 def _add_common(parser: argparse.ArgumentParser, *limits: str) -> None:
     parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--rig",
+        type=Path,
+        metavar="FILE",
+        help="several cameras and where they stand, in place of --camera; what is "
+        "given is then a folder that holds one for each camera, named as in this file",
+    )
     parser.add_argument("--pen", type=Path, metavar="FILE")
     add_pen_options(parser)
     parser.add_argument(
@@ -191,16 +216,19 @@ class _Measured:
     ----------
     cone_cam : (3,) array or None
         Of the calibration; None before another camera.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
     """
 
     calibration: CalibrationFile
     instrument: Instrument
     runs: tuple[TouchRun, ...]
     files: tuple[Path, ...]
-    camera_file: Path
+    viewers: Viewers
     pen_file: Path
     nominal_tip: FloatArray | None
     cone_cam: FloatArray | None
+    drift: FloatArray
 
     @property
     def touches(self) -> list[tuple[str, Sequence[Touch]]]:
@@ -216,6 +244,7 @@ def _fixed_point(options: argparse.Namespace) -> None:
         _limits(options),
         measured.nominal_tip,
         measured.cone_cam,
+        measured.drift,
     )
     _tell(
         *(options, measured, fixed_point_text, found, "fixed point"),
@@ -234,6 +263,7 @@ def _circle(options: argparse.Namespace) -> None:
         _limits(options),
         certified_uncertainty=options.certified_uncertainty,
         ball_offset=inwards * (options.ball_diameter or 0.0) / 2,
+        drift=measured.drift,
     )
     _tell(
         *(options, measured, circle_text, found, "circle"),
@@ -250,6 +280,7 @@ def _length(options: argparse.Namespace) -> None:
         options.length,
         _limits(options),
         certified_uncertainty=options.certified_uncertainty,
+        drift=measured.drift,
     )
     _tell(
         *(options, measured, length_text, found, "length"),
@@ -284,44 +315,41 @@ def _drift(options: argparse.Namespace) -> None:
 def _measure(
     options: argparse.Namespace, places: Sequence[tuple[str, ...]]
 ) -> _Measured:
-    require_other_file(options.json, options.camera, options.pen, options.tip)
+    drift: Path | None = getattr(options, "drift", None)
+    inputs = options.camera, options.rig, options.pen, options.tip, drift
+    require_other_file(options.json, *inputs)
     calibration = read_calibration(options.tip)
-    found = [touch_place(each) for each in places]
-    camera, camera_file = _camera(options, found[0])
+    given = read_viewers(options.camera, options.rig)
+    rig = None if given is None else given.rig
+    found = [touch_place(each, rig) for each in places]
+    viewers = given or found[0].viewers
+    if viewers is None:
+        raise lacking("--camera or --rig")
     pen, pen_file = _pen(options, found[0])
     for place in found:
-        require_other_file(options.json, *place.images.files)
-    instrument = instrument_of(calibration, camera, camera_file, pen, pen_file)
+        require_other_file(options.json, *place.files)
+    instrument = instrument_of(calibration, viewers, pen, pen_file)
     settling = 0 if options.frames == 1 else SETTLING
     rules = TouchRules(options.frames, settling)
     runs = []
     with progress("Finding LEDs") as report:
         for place in found:
-            images = place.name, place.images
-            runs.append(touch_run(*images, instrument, rules, place.mask))
+            runs.append(touch_run(place, instrument, rules))
             report(len(runs) / len(found))
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
-    is_same_camera = hashed(camera_file).sha256 == calibration.camera_sha256
     return _Measured(
         calibration=calibration,
         instrument=instrument,
         runs=tuple(runs),
-        files=tuple(file for place in found for file in place.images.files),
-        camera_file=camera_file,
+        files=tuple(file for place in found for file in place.files),
+        viewers=viewers,
         pen_file=pen_file,
         nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
-        cone_cam=calibration.cone_cam if is_same_camera else None,
+        cone_cam=cone_before(calibration, viewers),
+        drift=NO_DRIFT if drift is None else read_drift(drift),
     )
-
-
-def _camera(options: argparse.Namespace, place: TouchPlace) -> tuple[Camera, Path]:
-    if options.camera is not None:
-        return read_camera(options.camera), options.camera
-    if place.camera is None or place.camera_file is None:
-        raise lacking("--camera")
-    return place.camera, place.camera_file
 
 
 def _pen(options: argparse.Namespace, place: TouchPlace) -> tuple[Pen, Path]:
@@ -368,18 +396,16 @@ def _tell(
         assessment,
         {name: limits[name] for name in limits if hasattr(options, f"limit_{name}")},
         {
-            "tip": file_entry(options.tip),
-            "camera": file_entry(measured.camera_file),
-            "pen": file_entry(measured.pen_file),
-            "images": [
-                {"file": file.path.name, "sha256": file.sha256}
-                for file in all_hashed(measured.files)
-            ],
+            "tip": file_entry(hashed(options.tip)),
+            **viewer_entries(measured.viewers),
+            "pen": file_entry(hashed(measured.pen_file)),
+            "images": [file_entry(file) for file in all_hashed(measured.files)],
+            **_drift_entry(options),
         },
     )
     write_record(options.json, record)
 
 
-def file_entry(path: Path) -> dict[str, str]:
-    """Return a file with its hash."""
-    return {"file": path.name, "sha256": hashed(path).sha256}
+def _drift_entry(options: argparse.Namespace) -> dict[str, Any]:
+    drift: Path | None = getattr(options, "drift", None)
+    return {} if drift is None else {"drift": file_entry(hashed(drift))}

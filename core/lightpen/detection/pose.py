@@ -18,6 +18,7 @@ References
 
 import math
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -90,6 +91,19 @@ class Poses:
         )
 
 
+class Reprojection(Protocol):
+    """Reprojection errors of the pen at given poses."""
+
+    @property
+    def pixels(self) -> FloatArray:
+        """Observed centres, (N, M, 2), px; NaN where an LED was not seen."""
+
+    def residuals_with_jacobian(
+        self, R: FloatArray, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return residuals (N, M, 2), and d pixel / d (theta, dt), (N, M, 2, 6)."""
+
+
 def fit_poses(
     camera: Camera,
     pen: Pen,
@@ -114,8 +128,21 @@ def fit_poses(
     is_near : bool
         Whether that is by least squares on most of these LEDs already.
     """
-    _require_seen(pixels)
-    problem = _Reprojection(camera, pen.leds, pen.normals, pen.diameter / 2, pixels)
+    problem = CameraReprojection(
+        camera, pen.leds, pen.normals, pen.diameter / 2, pixels
+    )
+    return fit_reprojection(problem, rotations, translations, is_near=is_near)
+
+
+def fit_reprojection(
+    problem: Reprojection,
+    rotations: FloatArray,
+    translations: FloatArray,
+    *,
+    is_near: bool = False,
+) -> Poses:
+    """Fit poses to what any cameras saw, as `fit_poses` does for one."""
+    _require_seen(problem.pixels)
     R, t = rotations, translations
     if not is_near:
         R, t = _descend(problem, R, t, robust=False, max_steps=3, tolerance=ROUGHLY)
@@ -152,7 +179,7 @@ def fit_paper_poses(
     t = np.where(solved[:, None], t, translations)
     ideal = replace(camera, distortion=np.zeros(5))
     undistorted = ideal.pixels(normalised)
-    problem = _Reprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
+    problem = CameraReprojection(ideal, pen.leds, pen.normals, 0.0, undistorted)
     R, t = _descend(problem, R, t, robust=False)
     return _poses_at(problem, R, t, robust=False)
 
@@ -200,8 +227,8 @@ def start_poses(
 
 
 @dataclass(frozen=True, eq=False)
-class _Reprojection:
-    """Reprojection errors of discs at given poses; radius 0 means projected centres."""
+class CameraReprojection:
+    """Those of discs in the images of a camera; radius 0 means projected centres."""
 
     camera: Camera
     leds: FloatArray
@@ -354,7 +381,7 @@ def _require_seen(pixels: FloatArray) -> None:
 
 
 def _descend(
-    problem: _Reprojection,
+    problem: Reprojection,
     R: FloatArray,
     t: FloatArray,
     *,
@@ -390,7 +417,7 @@ def _descend(
 
 
 def _poses_at(
-    problem: _Reprojection, R: FloatArray, t: FloatArray, *, robust: bool
+    problem: Reprojection, R: FloatArray, t: FloatArray, *, robust: bool
 ) -> Poses:
     seen = np.isfinite(problem.pixels[..., 0])
     residuals, J = problem.residuals_with_jacobian(R, t)

@@ -1,6 +1,6 @@
-"""What a calibration leaves to measure with: camera, pen and tip, and how well known.
+"""What a calibration leaves to measure with: cameras, pen and tip, and how well known.
 
-The images of a swing put camera and pen right as far as they can. What they leave open
+The images of a swing put cameras and pen right as far as they can. What they leave open
 is common to every point that is measured afterwards, and hangs together: an error of
 the focal length, say, comes with one of the LEDs and one of the tip. So the covariance
 is that of all of them together.
@@ -14,59 +14,78 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.adjustment import Adjustment
 from lightpen.estimation.bundle import Bundle
-from lightpen.estimation.priors import priors_of
+from lightpen.estimation.priors import Priors, priors_of
 from lightpen.estimation.uncertainty import Budget, ShareName
 from lightpen.estimation.unknowns import led_basis
 from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.model.rig import rig_of
+from lightpen.model.rig import Rig
 
 
 class Parameters(NamedTuple):
-    """Where each kind of parameter stands in the covariance of an instrument."""
+    """Where each kind of parameter stands in the covariance of an instrument.
+
+    Attributes
+    ----------
+    cameras : tuple of slice
+        Intrinsics of each camera.
+    extrinsics : slice
+        Where all cameras but the first stand, as `Rig.covariance` has it.
+    """
 
     tip: slice
-    intrinsics: slice
+    cameras: tuple[slice, ...]
+    extrinsics: slice
     diameter: slice
     leds: slice
 
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return int(self.leds.stop)
 
-def parameters_of(camera: Camera, pen: Pen) -> Parameters:
-    """Return where the parameters of a camera and a pen stand."""
-    after_camera = 3 + len(camera.intrinsics)
-    return Parameters(
-        tip=slice(0, 3),
-        intrinsics=slice(3, after_camera),
-        diameter=slice(after_camera, after_camera + 1),
-        leds=slice(after_camera + 1, after_camera + 1 + 3 * pen.n_leds),
+
+def parameters_of(rig: Rig, pen: Pen) -> Parameters:
+    """Return where the parameters of cameras and a pen stand."""
+    sizes = [3, *(len(camera.intrinsics) for camera in rig.cameras)]
+    sizes += [6 * (rig.n_cameras - 1), 1, 3 * pen.n_leds]
+    ends = np.cumsum(sizes).tolist()
+    tip, *cameras, extrinsics, diameter, leds = (
+        slice(end - size, end) for size, end in zip(sizes, ends, strict=True)
     )
+    return Parameters(tip, tuple(cameras), extrinsics, diameter, leds)
 
 
 @dataclass(frozen=True, eq=False)
 class Instrument:
-    """A camera and a pen with its tip.
+    """A camera, or several of a rig, and a pen with its tip.
 
     Attributes
     ----------
     tip_pen : (3,) array
         mm.
     covariance : (q, q) array
-        Of tip, intrinsics, diameter and LEDs, as `parameters` has them.
+        Of tip, cameras, diameter and LEDs, as `parameters` has them.
     sigma : float
         Noise of one image coordinate during the calibration, px.
     """
 
-    camera: Camera
+    rig: Rig
     pen: Pen
     tip_pen: FloatArray
     covariance: FloatArray
     sigma: float
 
     @property
+    def camera(self) -> Camera:
+        """The camera, of several the first, in whose frame points are measured."""
+        return self.rig.cameras[0]
+
+    @property
     def parameters(self) -> Parameters:
         """Where each kind of parameter stands in the covariance."""
-        return parameters_of(self.camera, self.pen)
+        return parameters_of(self.rig, self.pen)
 
 
 def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
@@ -79,7 +98,7 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
     spread = spread + np.outer(held_back, held_back)
     mixing = _mixing(bundle)
     return Instrument(
-        camera=state.rig.cameras[0],
+        rig=state.rig,
         pen=state.pen,
         tip_pen=state.tip_pen,
         covariance=mixing @ spread @ mixing.T,
@@ -88,7 +107,7 @@ def adjusted_instrument(adjustment: Adjustment, budget: Budget) -> Instrument:
 
 
 def instrument_of_files(
-    camera: Camera,
+    rig: Rig,
     pen: Pen,
     tip_pen: FloatArray,
     tip_covariance: FloatArray,
@@ -106,11 +125,11 @@ def instrument_of_files(
     sigma : float
         Noise of one image coordinate, px.
     """
-    at = parameters_of(camera, pen)
-    priors = priors_of(rig_of(camera), pen, assumptions)
-    covariance = np.zeros((at.leds.stop, at.leds.stop))
+    at = parameters_of(rig, pen)
+    priors = priors_of(rig, pen, assumptions)
+    covariance = np.zeros((at.number, at.number))
     covariance[at.tip, at.tip] = tip_covariance
-    covariance[at.intrinsics, at.intrinsics] = priors.cameras[0].covariance
+    _put_cameras(covariance, at, priors)
     covariance[at.diameter, at.diameter] = priors.diameter.covariance
     scaling = (pen.leds - pen.leds.mean(axis=0)).ravel()
     basis = led_basis(pen.leds)
@@ -120,32 +139,53 @@ def instrument_of_files(
         else pen.led_covariance
     )
     covariance[at.leds, at.leds] += priors.scale.covariance * np.outer(scaling, scaling)
-    return Instrument(camera, pen, tip_pen, covariance, sigma)
+    return Instrument(rig, pen, tip_pen, covariance, sigma)
 
 
-def with_camera(instrument: Instrument, camera: Camera) -> Instrument:
-    """Return the instrument before another camera, which its swing knows nothing of."""
-    old, at = instrument.parameters, parameters_of(camera, instrument.pen)
-    moved = np.zeros((at.leds.stop, old.leds.stop))
+def with_rig(instrument: Instrument, rig: Rig) -> Instrument:
+    """Return the instrument before other cameras, which its swing knows nothing of."""
+    old, at = instrument.parameters, parameters_of(rig, instrument.pen)
+    moved = np.zeros((at.number, old.number))
     for kind in ("tip", "diameter", "leds"):
         place = getattr(old, kind)
         moved[getattr(at, kind), place] = np.eye(place.stop - place.start)
     covariance = moved @ instrument.covariance @ moved.T
-    prior = priors_of(rig_of(camera), instrument.pen, USUAL).cameras[0]
-    covariance[at.intrinsics, at.intrinsics] = prior.covariance
+    _put_cameras(covariance, at, priors_of(rig, instrument.pen, USUAL))
     return Instrument(
-        camera, instrument.pen, instrument.tip_pen, covariance, instrument.sigma
+        rig, instrument.pen, instrument.tip_pen, covariance, instrument.sigma
     )
 
 
 def instrument_record(instrument: Instrument) -> dict[str, Any]:
     """Return an instrument as an entry of a record of a calibration."""
-    return {
+    rig = instrument.rig
+    record = {
         "intrinsics": instrument.camera.intrinsics,
         "disc_diameter_mm": instrument.pen.diameter,
         "leds_mm": instrument.pen.leds,
         "covariance": instrument.covariance,
     }
+    if rig.n_cameras == 1:
+        return record
+    others = zip(rig.cameras, rig.rotations, rig.translations, strict=True)
+    return record | {
+        "other_cameras": [
+            {
+                "intrinsics": camera.intrinsics,
+                "cam_from_rig_rotation": rotation,
+                "cam_from_rig_translation_mm": translation,
+            }
+            for camera, rotation, translation in list(others)[1:]
+        ]
+    }
+
+
+def _put_cameras(covariance: FloatArray, at: Parameters, priors: Priors) -> None:
+    """Put what the files know of cameras into a covariance."""
+    for place, prior in zip(at.cameras, priors.cameras, strict=True):
+        covariance[place, place] = prior.covariance
+    if priors.extrinsics is not None:
+        covariance[at.extrinsics, at.extrinsics] = priors.extrinsics.covariance
 
 
 def _noise_counted(allowed: Bundle, budget: Budget) -> FloatArray:
@@ -163,13 +203,13 @@ def _noise_counted(allowed: Bundle, budget: Budget) -> FloatArray:
 def _mixing(bundle: Bundle) -> FloatArray:
     """Return the parameters of an instrument by the unknowns of a bundle, (q, p)."""
     unknowns, state = bundle.unknowns, bundle.state
-    at = parameters_of(state.rig.cameras[0], state.pen)
+    at = parameters_of(state.rig, state.pen)
     of = unknowns.columns
-    mixing = np.zeros((at.leds.stop, unknowns.number))
-    mixing[at.tip, of.tip] = np.eye(3)
-    n_intrinsics = at.intrinsics.stop - at.intrinsics.start
-    mixing[at.intrinsics, of.cameras[0]] = np.eye(n_intrinsics)
-    mixing[at.diameter, of.diameter] = 1.0
+    mixing = np.zeros((at.number, unknowns.number))
+    kinds = ("tip", "extrinsics", "diameter")
+    alike = [(getattr(at, kind), getattr(of, kind)) for kind in kinds]
+    for place, column in (*alike, *zip(at.cameras, of.cameras, strict=True)):
+        mixing[place, column] = np.eye(place.stop - place.start)
     mixing[at.leds, of.leds] = unknowns.basis
     mixing[at.leds, of.scale.start] = unknowns.scaling
     return mixing

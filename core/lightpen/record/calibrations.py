@@ -32,6 +32,7 @@ from lightpen.sentences import sentence
 
 WHAT = sentence("file.calibration", "calibration")
 LIMIT = 64 * MEGABYTE
+N_PLACE = 6  # parameters of where a camera of a rig stands
 
 
 class _File(Struct):
@@ -42,6 +43,14 @@ class _File(Struct):
 class _Inputs(Struct):
     camera: _File
     pen: _File
+    rig: _File | None = None
+    cameras: tuple[_File, ...] = ()
+
+
+class _OtherCamera(Struct):
+    intrinsics: list[float]
+    cam_from_rig_rotation: tuple[Vector, Vector, Vector]
+    cam_from_rig_translation_mm: Vector
 
 
 class _Instrument(Struct):
@@ -49,6 +58,7 @@ class _Instrument(Struct):
     disc_diameter_mm: Annotated[float, Meta(gt=0, le=1000)]
     leds_mm: list[Vector]
     covariance: list[list[float]]
+    other_cameras: tuple[_OtherCamera, ...] = ()
 
 
 class _Led(Struct):
@@ -91,6 +101,22 @@ class _Record(Struct):
 
 
 @dataclass(frozen=True, eq=False)
+class FittedCamera:
+    """A camera of a rig but the first, as a swing left it.
+
+    Attributes
+    ----------
+    intrinsics : (k,) array
+    rotation, translation : (3, 3) and (3,) array
+        Of cam_from_rig, mm.
+    """
+
+    intrinsics: FloatArray
+    rotation: FloatArray
+    translation: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class FittedInstrument:
     """What a swing left to measure with; see `lightpen.estimation.instrument`.
 
@@ -101,13 +127,16 @@ class FittedInstrument:
     leds : (L, 3) array
         mm.
     covariance : (q, q) array
-        Of tip, intrinsics, diameter and LEDs.
+        Of tip, cameras, diameter and LEDs.
+    others : tuple of FittedCamera
+        The other cameras of a rig.
     """
 
     intrinsics: FloatArray
     diameter: float
     leds: FloatArray
     covariance: FloatArray
+    others: tuple[FittedCamera, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +165,8 @@ class CalibrationFile:
         What stood in for what the files do not state.
     camera_sha256, pen_sha256 : str
         Of the files that it was made with.
+    seen_by : tuple of str
+        SHA-256 of the camera file, or of a rig file and those of all its cameras.
     pen_file : str
         Name of the pen file.
     displacements : (L, 3) array
@@ -173,6 +204,7 @@ class CalibrationFile:
     assumptions: Assumptions
     camera_sha256: str
     pen_sha256: str
+    seen_by: tuple[str, ...]
     pen_file: str
     displacements: FloatArray
     instrument: FittedInstrument | None
@@ -282,6 +314,7 @@ def _calibration(
         assumptions=assumed,
         camera_sha256=record.inputs.camera.sha256,
         pen_sha256=record.inputs.pen.sha256,
+        seen_by=_seen_by(record.inputs),
         pen_file=record.inputs.pen.file,
         displacements=np.array(
             [each.displacement_mm for each in record.leds], dtype=np.float64
@@ -304,9 +337,10 @@ def _instrument(record: _Record) -> FittedInstrument | None:
     entry = record.instrument
     if entry is None:
         return None
-    n_parameters = 4 + len(entry.intrinsics) + 3 * len(entry.leds_mm)
-    n_leds, n_rows = len(entry.leds_mm), len(entry.covariance)
-    if (n_leds, n_rows) != (len(record.leds), n_parameters) or any(
+    n_leds, others = len(entry.leds_mm), entry.other_cameras
+    n_parameters = 4 + len(entry.intrinsics) + 3 * n_leds
+    n_parameters += sum(N_PLACE + len(other.intrinsics) for other in others)
+    if (n_leds, len(entry.covariance)) != (len(record.leds), n_parameters) or any(
         len(row) != n_parameters for row in entry.covariance
     ):
         raise DamagedError("The covariance is of another instrument.")
@@ -315,7 +349,21 @@ def _instrument(record: _Record) -> FittedInstrument | None:
         diameter=entry.disc_diameter_mm,
         leds=np.array(entry.leds_mm),
         covariance=np.array(entry.covariance),
+        others=tuple(
+            FittedCamera(
+                np.array(other.intrinsics),
+                np.array(other.cam_from_rig_rotation),
+                np.array(other.cam_from_rig_translation_mm),
+            )
+            for other in others
+        ),
     )
+
+
+def _seen_by(inputs: _Inputs) -> tuple[str, ...]:
+    if inputs.rig is None:
+        return (inputs.camera.sha256,)
+    return (inputs.rig.sha256, *(each.sha256 for each in inputs.cameras))
 
 
 def _seen(record: _Record) -> FloatArray:

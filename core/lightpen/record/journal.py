@@ -67,6 +67,7 @@ class ImageLine(Struct, tag_field="kind", tag="image", omit_defaults=True):
     translation: Vector
     camera: CameraCounts | None = None  # since the swing began
     others: tuple[OtherImage, ...] = ()
+    touch: Count = 0  # of a verification, from 1
 
 
 class OutLine(Struct, tag_field="kind", tag="out"):

@@ -15,6 +15,9 @@ A record is a folder:
 ``swing.lightpen``   opens the swing in the program; holds nothing that is needed
 ==================== ===================================================================
 
+The images of the touches of a verification are kept in such a record, too; each then
+says of which touch it is.
+
 `lightpen.record.writing` puts an image on the disk before its line, and its line
 before it acknowledges the image; `lightpen.record.lock` keeps a second program
 from writing meanwhile. An image without a line is what a crash leaves: it was not
@@ -237,6 +240,8 @@ class RecordedImage:
         What became of the camera's images since the swing began.
     others : tuple of OtherImage
         Of the other cameras of a rig at this moment.
+    touch : int
+        Of a verification that it belongs to, from 1; 0 of a swing.
     """
 
     number: int
@@ -249,6 +254,7 @@ class RecordedImage:
     translation: FloatArray
     stats: Stats = field(default_factory=Stats)
     others: tuple[OtherImage, ...] = ()
+    touch: int = 0
 
     @property
     def rig_pixels(self) -> FloatArray:
@@ -405,7 +411,7 @@ def _record(folder: Path, header: Header, lines: Sequence[Line], length: int) ->
 
 
 def record_files(record: Record) -> tuple[Path, ...]:
-    """Return all files that a record consists of."""
+    """Return all files that a record of a swing consists of."""
     header = record.header
     names = (HEADER, JOURNAL, OPENER, *header_copies(header))
     images = (
@@ -570,6 +576,7 @@ def _recorded_image(folder: Path, line: ImageLine) -> RecordedImage:
         translation=np.array(line.translation, dtype=np.float64),
         stats=Stats() if line.camera is None else Stats(**asdict(line.camera)),
         others=line.others,
+        touch=line.touch,
     )
 
 

@@ -93,8 +93,13 @@ class RecordWriter:
         self._journal = _own_journal(folder, length)
 
     @classmethod
-    def create(cls, folder: Path, header: Header) -> Self:
+    def create(cls, folder: Path, header: Header, *, is_swing: bool = True) -> Self:
         """Make a record in a folder that does not exist or is empty.
+
+        Parameters
+        ----------
+        is_swing : bool
+            Whether the system is to open it with the program; touches are no swing.
 
         Raises
         ------
@@ -127,7 +132,8 @@ class RecordWriter:
             for name, copy in copies.items():
                 write_whole(folder / name, copy.data)
             write_whole(folder / HEADER, _header_bytes(header))
-            write_whole(folder / OPENER, OPENER_TEXT)
+            if is_swing:
+                write_whole(folder / OPENER, OPENER_TEXT)
             _sync_folder(folder)
             _sync_folder(folder.parent)
             stack.pop_all()
@@ -186,6 +192,7 @@ class RecordWriter:
         device_time_ns: int | None = None,
         stats: Stats | None = None,
         others: Sequence[OtherView] = (),
+        touch: int = 0,
     ) -> int:
         """Record one image, or those of a moment.
 
@@ -205,6 +212,8 @@ class RecordWriter:
             What became of the camera's images since the swing began.
         others : sequence of OtherView, optional
             Of the other cameras of a rig, in their order.
+        touch : int
+            Of a verification that it belongs to, from 1.
 
         Returns
         -------
@@ -237,6 +246,7 @@ class RecordWriter:
                 translation=translation.tolist(),
                 camera=None if stats is None else CameraCounts(**asdict(stats)),
                 others=other_images,
+                touch=touch,
             )
         )
         self._next_number = number + 1

@@ -31,7 +31,14 @@ from lightpen.model.rig import Rig
 from lightpen.sentences import sentence
 from lightpen.simulator.faults import Faults
 from lightpen.simulator.hand import Held, Operator
-from lightpen.simulator.image_plans import ImagePlan, led_faces, led_gains, render_plan
+from lightpen.simulator.image_plans import (
+    ImagePlan,
+    camera_turn,
+    lamps_beside,
+    led_faces,
+    led_gains,
+    render_plan,
+)
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import leds_in_camera
 from lightpen.simulator.view import Lamp, View
@@ -46,6 +53,7 @@ BITS: dict[str, Literal[8, 12, 16]] = {"Mono8": 8, "Mono12": 12, "Mono16": 16}
 
 N_BUFFERED = 2  # images that wait for a late reader
 MAX_POSES = 64  # through one exposure
+TURNING_TIME = 60.0  # s, in which it turns as far as the scene says
 STILL = 0.02  # px moved during the exposure that blur hides
 
 
@@ -350,7 +358,11 @@ class SimulatedCamera:
             shown = self._poses(scene, self.operator.held(between))
         gains = np.zeros_like(self._gains) if held.is_away else self._gains.copy()
         gains[[led - 1 for led in held.covered]] = 0
-        view = View(*shown, gains, self._lamps, faces=self._faces)
+        share = float(times[1]) / TURNING_TIME
+        turn = camera_turn(scene, share)
+        shown = turn @ shown[0], shown[1] @ turn.T
+        lamps = (*self._lamps, *lamps_beside(scene, share))
+        view = View(*shown, gains, lamps, faces=self._faces)
         return ImagePlan(seq, view, scene.optics, rotations[1], translations[1])
 
     def _poses(self, scene: Scene, held: Held) -> tuple[FloatArray, FloatArray]:

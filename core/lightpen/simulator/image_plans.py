@@ -243,19 +243,38 @@ def _turned(swing: Swing, scene: Scene) -> Swing:
 
 def _turn(scene: Scene, index: int) -> FloatArray:
     """Return by how much the camera has turned in an image, (3, 3)."""
-    share = index / max(scene.n_images - 1, 1) - 0.5
+    return camera_turn(scene, _share(scene, index))
+
+
+def _share(scene: Scene, index: int) -> float:
+    """Return how far the swing is in an image, from -0.5 to 0.5."""
+    return index / max(scene.n_images - 1, 1) - 0.5
+
+
+def camera_turn(scene: Scene, share: float) -> FloatArray:
+    """Return by how much the camera of a scene has turned, (3, 3).
+
+    Parameters
+    ----------
+    share : float
+        Of the whole turn.
+    """
     right, down = scene.camera_turn * share * np.array(TURN) / scene.camera.fx
     return rotation_from_vector(np.array([-down, right, 0.0]))
 
 
 def _lamps(scene: Scene, index: int) -> tuple[Lamp, ...]:
-    """Return the lamps beside the cone."""
+    return lamps_beside(scene, _share(scene, index))
+
+
+def lamps_beside(scene: Scene, share: float) -> tuple[Lamp, ...]:
+    """Return the lamps beside the cone, as a camera sees them that turns so far."""
     if not scene.has_lamp:
         return ()
     camera = scene.camera
     place = np.array(LAMP_PLACE) * camera.image_size
     ray = np.append(camera.unproject(place), 1.0)
-    place = camera.project((_turn(scene, index) @ ray)[None])[0]
+    place = camera.project((camera_turn(scene, share) @ ray)[None])[0]
     return (Lamp(place, (LAMP_RADIUS * camera.width,) * 2, level=LAMP_LEVEL),)
 
 

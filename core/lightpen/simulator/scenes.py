@@ -115,7 +115,7 @@ class Scene:
         Whether a lamp beside the cone is in view.
     camera_turn : float
         By which the image shifts from the first to the last one, as the camera turns,
-        px.
+        px; live, in a minute.
     viewpoint : int
         Which camera of several it is, from 0; it chooses the noise.
     """

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from lightpen.model.limits import VerificationLimits
+from lightpen.sentences import sentence
 from lightpen.verification.fixed_point import USUAL_TOUCHES
 from lightpen.verification.touching import FAST
 
@@ -31,6 +32,28 @@ class Wanting(StrEnum):
     RADIUS = "radius"
     LENGTH = "length"
     BALL = "ball"
+
+
+WANTING = {
+    Wanting.TASK: sentence(
+        "verification.no-task",
+        "Nothing is chosen to be touched. Choose the fixed point, the ring or the "
+        "length.",
+    ),
+    Wanting.RADIUS: sentence(
+        "verification.no-radius",
+        "The radius of the ring is not known. Enter the certified one.",
+    ),
+    Wanting.BALL: sentence(
+        "verification.no-ball",
+        "The diameter of the ball is not known, which a ring touched in its bore or "
+        "from outside needs. Enter it where the tip is named.",
+    ),
+    Wanting.LENGTH: sentence(
+        "verification.no-length",
+        "The length is not known. Enter the certified one.",
+    ),
+}
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.touch import Touch
+from lightpen.verification.touch import NO_DRIFT, Touch
 
 MIN_TOUCHES = 6
 LEAST_POINTS = 3  # that tell a circle at all
@@ -156,6 +156,7 @@ def measure_circle(
     *,
     certified_uncertainty: float = 0.0,
     ball_offset: float = 0.0,
+    drift: FloatArray = NO_DRIFT,
 ) -> Circle:
     """Measure a ring in one or several runs.
 
@@ -170,6 +171,9 @@ def measure_circle(
     ball_offset : float
         What is to be added to the radius of the circle of tip centres: the radius of
         the ball within a bore, minus that round a boss, mm.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm. A radius
+        is off by as much where it moved halfway round.
 
     Raises
     ------
@@ -178,7 +182,7 @@ def measure_circle(
     """
     measured, rows, noise = [], [], 0.0
     for name, touches in runs:
-        run, row = _measure_run(name, touches, instrument, ball_offset)
+        run, row = _measure_run(name, touches, instrument, ball_offset, drift)
         measured.append(run)
         rows.append(row)
         noise += sum(
@@ -187,6 +191,7 @@ def measure_circle(
         )
     row = np.mean(rows, axis=0)
     variance = float(row @ instrument.covariance @ row) + noise / len(runs) ** 2
+    variance += float(drift.max()) ** 2
     uncertainty = float(
         np.hypot(COVERAGE_FACTOR * np.sqrt(variance), certified_uncertainty)
     )
@@ -262,6 +267,14 @@ def ring_so_far(points_cam: FloatArray) -> CircleFit | None:
         return None
 
 
+def residuals_of(fit: CircleFit, points_cam: Sequence[FloatArray]) -> FloatArray:
+    """Return how far points are off a circle outwards and off its plane, (N, 2), mm."""
+    ways = np.reshape(points_cam, (-1, 3)) - fit.center_cam
+    axial = ways @ fit.normal_cam
+    spokes = ways - axial[:, None] * fit.normal_cam
+    return np.column_stack([np.linalg.norm(spokes, axis=1) - fit.radius, axial])
+
+
 def _across(normal: FloatArray) -> FloatArray:
     """Return the unit vector in a plane nearest to u, or to v where u sticks out."""
     axis = np.array([0.0, 1.0, 0.0] if abs(normal[0]) > EDGE_ON else [1.0, 0.0, 0.0])
@@ -270,7 +283,11 @@ def _across(normal: FloatArray) -> FloatArray:
 
 
 def _measure_run(
-    name: str, touches: Sequence[Touch], instrument: Instrument, ball_offset: float
+    name: str,
+    touches: Sequence[Touch],
+    instrument: Instrument,
+    ball_offset: float,
+    drift: FloatArray,
 ) -> tuple[CircleRun, FloatArray]:
     """Return a run, and the derivative of its radius by the instrument."""
     if len(touches) < MIN_TOUCHES:
@@ -316,7 +333,7 @@ def _measure_run(
         left_out=tuple(t for t, on in zip(touches, on_ring, strict=True) if not on),
         fit=fit,
         radius=fit.radius + ball_offset,
-        uncertainty=COVERAGE_FACTOR * float(np.sqrt(variance)),
+        uncertainty=COVERAGE_FACTOR * float(np.hypot(np.sqrt(variance), drift.max())),
     )
     return run, row
 

@@ -14,8 +14,9 @@ from typing import Any, TypeVar
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
 from lightpen.detection.fixed_lamps import masked_lights
+from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
-from lightpen.errors import AcceptanceError, LightpenError
+from lightpen.errors import AcceptanceError, FileError, LightpenError
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import all_hashed
 from lightpen.model.origin import Origin
@@ -24,28 +25,26 @@ from lightpen.record.supervision import Signature, require_supervisor
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import Report, Start, Task
-from lightpen.verification.choices import TaskKind, VerificationChoices, Wanting
+from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
+from lightpen.verification.conclusion import Conclusion, Outcome, conclusion_record
 from lightpen.verification.keeping import (
     TouchedImages,
-    VerificationAcceptance,
-    acceptance_record,
     keep_verification,
     task_record,
+    verifications_folder,
 )
-from lightpen.verification.places import runs_at, touch_place
+from lightpen.verification.recorded_runs import Done, read_runs
 from lightpen.verification.session import (
-    Found,
     SessionSetup,
     SessionState,
     SessionTransition,
     advance,
     end_task,
-    measure,
+    rules_of,
     touched_anew,
     with_found,
     without_touches,
 )
-from lightpen.verification.sources import touch_run
 from lightpen.verification.status import (
     Reading,
     SessionHappening,
@@ -55,7 +54,12 @@ from lightpen.verification.status import (
 from lightpen.verification.tip_in_force import (
     TipInForce,
     read_tip_in_force,
-    tip_at,
+)
+from lightpen.verification.touch_images import (
+    NewRecord,
+    TouchImages,
+    is_held_on,
+    new_record,
 )
 from lightpen.verification.touching import TouchHappening, TouchPhase, TouchRules
 from lightpen.verification.witness import LampImages, LampWitness, witnessed
@@ -72,20 +76,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """A record that waits to be written."""
+    """A record that waits to be written; those of its session are written before."""
 
-    record: Mapping[str, Any]
+    record_of: Callable[[tuple[Path, ...]], Mapping[str, Any]]
     is_simulated: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Done:
-    """What a task has found, with which tip, by which images."""
-
-    task: TaskKind
-    found: Found
-    tip: TipInForce
-    images: TouchedImages
 
 
 class VerificationCourse:
@@ -120,7 +114,9 @@ class VerificationCourse:
         self._unwritten: tuple[_Kept, ...] = ()
         self._trouble: Sentence | None = None
         self._task: Task | None = None
-        self._lamps = LampImages()
+        self._lamps: tuple[LampImages, ...] = ()  # of each camera
+        self._images = TouchImages(self._new_record)
+        self._unkept: Sentence | None = None  # why images are not kept now
 
     @property
     def status(self) -> VerificationStatus:
@@ -170,6 +166,7 @@ class VerificationCourse:
         """Forget all touches, and read the tip in force anew; what is kept stays."""
         self._drop_task()
         self._relieve()
+        self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here))
         self._read_tip()
 
@@ -177,6 +174,7 @@ class VerificationCourse:
         """Do one task again; what it found before is kept."""
         status, state = self._status, self._status.state
         if state is not None:
+            self._images.forget()
             state = touched_anew(state, task)
             self._publish(replace(status, state=state, accepted_by=""))
 
@@ -208,13 +206,10 @@ class VerificationCourse:
                 )
             require_supervisor(supervision, signature)
             supervisor = signature.name.strip()
-        acceptance = VerificationAcceptance(
-            found.grade, reason, supervisor, self._now()
+        conclusion = Conclusion(
+            *(Outcome.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
-        files = all_hashed(status.files)
-        record = acceptance_record(tip, began, files, acceptance)
-        is_simulated = tip.origin is Origin.SIMULATED
-        file = keep_verification(self._data, record, is_simulated=is_simulated)
+        file = self._write_next(_conclusion(tip, conclusion))
         self._relieve()
         accepted_by = supervisor or tip.names.operator
         kept = (*status.files, file)
@@ -223,8 +218,15 @@ class VerificationCourse:
     def end_task(self) -> None:
         """End the task at hand with the touches that there are, if they suffice."""
         status = self._status
-        if status.setup is not None and status.state is not None:
-            self._become(end_task(status.setup, status.state))
+        if status.setup is None or status.state is None:
+            return
+        transition = end_task(status.setup, status.state)
+        try:
+            self._images.follow(status.state, transition)
+        except FileError as error:
+            self._tell_trouble(error.sentence)
+            return
+        self._become(transition)
 
     def read(self, task: TaskKind, place: str, *, is_still: bool) -> None:
         """Do a task with recorded images.
@@ -241,7 +243,7 @@ class VerificationCourse:
         if self._task is not None or tip is None or setup is None:
             return
         rules = TouchRules(setup.choices.n_frames) if is_still else ONE_IMAGE
-        work = partial(_read_runs, task, place, tip, setup, rules)
+        work = partial(read_runs, task, place, tip, setup, rules)
         self._start(Reading.IMAGES, work, self._on_runs_read, self._on_runs_unread)
 
     def cancel(self) -> None:
@@ -252,6 +254,7 @@ class VerificationCourse:
     def shut_down(self) -> None:
         """Write what is not written yet."""
         self._drop_task()
+        self._give_up()
         self._write()
 
     # Images
@@ -266,11 +269,75 @@ class VerificationCourse:
         assert state is not None
         if status.began is None:
             self._status = replace(status, began=self._now())
-            self._lamps = LampImages()
-        if state.touching.phase is TouchPhase.HOLDING and sighting.has_pose:
-            masked = masked_lights(frame.image, aim.mask, frame.full_scale)
-            self._lamps = self._lamps.with_image(sighting, masked)
-        self._become(advance(setup, state, str(frame.seq), sighting))
+            self._lamps = (LampImages(),) * len(aim.aims)
+        if state.touching.phase is TouchPhase.HOLDING:
+            self._note_lamps(frame, sighting, aim)
+        together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
+        try:
+            name = self._name(frame, together, setup, state)
+            transition = advance(self._with_drift(setup, state), state, name, together)
+            self._images.follow(state, transition)
+        except FileError as error:  # an image that is not kept does not count
+            self._unkept = error.sentence
+            self._tell_trouble(error.sentence)
+            return
+        if self._unkept is not None and self._unkept is self._trouble:
+            self._relieve()
+        self._unkept = None
+        self._become(transition)
+
+    def _note_lamps(self, frame: Frame, sighting: Sighting, aim: Aim) -> None:
+        views = zip(
+            *(self._lamps, (frame, *frame.others), (sighting, *sighting.others)),
+            aim.aims,
+            strict=False,
+        )
+        self._lamps = tuple(
+            lamps.with_image(seen, masked_lights(own.image, of.mask, own.full_scale))
+            if seen.has_pose
+            else lamps
+            for lamps, own, seen, of in views
+        )
+
+    def _with_drift(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
+        """Return it with how far the camera has moved, where that is asked for next."""
+        task, tip = state.task(setup), self._status.tip
+        if task is None or tip is None:
+            return setup
+        rules = rules_of(setup, task)
+        if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
+            return setup
+        witness = self._witness(tip)
+        return setup if witness is None else replace(setup, drift=witness.share)
+
+    def _name(
+        self, frame: Frame, seen: Sighting, setup: SessionSetup, state: SessionState
+    ) -> str:
+        """Return the name of an image; one of a touch is kept under it."""
+        task = state.task(setup)
+        if task is None or not seen.has_pose or seen.is_blurred:
+            return str(frame.seq)
+        if not is_held_on(rules_of(setup, task), state):
+            return str(frame.seq)
+        return self._images.keep(frame, seen)
+
+    def _new_record(self) -> NewRecord:
+        """Make a record for the images of the run at hand."""
+        status, preparation = self._status, self._preparation
+        assert preparation is not None
+        assert status.tip is not None
+        tip = status.tip
+        header = preparation.header(
+            {
+                "verification": str(status.task),
+                "tip_file": tip.tip_file.path.name,
+                "tip_sha256": tip.tip_file.sha256,
+            }
+        )
+        root = verifications_folder(
+            self._data, is_simulated=tip.origin is Origin.SIMULATED
+        )
+        return new_record(root, tip.names, header)
 
     def _become(self, transition: SessionTransition) -> None:
         before, state = self._status.state, transition.state
@@ -284,15 +351,23 @@ class VerificationCourse:
             assert tip is not None
             assert found is not None
             witness = self._witness(tip)
-            images = TouchedImages(tip.origin, witness=witness)
+            records = self._images.next_task()
+            images = TouchedImages(tip.origin, witness=witness, records=records)
             self._status = replace(self._status, witness=witness)
-            self._keep(_Done(finished, found, tip, images))
+            self._keep(Done(finished, found, tip, images))
             happened.append(_ending(self._status))
+            self._conclude_done()
         self._publish(self._status, *happened)
 
     def _witness(self, tip: TipInForce) -> LampWitness | None:
-        camera = tip.instrument.camera
-        return witnessed(self._lamps, camera.fx, self._choices.limits)
+        """Return what lamps tell of the camera that moved farthest."""
+        limits, cameras = self._choices.limits, tip.instrument.rig.cameras
+        told = [
+            witnessed(lamps, camera.fx, limits)
+            for lamps, camera in zip(self._lamps, cameras, strict=False)
+        ]
+        known = [each for each in told if each is not None]
+        return max(known, key=lambda each: each.moved, default=None)
 
     # The tip
 
@@ -305,7 +380,7 @@ class VerificationCourse:
         status, setup, state = self._status, self._status.setup, self._status.state
         if setup is None or state is None:
             return
-        task = state.task(setup)
+        before, task = state, state.task(setup)
         for kind in TaskKind:
             is_found = state.found(kind) is not None
             if is_found and _asks_otherwise(kind, setup.choices, choices):
@@ -313,6 +388,8 @@ class VerificationCourse:
         setup = replace(setup, choices=choices)
         if state.task(setup) is not task:
             state = without_touches(state)
+        if state is not before:
+            self._images.forget()
         refusal = self._why_not(status.tip)
         self._publish(replace(status, setup=setup, state=state, refusal=refusal))
 
@@ -331,6 +408,7 @@ class VerificationCourse:
         self._task = None
         status = replace(self._status, reading=Reading.NOTHING)
         if status.tip is None or not tip.is_like(status.tip):
+            self._give_up()
             setup = SessionSetup(
                 tip.instrument,
                 self._choices,
@@ -349,6 +427,7 @@ class VerificationCourse:
 
     def _on_no_tip(self, why: Sentence) -> None:
         self._task = None
+        self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here, refusal=why))
 
     def _why_not(self, tip: TipInForce | None) -> Sentence | None:
@@ -356,19 +435,21 @@ class VerificationCourse:
         if tip is None:
             return self._status.refusal
         wanting = self._choices.wanting(tip.names.ball_diameter)
-        return _WANTING[wanting[0]] if wanting else None
+        return WANTING[wanting[0]] if wanting else None
 
     # Recorded images
 
-    def _on_runs_read(self, done: "_Done") -> None:
+    def _on_runs_read(self, done: Done) -> None:
         self._task = None
         status = replace(self._status, reading=Reading.NOTHING)
         if status.state is None:
             return
         self._relieve()
+        self._images.forget()
         state = with_found(status.state, done.found)
         self._status = replace(status, state=state, began=status.began or self._now())
         self._keep(done)
+        self._conclude_done()
         self._publish(self._status, _ending(self._status))
 
     def _on_runs_unread(self, why: Sentence) -> None:
@@ -395,7 +476,7 @@ class VerificationCourse:
 
     # Records
 
-    def _keep(self, done: "_Done") -> None:
+    def _keep(self, done: Done) -> None:
         """Keep what a task has found, now or as soon as it can be written."""
         setup = self._status.setup
         assert setup is not None
@@ -404,23 +485,48 @@ class VerificationCourse:
             *(self._status.began or self._now(), done.images),
         )
         origins = done.tip.origin, done.images.origin
-        self._unwritten = (*self._unwritten, _Kept(record, Origin.SIMULATED in origins))
+        kept = _Kept(lambda _: record, Origin.SIMULATED in origins)
+        self._unwritten = (*self._unwritten, kept)
+        self._write()
+
+    def _conclude_done(self) -> None:
+        """Conclude a verification when all that was chosen is found."""
+        found = self._status.assessment
+        if self._status.is_done and found is not None:
+            is_kept = found.is_accepted
+            self._conclude(Outcome.ACCEPTED if is_kept else Outcome.REFUSED)
+
+    def _give_up(self) -> None:
+        """Conclude what was begun and is not done."""
+        self._images.forget()
+        if self._status.began is not None and not self._status.is_done:
+            self._conclude(Outcome.ABANDONED)
+
+    def _conclude(self, outcome: Outcome) -> None:
+        """Say what became of the verification, with all records of it."""
+        status = self._status
+        if status.tip is None or status.began is None:
+            return
+        conclusion = Conclusion(outcome, status.began, self._now(), status.assessment)
+        self._unwritten = (*self._unwritten, _conclusion(status.tip, conclusion))
         self._write()
 
     def _write(self) -> None:
         """Write what waits for it, or tell why it cannot be."""
         try:
             while self._unwritten:
-                first = self._unwritten[0]
-                file = keep_verification(
-                    self._data, first.record, is_simulated=first.is_simulated
-                )
+                file = self._write_next(self._unwritten[0])
                 self._unwritten = self._unwritten[1:]
                 files = (*self._status.files, file)
                 self._status = replace(self._status, files=files)
                 self._relieve()
         except LightpenError as error:
             self._tell_trouble(error.sentence)
+
+    def _write_next(self, kept: _Kept) -> Path:
+        """Write a record of the session, whose other records are written."""
+        record = kept.record_of(self._status.files)
+        return keep_verification(self._data, record, is_simulated=kept.is_simulated)
 
     def _publish(self, status: VerificationStatus, *events: SessionHappening) -> None:
         """Become this status, and tell of it."""
@@ -437,29 +543,12 @@ class VerificationCourse:
             self._listener.on_relief(trouble)
 
 
-def _read_runs(
-    task: TaskKind,
-    place: str,
-    tip: TipInForce,
-    setup: SessionSetup,
-    rules: TouchRules,
-    report: Report,
-) -> _Done:
-    """Return what recorded images have found."""
-    places = [touch_place((run,)) for run in runs_at(place)]
-    tip = tip_at(tip, places[0])
-    setup = replace(setup, instrument=tip.instrument, cone_cam=tip.cone_cam)
-    runs = []
-    for i, each in enumerate(places, start=1):
-        runs.append(touch_run(each.name, each.images, tip.instrument, rules, each.mask))
-        report(i / len(places))
-    found = measure(setup, task, [(run.name, run.touches) for run in runs])
-    images = TouchedImages(
-        origin=places[0].origin,
-        files=all_hashed([file for each in places for file in each.images.files]),
-        rejected=tuple(image for run in runs for image in run.rejected),
+def _conclusion(tip: TipInForce, conclusion: Conclusion) -> _Kept:
+    """Return the record of a conclusion, to be written when its session is."""
+    return _Kept(
+        lambda files: conclusion_record(tip, conclusion, all_hashed(files)),
+        tip.origin is Origin.SIMULATED,
     )
-    return _Done(task, found, tip, images)
 
 
 def _verifies_like(one: Preparation, other: Preparation) -> bool:
@@ -496,24 +585,4 @@ def _ending(status: VerificationStatus) -> SessionHappening:
 _HAPPENED = {
     TouchHappening.TAKEN: SessionHappening.TAKEN,
     TouchHappening.BROKEN_OFF: SessionHappening.BROKEN_OFF,
-}
-_WANTING = {
-    Wanting.TASK: sentence(
-        "verification.no-task",
-        "Nothing is chosen to be touched. Choose the fixed point, the ring or the "
-        "length.",
-    ),
-    Wanting.RADIUS: sentence(
-        "verification.no-radius",
-        "The radius of the ring is not known. Enter the certified one.",
-    ),
-    Wanting.BALL: sentence(
-        "verification.no-ball",
-        "The diameter of the ball is not known, which a ring touched in its bore or "
-        "from outside needs. Enter it where the tip is named.",
-    ),
-    Wanting.LENGTH: sentence(
-        "verification.no-length",
-        "The length is not known. Enter the certified one.",
-    ),
 }

@@ -25,7 +25,7 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.touch import Touch, joint_covariance, with_tip
+from lightpen.verification.touch import NO_DRIFT, Touch, joint_covariance, with_tip
 
 USUAL_TOUCHES = 10
 MIN_TOUCHES = 3
@@ -108,6 +108,7 @@ def measure_fixed_point(
     limits: VerificationLimits,
     nominal_tip: FloatArray | None = None,
     cone_cam: FloatArray | None = None,
+    drift: FloatArray = NO_DRIFT,
 ) -> FixedPoint:
     """Measure a fixed point and judge the tip by its scatter.
 
@@ -117,6 +118,8 @@ def measure_fixed_point(
         mm, to be shown beside.
     cone_cam : (3,) array, optional
         Where the calibration had the same cone before the same camera, mm.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
 
     Raises
     ------
@@ -139,7 +142,7 @@ def measure_fixed_point(
         left_out=left_out,
         calibrated=calibrated,
         nominal=nominal_scatter(kept, instrument, nominal_tip),
-        uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean)),
+        uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(of_mean) + drift**2),
         expected_deviation=expected,
         tip_change=change,
         tip_change_uncertainty=COVERAGE_FACTOR * np.sqrt(np.diag(change_covariance)),

@@ -7,12 +7,10 @@ says besides who verified what in which session. Those of simulated pens are kep
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import datetime
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from lightpen.estimation.report import record_bytes
-from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
@@ -20,6 +18,7 @@ from lightpen.record.numbered_files import add_numbered
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
 from lightpen.verification.fixed_point import FixedPoint
+from lightpen.verification.places import Viewers
 from lightpen.verification.records import (
     circle_entries,
     fixed_point_entries,
@@ -30,6 +29,7 @@ from lightpen.verification.records import (
 from lightpen.verification.session import Found
 from lightpen.verification.tip_in_force import TipInForce
 from lightpen.verification.touch import RejectedFrame
+from lightpen.verification.touch_images import TouchRecord
 from lightpen.verification.witness import LampWitness, witness_entries
 
 VERIFICATIONS = "verifications"
@@ -54,28 +54,15 @@ class TouchedImages:
         Those that belong to no touch, and why.
     witness : LampWitness or None
         What fixed lamps in view tell so far.
+    records : tuple of TouchRecord
+        Where those of a live camera are kept, run by run.
     """
 
     origin: Origin | None
     files: tuple[InputFile, ...] = ()
     rejected: tuple[RejectedFrame, ...] = ()
     witness: LampWitness | None = None
-
-
-@dataclass(frozen=True)
-class VerificationAcceptance:
-    """Why a tip is used though something was found against it.
-
-    Attributes
-    ----------
-    supervisor : str
-        Empty where it took none.
-    """
-
-    grade: Grade
-    reason: str
-    supervisor: str
-    at: datetime
+    records: tuple[TouchRecord, ...] = ()
 
 
 def keep_verification(
@@ -88,8 +75,13 @@ def keep_verification(
     FileError
         It cannot be written.
     """
-    root = data / SIMULATED if is_simulated else data
-    return add_numbered(root / VERIFICATIONS, record_bytes(record))
+    folder = verifications_folder(data, is_simulated=is_simulated)
+    return add_numbered(folder, record_bytes(record))
+
+
+def verifications_folder(data: Path, *, is_simulated: bool) -> Path:
+    """Return the folder of a data folder that verifications are kept in."""
+    return (data / SIMULATED if is_simulated else data) / VERIFICATIONS
 
 
 def task_record(
@@ -124,42 +116,24 @@ def task_record(
         found.assessment,
         {name: limits[name] for name in LIMITS[task]},
         {
-            "tip": _entry(tip.tip_file),
-            "camera": _entry(tip.camera_file),
-            "pen": _entry(tip.pen_file),
-            "images": [_entry(file) for file in images.files],
+            "tip": file_entry(tip.tip_file),
+            **viewer_entries(tip.viewers),
+            "pen": file_entry(tip.pen_file),
+            "images": [file_entry(file) for file in images.files],
+            "touches": [
+                {"folder": each.folder.name, "journal_sha256": each.journal.sha256}
+                for each in images.records
+            ],
         },
     )
 
 
-def acceptance_record(
-    tip: TipInForce,
-    session: datetime,
-    files: tuple[InputFile, ...],
-    acceptance: VerificationAcceptance,
-) -> dict[str, Any]:
-    """Return the record of a tip that is used though its verification is no pass.
-
-    Parameters
-    ----------
-    files : tuple of InputFile
-        Of the verification.
-    """
-    names = tip.names
-    return {
-        "program": {"name": "lightpen", "version": version("lightpen")},
-        "created": acceptance.at.isoformat(timespec="seconds"),
-        "verification": "acceptance",
-        "session": session.isoformat(timespec="seconds"),
-        "station": names.station,
-        "operator": names.operator,
-        "pen": names.pen,
-        "tip": names.tip,
-        "grade": acceptance.grade.value,
-        "supervisor": acceptance.supervisor,
-        "reason": acceptance.reason,
-        "accepts": [_entry(file) for file in files],
-    }
+def viewer_entries(viewers: Viewers) -> dict[str, Any]:
+    """Return the files of cameras, as inputs of a record."""
+    first, *others = (file_entry(file) for file in viewers.files)
+    if not others:
+        return {"camera": first}
+    return {"camera": others[0], "rig": first, "cameras": others}
 
 
 def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
@@ -170,5 +144,6 @@ def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
     return length_entries(found, tip.instrument)
 
 
-def _entry(file: InputFile) -> dict[str, str]:
+def file_entry(file: InputFile) -> dict[str, str]:
+    """Return a file with its hash, as an entry of a record."""
     return {"file": file.path.name, "sha256": file.sha256}

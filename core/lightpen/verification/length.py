@@ -23,7 +23,7 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.touch import Touch
+from lightpen.verification.touch import NO_DRIFT, Touch
 
 MIN_APART = 0.1  # of the certified length, between two ends
 MAX_WIDE = 0.1  # of the distance of the ends, that touches of one end may scatter
@@ -101,6 +101,7 @@ def measure_length(
     limits: VerificationLimits,
     *,
     certified_uncertainty: float = 0.0,
+    drift: FloatArray = NO_DRIFT,
 ) -> Length:
     """Measure a length at one or several places.
 
@@ -110,6 +111,8 @@ def measure_length(
         Name and touches of each place: both ends, each once or more.
     certified, certified_uncertainty : float
         The length and U (k = 2) of it, mm.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
 
     Raises
     ------
@@ -123,7 +126,7 @@ def measure_length(
         span = middles[1] - middles[0]
         length = float(np.linalg.norm(span))
         along = span / length
-        row, noise = np.zeros(len(instrument.covariance)), 0.0
+        row, noise = np.zeros(len(instrument.covariance)), float(along**2 @ drift**2)
         for end, sign in zip(ends, (-1.0, 1.0), strict=True):
             for touch in end:
                 row += sign / len(end) * along @ touch.sensitivity

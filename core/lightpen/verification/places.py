@@ -1,17 +1,52 @@
-"""Where images of touches are: folders, patterns and videos, and records of swings."""
+"""Where images of touches are: folders, patterns and videos, and records of swings.
+
+Those of a rig are in a folder for each camera, named as the rig file names it, in the
+folder of a run; or in a record.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.formats.files import FOLDER, unreadable
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.files import FOLDER, printable, unreadable
+from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.formats.images import ImageSource, find_images, natural_order
+from lightpen.formats.rig_files import RigFile, read_rig
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
-from lightpen.record.reading import is_record, open_record, recorded_origin, source
+from lightpen.model.rig import Rig, rig_of
+from lightpen.record.reading import (
+    Record,
+    RecordSource,
+    is_record,
+    open_record,
+    recorded_origin,
+    source,
+)
 from lightpen.record.recordings import is_simulated_recording
+from lightpen.sentences import sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Viewers:
+    """The cameras that look at the pen, one or those of a rig.
+
+    Attributes
+    ----------
+    files : tuple of InputFile
+        The camera file; or the rig file, and those of all its cameras.
+    """
+
+    rig: Rig
+    files: tuple[InputFile, ...]
+
+    @property
+    def hashes(self) -> tuple[str, ...]:
+        """SHA-256 of their files: what tells whether they are the same."""
+        return tuple(file.sha256 for file in self.files)
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,22 +55,63 @@ class TouchPlace:
 
     Attributes
     ----------
-    mask : (M, 3) array or None
-        Circles of stray light: centre x, y and radius, px.
+    images : tuple of ImageSource
+        Of each camera.
+    masks : tuple of (M, 3) array or None
+        Circles of stray light before each camera: centre x, y and radius, px.
+    touches : tuple of int or None
+        Which touch each image is of, from 1, or 0 where it takes no part; None of
+        images of which nobody said so.
     """
 
     name: str
-    images: ImageSource
+    images: tuple[ImageSource, ...]
     origin: Origin | None
-    camera: Camera | None = None
-    camera_file: Path | None = None
+    viewers: Viewers | None = None
     pen: Pen | None = None
     pen_file: Path | None = None
-    mask: FloatArray | None = None
+    masks: tuple[FloatArray | None, ...] = (None,)
+    touches: tuple[int, ...] | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Files of all images."""
+        return tuple(file for each in self.images for file in each.files)
 
 
-def touch_place(where: tuple[str, ...]) -> TouchPlace:
+def viewers_of_camera(camera: Camera, file: Path) -> Viewers:
+    """Return a single camera that was read from a file."""
+    return Viewers(rig_of(camera), all_hashed([file]))
+
+
+def viewers_of_rig(file: RigFile) -> Viewers:
+    """Return the cameras of a rig file."""
+    return Viewers(file.rig, all_hashed([file.path, *file.camera_files]))
+
+
+def read_viewers(camera_file: Path | None, rig_file: Path | None) -> Viewers | None:
+    """Read a camera file or a rig file; None of neither.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is not what it must be.
+    """
+    if rig_file is not None:
+        return viewers_of_rig(read_rig(rig_file))
+    if camera_file is not None:
+        return viewers_of_camera(read_camera(camera_file), camera_file)
+    return None
+
+
+def touch_place(where: tuple[str, ...], rig: Rig | None = None) -> TouchPlace:
     """Return a place as `lightpen.formats.images.find_images` takes it, or a record.
+
+    Parameters
+    ----------
+    rig : Rig, optional
+        That the images are of; what is given is then a place for each camera, or a
+        folder that holds one for each.
 
     Raises
     ------
@@ -48,21 +124,61 @@ def touch_place(where: tuple[str, ...]) -> TouchPlace:
         own = source(record)
         return TouchPlace(
             name=where[0],
-            images=own.images,
+            images=(own.images, *own.other_images),
             origin=recorded_origin(record),
-            camera=own.camera,
-            camera_file=own.camera_files[0],
+            viewers=_recorded_viewers(own),
             pen=own.pen,
             pen_file=own.pen_file,
-            mask=own.masks[0],
+            masks=own.masks,
+            touches=_recorded_touches(record),
         )
     is_simulated = is_simulated_recording(where[0])
     origin = Origin.SIMULATED if is_simulated else Origin.RECORDED
-    return TouchPlace(where[0], find_images(*where), origin)
+    if rig is None or rig.n_cameras == 1:
+        return TouchPlace(where[0], (find_images(*where),), origin)
+    images = tuple(map(find_images, _of_each_camera(where, rig)))
+    return TouchPlace(where[0], images, origin, masks=(None,) * rig.n_cameras)
 
 
-def runs_at(place: str) -> tuple[str, ...]:
+def _recorded_touches(record: Record) -> tuple[int, ...] | None:
+    """Return which touches the images of a verification are of; None of a swing."""
+    if not any(image.touch for image in record.images):
+        return None
+    out = record.taken_out
+    return tuple(0 if i.number in out else i.touch for i in record.images)
+
+
+def _recorded_viewers(own: RecordSource) -> Viewers:
+    if own.rig is None or own.rig_file is None:
+        return viewers_of_camera(own.camera, own.camera_files[0])
+    return Viewers(own.rig, all_hashed([own.rig_file, *own.camera_files]))
+
+
+def _of_each_camera(where: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
+    """Return the places of the images of each camera."""
+    if len(where) == rig.n_cameras:
+        return where
+    folders = [Path(where[0]) / name for name in rig.names]
+    if len(where) > 1 or not all(map(Path.is_dir, folders)):
+        raise FileError(
+            sentence(
+                "verification.no-rig-folders",
+                "{place} holds no images of two cameras. Give a folder with one folder "
+                "for each camera in it, named as in the rig file: {names}.",
+                place=printable(where[0]),
+                names=", ".join(rig.names),
+            )
+        )
+    return tuple(map(str, folders))
+
+
+def runs_at(place: str, rig: Rig | None = None) -> tuple[str, ...]:
     """Return the runs at a place: itself, or the folders in it if they hold the images.
+
+    Parameters
+    ----------
+    rig : Rig, optional
+        That the images are of.
 
     Raises
     ------
@@ -73,16 +189,16 @@ def runs_at(place: str) -> tuple[str, ...]:
     if is_record(folder):
         return (place,)
     try:
-        find_images(place)
+        touch_place((place,), rig)
     except FileError:
-        runs = _folders_with_images(folder)
+        runs = _folders_with_images(folder, rig)
         if not runs:
             raise
         return runs
     return (place,)
 
 
-def _folders_with_images(folder: Path) -> tuple[str, ...]:
+def _folders_with_images(folder: Path, rig: Rig | None) -> tuple[str, ...]:
     if not folder.is_dir():
         return ()
     try:
@@ -90,14 +206,14 @@ def _folders_with_images(folder: Path) -> tuple[str, ...]:
     except OSError as error:
         raise unreadable(folder, FOLDER, error) from error
     inner.sort(key=lambda path: natural_order(path.name))
-    return tuple(str(path) for path in inner if _holds_images(path))
+    return tuple(str(path) for path in inner if _holds_images(path, rig))
 
 
-def _holds_images(folder: Path) -> bool:
+def _holds_images(folder: Path, rig: Rig | None) -> bool:
     if is_record(folder):
         return True
     try:
-        find_images(str(folder))
+        touch_place((str(folder),), rig)
     except FileError:
         return False
     return True

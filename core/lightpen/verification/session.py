@@ -30,7 +30,7 @@ from lightpen.verification.circle import (
 from lightpen.verification.fixed_point import FixedPoint, measure_fixed_point
 from lightpen.verification.length import Length, measure_length
 from lightpen.verification.sources import require_leds_fit
-from lightpen.verification.touch import Touch, measure_touches
+from lightpen.verification.touch import NO_DRIFT, Touch, measure_touches
 from lightpen.verification.touching import (
     TouchEvent,
     TouchHappening,
@@ -87,6 +87,8 @@ class SessionSetup:
         Of the tip, mm; needed where a ring is touched in a bore or round a boss.
     nominal_tip, cone_cam : (3,) array or None
         See `lightpen.verification.fixed_point.measure_fixed_point`.
+    drift : (3,) array
+        Standard uncertainty of a point by a camera that moved meanwhile, mm.
     """
 
     instrument: Instrument
@@ -94,6 +96,7 @@ class SessionSetup:
     ball_diameter: float | None = None
     nominal_tip: FloatArray | None = None
     cone_cam: FloatArray | None = None
+    drift: FloatArray = field(default_factory=NO_DRIFT.copy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,17 +220,20 @@ def measure(setup: SessionSetup, task: TaskKind, runs: Runs) -> Found:
             return measure_fixed_point(
                 [touch for _, touches in runs for touch in touches],
                 *(instrument, choices.limits, setup.nominal_tip, setup.cone_cam),
+                drift=setup.drift,
             )
         case TaskKind.CIRCLE:
             return measure_circle(
                 *(runs, instrument, choices.radius, choices.limits),
                 certified_uncertainty=choices.radius_uncertainty,
                 ball_offset=ball_offset(choices.surface, setup.ball_diameter),
+                drift=setup.drift,
             )
         case TaskKind.LENGTH:
             return measure_length(
                 *(runs, instrument, choices.length, choices.limits),
                 certified_uncertainty=choices.length_uncertainty,
+                drift=setup.drift,
             )
 
 

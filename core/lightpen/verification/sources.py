@@ -7,31 +7,33 @@ from pathlib import Path
 
 import numpy as np
 
-from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_images
 from lightpen.detection.reasons import counted
+from lightpen.detection.rig_observations import observe_rig_images
+from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting, sight_centers, unseen
 from lightpen.errors import CalibrationError, UsageError
 from lightpen.estimation.instrument import (
     Instrument,
     instrument_of_files,
-    with_camera,
+    with_rig,
 )
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.formats.files import printable, sha256
-from lightpen.formats.images import ImageSource
+from lightpen.formats.pairing import pair_images
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
-from lightpen.record.calibrations import CalibrationFile
+from lightpen.model.rig import Rig
+from lightpen.record.calibrations import CalibrationFile, FittedInstrument
 from lightpen.sentences import Sentence, sentence
+from lightpen.verification.places import TouchPlace, Viewers
 from lightpen.verification.touch import (
     RejectedFrame,
     StillFrames,
     Touch,
-    TouchFrame,
     measure_touches,
 )
-from lightpen.verification.touching import TouchRules, take_all
+from lightpen.verification.touching import TouchRules, take_all, touch_frame
 
 MAX_RMS = 1.0  # px; LED errors of 0.3 mm make this
 
@@ -54,16 +56,12 @@ class TouchRun:
 
 
 def instrument_of(
-    calibration: CalibrationFile,
-    camera: Camera,
-    camera_file: Path,
-    pen: Pen,
-    pen_file: Path,
+    calibration: CalibrationFile, viewers: Viewers, pen: Pen, pen_file: Path
 ) -> Instrument:
     """Return the instrument that a calibration left.
 
-    Before another camera than that of the calibration, tip and LEDs are as the swing
-    left them and the camera is as its file has it.
+    Before other cameras than those of the calibration, tip and LEDs are as the swing
+    left them and the cameras are as their files have them.
 
     Raises
     ------
@@ -84,58 +82,86 @@ def instrument_of(
             )
         )
     fitted = calibration.instrument
-    if fitted is None or calibration.method != "joint":
+    is_whole = fitted is not None and calibration.is_of_rig == bool(fitted.others)
+    if fitted is None or not is_whole or calibration.method != "joint":
         return instrument_of_files(
-            camera,
+            viewers.rig,
             pen,
             calibration.tip_pen,
             calibration.covariance[:3, :3],
             calibration.sigma,
         )
-    same_camera = sha256(camera_file) == calibration.camera_sha256 and len(
-        camera.intrinsics
-    ) == len(fitted.intrinsics)
     instrument = Instrument(
-        camera=camera.with_intrinsics(fitted.intrinsics),
+        rig=_fitted_rig(viewers, fitted),
         pen=replace(pen, leds=fitted.leds, diameter=fitted.diameter),
         tip_pen=calibration.tip_pen,
         covariance=fitted.covariance,
         sigma=calibration.sigma,
     )
-    return instrument if same_camera else with_camera(instrument, camera)
+    is_same = viewers.hashes == calibration.seen_by
+    return instrument if is_same else with_rig(instrument, viewers.rig)
 
 
-def touch_run(
-    name: str,
-    images: ImageSource,
-    instrument: Instrument,
-    rules: TouchRules,
-    mask: FloatArray | None = None,
-) -> TouchRun:
+def _fitted_rig(viewers: Viewers, fitted: FittedInstrument) -> Rig:
+    """Return the cameras as a swing left them."""
+    one = viewers.rig.cameras[0]  # whose images are as large
+    of_files = dict(enumerate(viewers.rig.cameras))
+    intrinsics = [fitted.intrinsics, *(other.intrinsics for other in fitted.others)]
+    return replace(
+        viewers.rig,
+        cameras=tuple(
+            of_files.get(c, one).with_intrinsics(each)
+            for c, each in enumerate(intrinsics)
+        ),
+        rotations=np.array([np.eye(3), *(other.rotation for other in fitted.others)]),
+        translations=np.array(
+            [np.zeros(3), *(other.translation for other in fitted.others)]
+        ),
+        covariance=None,
+    )
+
+
+def touch_run(place: TouchPlace, instrument: Instrument, rules: TouchRules) -> TouchRun:
     """Find the touches in images.
 
     With one image a touch, and none to settle, each image is a touch; else the pen must
-    be held still through as many as the rules say.
+    be held still through as many as the rules say. Images of which it is recorded what
+    touch they are of need no rules.
 
     Raises
     ------
     FileError
-        No image can be read.
+        No image can be read, or those of two cameras are of other moments.
     CalibrationError
         No image shows the pen, or its LEDs are not those of the pen.
     """
-    seen = observe_images(images, instrument.camera, instrument.pen, mask=mask)
-    return touches_of(name, seen, instrument, rules)
+    rig, pen = instrument.rig, instrument.pen
+    if len(place.images) != rig.n_cameras:
+        raise _other_number(place, rig)
+    if rig.n_cameras == 1:
+        images, mask = place.images[0], place.masks[0]
+        alone = observe_images(images, instrument.camera, pen, mask=mask)
+        return touches_of(place.name, [alone], instrument, rules, place.touches)
+    pairing = pair_images([each.names for each in place.images], rig.names)
+    seen = observe_rig_images(place.images, pairing, rig, pen, masks=place.masks)
+    return touches_of(place.name, seen, instrument, rules, place.touches)
 
 
 def touches_of(
-    name: str, seen: Observations, instrument: Instrument, rules: TouchRules
+    name: str,
+    seen: Sequence[Observations],
+    instrument: Instrument,
+    rules: TouchRules,
+    touches_known: Sequence[int] | None = None,
 ) -> TouchRun:
-    """Return the touches in what images show; see `touch_run`."""
-    fit = [i for i, reason in enumerate(seen.reasons) if not reason]
-    if not fit:
-        raise _no_pen(name, seen)
-    held = _held(seen, fit, instrument, rules)
+    """Return the touches in what the images of each camera show; see `touch_run`."""
+    images = _sightings(seen, instrument)
+    if not any(sighting.has_pose for _, sighting in images):
+        raise _no_pen(name, seen[0])
+    if touches_known is None:
+        held = _held(images, instrument, rules)
+    else:
+        held = _held_as_recorded(images, touches_known)
     if not held:
         raise CalibrationError(
             sentence(
@@ -150,9 +176,9 @@ def touches_of(
     require_leds_fit(name, touches)
     named = {each.name for touch in touches for each in touch.rejected}
     rejected = tuple(
-        RejectedFrame(image, reason)
-        for image, reason in zip(seen.names, seen.reasons, strict=True)
-        if reason and image not in named
+        RejectedFrame(image, sighting.reason)
+        for image, sighting in images
+        if not sighting.has_pose and image not in named
     )
     return TouchRun(name, touches, rejected)
 
@@ -180,36 +206,72 @@ def require_leds_fit(name: str, touches: Sequence[Touch]) -> None:
 
 
 def _held(
-    seen: Observations, fit: list[int], instrument: Instrument, rules: TouchRules
+    images: Sequence[tuple[str, Sighting]], instrument: Instrument, rules: TouchRules
 ) -> tuple[StillFrames, ...]:
-    if rules.n_frames + rules.n_settling == 1:
-        return tuple(
-            StillFrames(
-                (
-                    TouchFrame(
-                        seen.names[i],
-                        seen.pixels[i],
-                        seen.rotations[i],
-                        seen.translations[i],
-                    ),
-                )
-            )
-            for i in fit
-        )
-    images = zip(seen.names, _sightings(seen, instrument), strict=True)
-    return take_all(instrument, rules, images).taken
+    if rules.n_frames + rules.n_settling > 1:
+        return take_all(instrument, rules, images).taken
+    return tuple(
+        StillFrames((touch_frame(name, sighting),))
+        for name, sighting in images
+        if sighting.has_pose
+    )
 
 
-def _sightings(seen: Observations, instrument: Instrument) -> list[Sighting]:
-    camera, pen = instrument.camera, instrument.pen
-    return [
-        unseen(pen, reason)
-        if reason
-        else sight_centers(camera, pen, pixels, rotation, translation)
-        for reason, pixels, rotation, translation in zip(
-            seen.reasons, seen.pixels, seen.rotations, seen.translations, strict=True
+def _held_as_recorded(
+    images: Sequence[tuple[str, Sighting]], touches: Sequence[int]
+) -> tuple[StillFrames, ...]:
+    """Return the images of each touch; 0 of those that are of none."""
+    by_touch: dict[int, list[tuple[str, Sighting]]] = {}
+    for image, touch in zip(images, touches, strict=True):
+        if touch:
+            by_touch.setdefault(touch, []).append(image)
+    held = (
+        StillFrames(
+            tuple(touch_frame(*image) for image in own if image[1].has_pose),
+            tuple(
+                RejectedFrame(name, seen.reason)
+                for name, seen in own
+                if not seen.has_pose
+            ),
         )
-    ]
+        for own in by_touch.values()
+    )
+    return tuple(still for still in held if still.frames)
+
+
+def _sightings(
+    seen: Sequence[Observations], instrument: Instrument
+) -> list[tuple[str, Sighting]]:
+    """Return name and sighting of each moment, by all cameras together."""
+    rig, pen = instrument.rig, instrument.pen
+    images = []
+    for i, name in enumerate(seen[0].names):
+        views = [_sighting(rig.cameras[c], pen, each, i) for c, each in enumerate(seen)]
+        sighting = replace(views[0], others=tuple(views[1:]))
+        name = name or next(each.names[i] for each in seen if each.names[i])
+        images.append((name, see_together(rig, pen, sighting)))
+    return images
+
+
+def _sighting(camera: Camera, pen: Pen, seen: Observations, i: int) -> Sighting:
+    if seen.reasons[i]:
+        return unseen(pen, seen.reasons[i])
+    return sight_centers(
+        camera, pen, seen.pixels[i], seen.rotations[i], seen.translations[i]
+    )
+
+
+def _other_number(place: TouchPlace, rig: Rig) -> UsageError:
+    return UsageError(
+        sentence(
+            "verification.other-number-of-cameras",
+            "{place} holds the images of {n_given} cameras, and the tip is verified "
+            "by {n_cameras}. Give the camera file, or the rig file, of these images.",
+            place=printable(place.name),
+            n_given=len(place.images),
+            n_cameras=rig.n_cameras,
+        )
+    )
 
 
 def _no_pen(name: str, seen: Observations) -> CalibrationError:

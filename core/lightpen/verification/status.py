@@ -95,7 +95,7 @@ class VerificationStatus:
         found = None if self.state is None else self.state.assessment
         if found is None or self.witness is None:
             return found
-        return worst((found, self.witness.assessment))
+        return worst((self.witness.assessment, found))  # it explains the others
 
 
 class VerificationListener(Protocol):

@@ -16,7 +16,12 @@ from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.sentences import sentence
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.places import TouchPlace
+from lightpen.verification.places import (
+    TouchPlace,
+    Viewers,
+    viewers_of_camera,
+    viewers_of_rig,
+)
 from lightpen.verification.sources import instrument_of
 
 
@@ -32,8 +37,8 @@ class TipInForce:
         What the images of its verification are of.
     nominal_tip, cone_cam : (3,) array or None
         mm; the cone of the calibration is not known before another camera.
-    mask : (M, 3) array
-        Circles of stray light: centre x, y and radius, px.
+    masks : tuple of (M, 3) array
+        Circles of stray light before each camera: centre x, y and radius, px.
     """
 
     names: Names
@@ -42,15 +47,20 @@ class TipInForce:
     instrument: Instrument
     nominal_tip: FloatArray | None
     cone_cam: FloatArray | None
-    mask: FloatArray
+    masks: tuple[FloatArray, ...]
+    viewers: Viewers
     tip_file: InputFile
-    camera_file: InputFile
     pen_file: InputFile
 
     @property
     def aim(self) -> Aim:
         """What to look for in the images."""
-        return Aim(self.instrument.camera, self.instrument.pen, self.mask)
+        pen, rig = self.instrument.pen, self.instrument.rig
+        first, *others = (
+            Aim(camera, pen, mask)
+            for camera, mask in zip(rig.cameras, self.masks, strict=True)
+        )
+        return replace(first, others=tuple(others))
 
     def is_like(self, other: "TipInForce") -> bool:
         """Return whether touches with the other tip are touches with this one."""
@@ -58,9 +68,9 @@ class TipInForce:
             self.names == other.names
             and self.origin is other.origin
             and self.tip_file == other.tip_file
-            and self.camera_file == other.camera_file
+            and self.viewers.hashes == other.viewers.hashes
             and self.pen_file == other.pen_file
-            and np.array_equal(self.mask, other.mask)
+            and all(map(np.array_equal, self.masks, other.masks))
         )
 
 
@@ -78,17 +88,10 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> TipIn
         There is none, its result was changed, or it is of another LED file.
     """
     names, origin = preparation.names, preparation.origin
-    if preparation.second is not None:
-        raise UsageError(
-            sentence(
-                "verification.two-cameras",
-                "Two cameras look at the pen, and a tip is verified by one. Choose a "
-                "single camera with its intrinsics file.",
-            )
-        )
-    camera_file, pen_file = preparation.camera_file, preparation.pen_file
-    if camera_file is None or pen_file is None:
-        raise ValueError("`camera_file` and `pen_file` must be chosen.")
+    pen_file = preparation.pen_file
+    viewers = _viewers(preparation)
+    if viewers is None or pen_file is None:
+        raise ValueError("Cameras and `pen_file` must be chosen.")
     file = archive.file_in_force(
         names.pen, names.tip, is_simulated=origin is Origin.SIMULATED
     )
@@ -103,24 +106,20 @@ def read_tip_in_force(archive: FolderArchive, preparation: Preparation) -> TipIn
             )
         )
     calibration = read_calibration(file)
-    instrument = instrument_of(
-        *(calibration, camera_file.camera, camera_file.path),
-        *(pen_file.pen, pen_file.path),
-    )
+    instrument = instrument_of(calibration, viewers, pen_file.pen, pen_file.path)
     nominal_tip = preparation.nominal_tip
     for known in (pen_file.pen.nominal_tip, calibration.nominal_tip):
         nominal_tip = known if nominal_tip is None else nominal_tip
-    camera = hashed(camera_file.path)
     return TipInForce(
         names=names,
         origin=origin,
         calibration=calibration,
         instrument=instrument,
         nominal_tip=nominal_tip,
-        cone_cam=_cone_cam(calibration, camera),
-        mask=preparation.mask,
+        cone_cam=cone_before(calibration, viewers),
+        masks=tuple(map(preparation.mask_of, range(viewers.rig.n_cameras))),
+        viewers=viewers,
         tip_file=hashed(file),
-        camera_file=camera,
         pen_file=hashed(pen_file.path),
     )
 
@@ -133,20 +132,29 @@ def tip_at(tip: TipInForce, place: TouchPlace) -> TipInForce:
     UsageError
         They are of another pen.
     """
-    camera, pen, pen_file = place.camera, place.pen, place.pen_file
-    if camera is None or place.camera_file is None or pen is None or pen_file is None:
+    viewers, pen, pen_file = place.viewers, place.pen, place.pen_file
+    if viewers is None or pen is None or pen_file is None:
         return tip
-    calibration, camera_file = tip.calibration, hashed(place.camera_file)
     return replace(
         tip,
-        instrument=instrument_of(calibration, camera, place.camera_file, pen, pen_file),
-        cone_cam=_cone_cam(calibration, camera_file),
-        camera_file=camera_file,
+        instrument=instrument_of(tip.calibration, viewers, pen, pen_file),
+        cone_cam=cone_before(tip.calibration, viewers),
+        viewers=viewers,
         pen_file=hashed(pen_file),
     )
 
 
-def _cone_cam(calibration: CalibrationFile, camera: InputFile) -> FloatArray | None:
-    """Return where the calibration had the cone, before the same camera."""
-    is_same = camera.sha256 == calibration.camera_sha256
+def cone_before(calibration: CalibrationFile, viewers: Viewers) -> FloatArray | None:
+    """Return where the calibration had the cone, (3,), mm; None before others."""
+    is_same = viewers.hashes == calibration.seen_by
     return calibration.cone_cam if is_same else None
+
+
+def _viewers(preparation: Preparation) -> Viewers | None:
+    """Return the cameras that are chosen."""
+    rig_file, camera_file = preparation.rig_file, preparation.camera_file
+    if preparation.second is not None:
+        return None if rig_file is None else viewers_of_rig(rig_file)
+    if camera_file is None:
+        return None
+    return viewers_of_camera(camera_file.camera, camera_file.path)

@@ -6,39 +6,43 @@ what is not known of tip, LEDs and camera, which all touches share. The latter i
 as the derivative of the point by these parameters, so that it drops out of a difference
 of two points as far as it moves both alike.
 
-With the derivative ``J`` of the LED centres by the pose and ``K`` by the parameters
-``p`` a pose follows an error of them by ``-(J^T W J)^-1 J^T W K dp``.
+Several cameras make one pose of the pen by all their images together, in the frame of
+the first. With the derivative ``J`` of the LED centres by the pose and ``K`` by the
+parameters ``p`` a pose follows an error of them by ``-(J^T W J)^-1 J^T W K dp``.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.pose import Poses, disc_residuals, fit_poses, normal_equations
+from lightpen.detection.pose import Poses, disc_residuals, normal_equations
 from lightpen.detection.reasons import Reason
+from lightpen.detection.rig_pose import fit_rig_poses, in_rig
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI, in_deviations, tip_covariances
 from lightpen.model.rigid import nearest_rotation, skew
 
 KNOWN_FREEDOM = 30  # degrees, that the noise of the calibration counts for
 POSE_UNKNOWNS = 6
+NO_DRIFT = np.zeros(3)  # mm
 UPRIGHT_AXIS = np.array([0.0, 1.0, 0.0])  # of the pen, away from its tip
 
 
 @dataclass(frozen=True, eq=False)
 class TouchFrame:
-    """The pen in one image.
+    """The pen in one image, or in those of several cameras at one moment.
 
     Attributes
     ----------
     name : str
         File or frame.
-    pixels : (L, 2) array
-        Ellipse centres of the LEDs, px; NaN where an LED was not seen.
+    pixels : (C, L, 2) array
+        Ellipse centres of the LEDs in each camera, px; NaN where one was not seen.
     rotation, translation : (3, 3) and (3,) array
-        Rough cam_from_pen, mm.
+        Rough cam_from_pen of the first camera, mm.
     """
 
     name: str
@@ -140,8 +144,8 @@ def measure_touches(
     if not held:
         return ()
     frames = [frame for still in held for frame in still.frames]
-    poses = fit_poses(
-        instrument.camera,
+    poses = fit_rig_poses(
+        instrument.rig,
         instrument.pen,
         np.array([frame.pixels for frame in frames]),
         np.array([frame.rotation for frame in frames]),
@@ -216,10 +220,48 @@ def joint_covariance(
 
 def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
     """Return the derivatives (N, 3, q) of the tip in the camera by the parameters."""
-    camera, pen, at = instrument.camera, instrument.pen, instrument.parameters
     R = poses.rotations
+    views = [_view(instrument, c, poses) for c in range(instrument.rig.n_cameras)]
+    J = np.concatenate([view.by_pose for view in views], axis=1)
+    K = np.concatenate([view.by_parameters for view in views], axis=1)
+    n_images, n_centers = J.shape[:2]
+    weights = poses.weights
+    H, _ = normal_equations(J, np.zeros((n_images, n_centers, 2)), weights)
+    weighted = J.reshape(n_images, -1, 6) * np.repeat(weights, 2, axis=1)[..., None]
+    follows = np.linalg.solve(
+        H, np.swapaxes(weighted, 1, 2) @ K.reshape(n_images, 2 * n_centers, -1)
+    )
+    by_pose = np.concatenate(
+        [-skew(R @ instrument.tip_pen), np.broadcast_to(np.eye(3), R.shape)], axis=2
+    )
+    sensitivities = -by_pose @ follows
+    sensitivities[..., instrument.parameters.tip] += R
+    return np.asarray(sensitivities)
+
+
+class _View(NamedTuple):
+    """How the centres in the images of a camera follow poses and parameters.
+
+    Attributes
+    ----------
+    by_pose : (N, L, 2, 6) array
+        By that of the pen in the rig.
+    by_parameters : (N, L, 2, q) array
+        By those of the instrument.
+    """
+
+    by_pose: FloatArray
+    by_parameters: FloatArray
+
+
+def _view(instrument: Instrument, c: int, poses: Poses) -> _View:
+    """Return how the images of the c-th camera follow poses rig_from_pen."""
+    rig, pen, at = instrument.rig, instrument.pen, instrument.parameters
+    camera, turn = rig.cameras[c], rig.rotations[c]
+    R = turn @ poses.rotations
     lever = pen.leds @ np.swapaxes(R, 1, 2)
-    centers = lever + poses.translations[:, None]
+    from_rig = lever + (poses.translations @ turn.T)[:, None]
+    centers = from_rig + rig.translations[c]
     normals = pen.normals @ np.swapaxes(R, 1, 2)
     n_images, n_leds = lever.shape[:2]
     nowhere = np.zeros((n_images, n_leds, 2))
@@ -227,8 +269,12 @@ def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
         camera, lever, centers, normals, pen.diameter / 2, nowhere
     )
     normalised = centers[..., :2] / centers[..., 2:]
-    K = np.zeros((n_images, n_leds, 2, at.leds.stop))
-    K[..., at.intrinsics] = camera.intrinsics_jacobian(normalised)
+    K = np.zeros((n_images, n_leds, 2, at.number))
+    K[..., at.cameras[c]] = camera.intrinsics_jacobian(normalised)
+    if c > 0:
+        start = at.extrinsics.start + 6 * (c - 1)
+        by_turn = np.cross(from_rig[:, :, None], J[..., 3:])
+        K[..., start : start + 3], K[..., start + 3 : start + 6] = by_turn, J[..., 3:]
     # The centre of a disc's image lies off that of the disc with the diameter squared.
     offset = -modelled - camera.pixels(normalised)
     K[..., at.diameter] = (2 / pen.diameter * offset)[..., None]
@@ -236,18 +282,7 @@ def point_sensitivities(instrument: Instrument, poses: Poses) -> FloatArray:
     for j in range(n_leds):
         own = slice(at.leds.start + 3 * j, at.leds.start + 3 * j + 3)
         K[:, j, :, own] = by_led[:, j]
-    weights = poses.weights
-    H, _ = normal_equations(J, np.zeros_like(nowhere), weights)
-    weighted = J.reshape(n_images, -1, 6) * np.repeat(weights, 2, axis=1)[..., None]
-    follows = np.linalg.solve(
-        H, np.swapaxes(weighted, 1, 2) @ K.reshape(n_images, 2 * n_leds, -1)
-    )
-    by_pose = np.concatenate(
-        [-skew(R @ instrument.tip_pen), np.broadcast_to(np.eye(3), R.shape)], axis=2
-    )
-    sensitivities = -by_pose @ follows
-    sensitivities[..., at.tip] += R
-    return np.asarray(sensitivities)
+    return _View(in_rig(J, turn), K)
 
 
 def _pooled_sigma(instrument: Instrument, poses: Poses) -> float:

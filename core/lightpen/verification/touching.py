@@ -144,7 +144,7 @@ def advance(
     name: str,
     sighting: Sighting,
 ) -> TouchTransition:
-    """Take one more image."""
+    """Take one more image, of several cameras what they saw together."""
     if not sighting.has_pose or sighting.is_blurred:
         reason = sighting.reason or Reason.BLURRED
         return _without_pose(state, RejectedFrame(name, reason))
@@ -178,14 +178,21 @@ def take_all(
     return state
 
 
+def touch_frame(name: str, sighting: Sighting) -> TouchFrame:
+    """Return what images with a pose show of the pen."""
+    return TouchFrame(
+        name, sighting.rig_pixels, sighting.rotation, sighting.translation
+    )
+
+
 def _seen(instrument: Instrument, name: str, sighting: Sighting) -> SeenTip:
-    frame = TouchFrame(name, sighting.pixels, sighting.rotation, sighting.translation)
     R = sighting.rotation
     sigma = max(sighting.sigma, instrument.sigma)
     noise = tip_covariances(
         R[None], sighting.cofactors[None] * sigma**2, instrument.tip_pen
     )[0]
-    return SeenTip(frame, R @ instrument.tip_pen + sighting.translation, noise)
+    tip_cam = R @ instrument.tip_pen + sighting.translation
+    return SeenTip(touch_frame(name, sighting), tip_cam, noise)
 
 
 def _name(seen: SeenTip) -> str:

@@ -3,7 +3,8 @@
 A camera that turns by an angle shifts all that it sees alike, so that a point at the
 distance w seems to move by ``w / f`` times the shift of a lamp. The images of all
 touches are parted into blocks in the order of time: what the lamps moved by from the
-first block to any other is told beside what the noise of their centres makes of it.
+first block to any other is told beside what the noise of their centres makes of it,
+and counts in U of what was touched.
 """
 
 from dataclasses import dataclass, field
@@ -21,11 +22,11 @@ from lightpen.verification.assessment import (
     VERIFY_AGAIN,
     Conformity,
     accepted,
-    check,
+    refused,
 )
 
-BLOCK = 8  # images
-MIN_BLOCKS = 3  # before, during and after
+BLOCK = 8  # images, at least
+MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less noisy
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,16 @@ class LampWitness:
     assessment: Conformity = field(repr=False)
 
     @property
+    def share(self) -> FloatArray:
+        """Standard uncertainty by it of what is touched meanwhile, (3,), mm.
+
+        The camera may have been anywhere between, as `lightpen.verification.drift` has
+        it; along the view lamps tell nothing.
+        """
+        farthest = np.abs(self.moves).max(axis=0)
+        return np.asarray(np.append(farthest, 0.0) / np.sqrt(3))
+
+    @property
     def moved(self) -> float:
         """The farthest move, mm."""
         return float(np.linalg.norm(self.moves, axis=1).max())
@@ -101,7 +112,7 @@ def witnessed_by(
     """
     lamps = lamps[np.isfinite(lamps[..., 0]).any(axis=1)]
     n_images, n_lamps = lamps.shape[:2]
-    n_blocks = n_images // BLOCK
+    n_blocks = min(n_images // BLOCK, MAX_BLOCKS)
     if not n_lamps or n_blocks < MIN_BLOCKS:
         return None
     places = np.nanmean(lamps, axis=0)
@@ -111,8 +122,9 @@ def witnessed_by(
     noise = np.concatenate(
         [part - mean for part, mean in zip(blocks, means, strict=True)]
     )
-    spread = float(np.sqrt(np.nanmean(noise**2) * BLOCK / (BLOCK - 1)))
-    uncertainty = COVERAGE_FACTOR * scale * spread * float(np.sqrt(2 / BLOCK))
+    length = n_images / n_blocks
+    spread = float(np.sqrt(np.nanmean(noise**2) * length / (length - 1)))
+    uncertainty = COVERAGE_FACTOR * scale * spread * float(np.sqrt(2 / length))
     moves = scale * (means - means[0])
     return LampWitness(places, moves, uncertainty, _judged(moves, uncertainty, limits))
 
@@ -126,6 +138,7 @@ def witness_entries(witness: LampWitness | None) -> dict[str, Any] | None:
         "moves_mm": witness.moves,
         "moved_mm": witness.moved,
         "expanded_uncertainty_mm": witness.uncertainty,
+        "standard_uncertainty_share_mm": witness.share,
         "grade": witness.assessment.grade.value,
     }
 
@@ -135,12 +148,12 @@ def _judged(
 ) -> Conformity:
     moved = float(np.linalg.norm(moves, axis=1).max())
     if moved > limits.drift:
-        return check(
+        return refused(
             sentence(
                 "witness.moved",
                 "The camera moved: fixed lamps in view shift by {moved:.4f} mm where "
                 "the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was "
-                "touched is off by as much.",
+                "touched is off by as much, which its U counts.",
                 moved=moved,
                 uncertainty=uncertainty,
                 limit=limits.drift,

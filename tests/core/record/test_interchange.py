@@ -48,6 +48,7 @@ def made(pen: str = "LP-04", tip: str = "T-10") -> CalibrationFile:
         sigma=0.02,
         nominal_tip=None,
         camera_sha256="",
+        seen_by=("",),
         pen_sha256="",
         pen_file="",
         displacements=none,

@@ -9,6 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.estimation.instrument import Instrument, instrument_of_files
 from lightpen.model.posture import rotations_of
+from lightpen.model.rig import rig_of
 from lightpen.simulator.swings import (
     PAPER_TIP,
     paper_camera,
@@ -33,7 +34,7 @@ def instrument() -> Instrument:
     """The paper's camera and pen with files that are as they should be."""
     pen = replace(paper_pen(), led_sigma=0.002)
     return instrument_of_files(
-        paper_camera(), pen, PAPER_TIP, TIP_SIGMA**2 * np.eye(3), SIGMA
+        rig_of(paper_camera()), pen, PAPER_TIP, TIP_SIGMA**2 * np.eye(3), SIGMA
     )
 
 
@@ -65,7 +66,7 @@ def touching(instrument: Instrument) -> Touching:
             held.append(
                 StillFrames(
                     tuple(
-                        TouchFrame(f"touch {i + 1} image {k + 1}", each, R, t)
+                        TouchFrame(f"touch {i + 1} image {k + 1}", each[None], R, t)
                         for k, each in enumerate(pixels)
                     )
                 )

@@ -19,24 +19,34 @@ from tests.accepted_tip import (
     round_a_ring,
 )
 
-from lightpen.cameras.protocol import Frame, sealed
+from lightpen.cameras.clock import SkippingClock
+from lightpen.cameras.protocol import CameraSettings, Frame, sealed
 from lightpen.commands.verifications import read_fixed_point, read_scale
 from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import Sighting
+from lightpen.detection.sighting import Sighting, look
+from lightpen.estimation.verdict import Grade
 from lightpen.formats.decoding import encode_png
+from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
+from lightpen.model.rig import rig_of
 from lightpen.record.folder_archive import SIMULATED, FolderArchive
+from lightpen.record.journal import JOURNAL
+from lightpen.record.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.record.supervision import Signature, set_password
 from lightpen.sentences import Sentence
+from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
+from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
+from lightpen.verification.conclusion import CONCLUSION
 from lightpen.verification.keeping import VERIFICATIONS
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
+from lightpen.verification.touch_images import CONCLUDED, TOUCHES
 
 EVE = Signature("Eve", "correct horse")
 TIMEOUT = 60.0  # s until a test gives up
@@ -95,18 +105,38 @@ class Verifier:
         self.runner = VerificationRunner(
             FolderArchive(folder), folder, self.ear, lambda: NOON
         )
-        assert prepared.camera is not None
-        assert prepared.pen is not None
-        self.holder = Holder(prepared.camera, prepared.pen)
+        camera, pen, rig_file = prepared.camera, prepared.pen, prepared.rig_file
+        assert camera is not None
+        assert pen is not None
+        rig = rig_of(camera) if rig_file is None else rig_file.rig
+        self.holder = Holder(rig, pen)
 
     @property
     def status(self) -> VerificationStatus:
         return self.runner.status
 
     @property
+    def kept(self) -> Path:
+        return self.folder / SIMULATED / VERIFICATIONS
+
+    @property
     def records(self) -> list[dict[str, Any]]:
-        files = sorted((self.folder / SIMULATED / VERIFICATIONS).glob("*.json"))
+        """What each task found."""
+        return [each for each in self._all if each["verification"] != CONCLUSION]
+
+    @property
+    def conclusions(self) -> list[dict[str, Any]]:
+        return [each for each in self._all if each["verification"] == CONCLUSION]
+
+    @property
+    def _all(self) -> list[dict[str, Any]]:
+        files = sorted(self.kept.glob("*.json"))
         return [json.loads(file.read_bytes()) for file in files]
+
+    @property
+    def runs(self) -> list[Path]:
+        """Records of the images of live touches."""
+        return sorted((self.kept / TOUCHES).glob("*"))
 
     def come(self, choices: VerificationChoices = CHOICES) -> None:
         """Be at it, and wait until the tip is read."""
@@ -123,7 +153,8 @@ class Verifier:
         for sighting in sightings:
             wanted = aim or self.status.aim
             assert wanted is not None
-            self.runner.take(FRAME, sighting, wanted)
+            frame = replace(FRAME, others=(FRAME,) * (len(wanted.aims) - 1))
+            self.runner.take(frame, sighting, wanted)
 
     def touch(self, *holds: Hold) -> None:
         for hold in holds:
@@ -175,9 +206,35 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     assert abs(length["runs"][0]["error_mm"]) < 0.02
 
 
+def test_two_cameras_verify_a_tip_together(
+    verifier: Verifier, prepared_by_two: Preparation
+) -> None:
+    verifier.preparation = prepared_by_two
+    assert prepared_by_two.rig_file is not None
+    rig = prepared_by_two.rig_file.rig
+    verifier.holder = Holder(rig, verifier.holder.pen)
+    accept_tip(verifier.folder, prepared_by_two)
+    verifier.come()
+    aim = verifier.status.aim
+    assert aim is not None
+    assert len(aim.aims) == 2
+    verifier.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+
+    assert verifier.ear.troubles == []
+    assert verifier.ear.events[-1] is SessionHappening.DONE
+    point, circle, length = verifier.records
+    depths = [each["noise_covariance"][2][2] for each in point["touches"]]
+    assert max(depths) ** 0.5 < 0.008  # 0.02 by one camera alone
+    assert abs(circle["mean_error_mm"]) < 0.005
+    assert abs(length["runs"][0]["error_mm"]) < 0.02
+    assert point["inputs"]["rig"]["file"] == "rig.json"
+    names = [each["file"] for each in point["inputs"]["cameras"]]
+    assert names == ["camera.yaml", "camera-2.yaml"]
+
+
 def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
-    point, _, length = at_it.status.files
+    point, _, length, _ = at_it.status.files
 
     assert read_fixed_point(point).shape == (4, 3)
     assert read_scale(length).factor == pytest.approx(1.0, abs=1e-3)
@@ -190,10 +247,12 @@ def test_what_is_found_is_kept_before_the_next_task_begins(at_it: Verifier) -> N
     assert [each["verification"] for each in at_it.records] == ["fixed point"]
 
 
-def test_what_cannot_be_kept_is_told_and_kept_later(at_it: Verifier) -> None:
+def test_what_cannot_be_kept_is_told_and_kept_later(
+    at_it: Verifier, recorded: Path
+) -> None:
     in_the_way = at_it.folder / SIMULATED / VERIFICATIONS
     in_the_way.write_text("A file where the folder should be.")
-    at_it.touch(*leant(4))
+    at_it.read(TaskKind.FIXED_POINT, recorded)
     assert at_it.ear.troubles == ["results.no-folder"]
     assert at_it.status.state is not None
     assert at_it.status.state.fixed_point is not None
@@ -311,17 +370,20 @@ def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(
     assert len(at_it.records) == 1
 
 
-def test_recorded_images_do_a_task(
-    at_it: Verifier, prepared: Preparation, tmp_path: Path
-) -> None:
+@pytest.fixture(scope="module")
+def recorded(prepared: Preparation, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Five images of the pen in the cone, each in another posture."""
     assert prepared.camera is not None
     scene = Scene(n_images=5, camera=prepared.camera)
-    folder = tmp_path / "touches"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("touches")
     for plan in plan_scene(scene).image_plans:
         image = render_plan(scene, plan)
         (folder / f"{plan.index}.png").write_bytes(encode_png(image))
-    at_it.read(TaskKind.FIXED_POINT, folder)
+    return folder
+
+
+def test_recorded_images_do_a_task(at_it: Verifier, recorded: Path) -> None:
+    at_it.read(TaskKind.FIXED_POINT, recorded)
 
     assert at_it.status.state is not None
     assert at_it.status.state.fixed_point is not None
@@ -354,6 +416,151 @@ def test_a_bug_pauses_it_and_loses_nothing(
     assert len(at_it.status.state.touches) == 1
 
 
+# The images of live touches
+
+
+def test_a_verification_can_be_repeated_from_the_images_of_its_touches(
+    at_it: Verifier,
+) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED] * 3
+    for run, record in zip(at_it.runs, at_it.records, strict=True):
+        (touches,) = record["inputs"]["touches"]
+        assert touches["folder"] == run.name
+        assert touches["journal_sha256"] == sha256(run / JOURNAL)
+        assert [each["images"] for each in touches_of(record)] == [
+            [f"{image.number:06d}.png" for image in group]
+            for group in by_touch(open_record(run))
+        ]
+
+
+def touches_of(record: dict[str, Any]) -> list[dict[str, Any]]:
+    runs = record.get("runs", [record])
+    if "ends" in runs[0]:
+        return [touch for run in runs for end in run["ends"] for touch in end]
+    return [touch for run in runs for touch in run["touches"]]
+
+
+def by_touch(record: Record) -> list[list[RecordedImage]]:
+    numbers = sorted({image.touch for image in record.used_images})
+    return [[i for i in record.used_images if i.touch == n] for n in numbers]
+
+
+def test_of_a_touch_that_was_broken_off_no_image_counts(at_it: Verifier) -> None:
+    at_it.see(at_it.holder.still(leant(4)[0], 5))
+    at_it.see(at_it.holder.away())
+    at_it.touch(leant(4)[1])
+    (run,) = at_it.runs
+    record = open_record(run)
+
+    assert len(record.images) == 5
+    assert len(record.used_images) == 3
+    assert {image.touch for image in record.used_images} == {1}
+
+
+def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
+    at_it.touch(leant(4)[0])
+    at_it.runner.touch_anew(TaskKind.FIXED_POINT)
+    (first,) = at_it.runs
+    assert open_record(first).verdict == DISCARDED
+    (at_it.kept / TOUCHES).rename(at_it.folder / "elsewhere")
+    (at_it.kept / TOUCHES).write_text("A file where the folder should be.")
+    at_it.touch(leant(4)[1])
+    assert set(at_it.ear.troubles) == {"record.unwritable"}
+    assert at_it.status.state is not None
+    assert not at_it.status.state.touches
+
+    (at_it.kept / TOUCHES).unlink()
+    at_it.touch(leant(4)[2])
+    assert at_it.ear.reliefs
+    assert len(at_it.status.state.touches) == 1
+
+
+# A camera that moves
+
+
+@pytest.mark.parametrize("turn", [0.0, 3.0])
+def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
+    verifier: Verifier, turn: float
+) -> None:
+    """It turns by so many px a minute, of which the touches take a tenth or so."""
+    accept_tip(verifier.folder, verifier.preparation)
+    few = replace(CHOICES, kinds=(TaskKind.FIXED_POINT,), n_touches=3, n_frames=8)
+    verifier.come(few)
+    assert verifier.preparation.camera is not None
+    clock = SkippingClock()
+    camera = SimulatedCamera(
+        Scene(camera=verifier.preparation.camera, has_lamp=True, camera_turn=turn),
+        clock,
+    )
+    camera.open()
+    camera.configure(CameraSettings(frame_rate=10.0))
+    camera.start()
+    toucher, seen = Toucher(camera.operator), None
+    while verifier.status.task is not None and clock.now_ns() < TIMEOUT * 1e9:
+        status = verifier.status
+        assert status.setup is not None
+        assert status.state is not None
+        assert status.aim is not None
+        assert status.aim.camera is not None
+        assert status.aim.pen is not None
+        toucher.follow(status.setup, status.state)
+        frame = camera.read(1.0)
+        seen = look(frame.image, status.aim.camera, status.aim.pen, None, seen)
+        verifier.runner.take(frame, seen, status.aim)
+    camera.close()
+    status = verifier.status
+    witness = status.witness
+    assert witness is not None
+    assert status.assessment is not None
+    assert status.state is not None
+    assert status.state.fixed_point is not None
+    (record,) = verifier.records
+    told = record["witness"]
+    assert told["moved_mm"] == witness.moved
+    U = status.state.fixed_point.uncertainty
+    assert U[0] >= 2 * witness.share[0]
+    if turn:
+        assert status.assessment.reason.code == "witness.moved"
+        assert 0.02 < witness.moved < 0.3
+    else:
+        assert witness.assessment.grade is Grade.PASS
+        assert witness.moved < 0.006
+
+
+# What became of it
+
+
+def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
+    at_it: Verifier,
+) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10])
+    assert at_it.conclusions == []
+    at_it.touch(*BAR)
+    (conclusion,) = at_it.conclusions
+
+    assert conclusion["outcome"] == "accepted"
+    assert conclusion["grade"] == "pass"
+    assert conclusion["session"] == NOON.isoformat()
+    files = sorted(at_it.kept.glob("*.json"))[:3]
+    assert conclusion["records"] == [
+        {"file": file.name, "sha256": sha256(file)} for file in files
+    ]
+
+
+def test_what_is_given_up_is_abandoned(at_it: Verifier) -> None:
+    at_it.touch(*leant(4), round_a_ring(11, 31.751)[0])
+    at_it.runner.start_over()
+    at_it.ear.wait_until(
+        lambda: at_it.status.tip is not None and not at_it.status.began
+    )
+    (conclusion,) = at_it.conclusions
+
+    assert conclusion["outcome"] == "abandoned"
+    assert len(conclusion["records"]) == 1
+    assert [open_record(run).verdict for run in at_it.runs] == [CONCLUDED, DISCARDED]
+
+
 # What was found against a tip
 
 
@@ -362,7 +569,7 @@ def doubted(verifier: Verifier) -> Verifier:
     """A verification that the tip has failed, as it was bent."""
     accept_tip(verifier.folder, verifier.preparation)
     verifier.holder = Holder(
-        *(verifier.holder.camera, verifier.holder.pen),
+        *(verifier.holder.rig, verifier.holder.pen),
         PAPER_TIP + np.array([0.3, 0.0, 0.0]),
     )
     verifier.come(replace(CHOICES, kinds=(TaskKind.FIXED_POINT,)))
@@ -390,15 +597,19 @@ def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(
     set_password(doubted.folder, EVE, EVE.password, NOON)
     doubted.runner.accept("Only roughing today.", EVE)
     doubted.ear.wait_until(lambda: doubted.status.accepted_by == "Eve")
-    point, acceptance = doubted.records
+    (point,) = doubted.records
+    refusal, acceptance = doubted.conclusions
 
-    assert point["verdict"]["grade"] == "repeat"
-    assert acceptance["verification"] == "acceptance"
+    assert point["verdict"]["grade"] == refusal["grade"] == "repeat"
+    assert (refusal["outcome"], acceptance["outcome"]) == ("refused", "accepted")
     assert acceptance["supervisor"] == "Eve"
     assert acceptance["reason"] == "Only roughing today."
     assert acceptance["operator"] == "Ann"
-    assert acceptance["accepts"][0]["file"] == "000001.json"
-    assert EVE.password not in json.dumps(doubted.records)
+    assert [each["file"] for each in acceptance["records"]] == [
+        "000001.json",
+        "000002.json",
+    ]
+    assert EVE.password not in json.dumps(doubted.records + doubted.conclusions)
 
 
 def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:

@@ -13,6 +13,7 @@ from lightpen.cameras.protocol import CameraSettings
 from lightpen.detection.sighting import Sighting, look
 from lightpen.estimation.instrument import Instrument, instrument_of_files
 from lightpen.estimation.verdict import Grade
+from lightpen.model.rig import rig_of
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
@@ -38,7 +39,7 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
     scene = Scene(camera=paper_camera(binning=4))
     pen = replace(scene.pen, led_sigma=0.002)
     instrument = instrument_of_files(
-        scene.camera, pen, scene.tip_pen, 1e-6 * np.eye(3), 0.01
+        rig_of(scene.camera), pen, scene.tip_pen, 1e-6 * np.eye(3), 0.01
     )
     artefacts = Artefacts()
     choices = VerificationChoices(
@@ -132,7 +133,7 @@ class Session:
 @pytest.fixture
 def session(instrument: Instrument) -> Session:
     setup = SessionSetup(instrument, CHOICES)
-    return Session(setup, Holder(instrument.camera, instrument.pen))
+    return Session(setup, Holder(instrument.rig, instrument.pen))
 
 
 def test_each_task_begins_when_the_one_before_is_done(session: Session) -> None:
@@ -225,7 +226,7 @@ def test_leds_that_are_not_those_of_the_pen_are_told_and_not_counted(
     rng = np.random.default_rng(1)
     pen = session.setup.instrument.pen
     session.holder = Holder(
-        session.setup.instrument.camera,
+        session.setup.instrument.rig,
         replace(pen, leds=pen.leds + rng.normal(0, 2.0, pen.leds.shape)),
     )
     session.touch(leant(4)[0])
@@ -274,7 +275,7 @@ def test_another_tip_than_the_one_in_force_is_named(session: Session) -> None:
     session.choose(kinds=(TaskKind.FIXED_POINT,), n_touches=6)
     instrument = session.setup.instrument
     bent = instrument.tip_pen + np.array([0.3, 0.0, 0.0])
-    session.holder = Holder(instrument.camera, instrument.pen, bent)
+    session.holder = Holder(instrument.rig, instrument.pen, bent)
     session.touch(*leant(6))
 
     found = session.state.fixed_point

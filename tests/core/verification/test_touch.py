@@ -30,7 +30,7 @@ def test_exact_images_give_the_exact_point(instrument: Instrument) -> None:
     R = np.diag([1.0, -1.0, -1.0])
     t = PAPER_CONE - R @ PAPER_TIP
     rng = np.random.default_rng(0)
-    (pixels,) = simulate_centers(
+    pixels = simulate_centers(
         instrument.camera, instrument.pen, R[None], t[None], 0.0, rng
     )
 
@@ -66,7 +66,7 @@ def test_a_point_follows_the_parameters_as_its_derivative_says(
     (derivative,) = point_sensitivities(instrument, poses)
     by_scale = derivative[:, at.leds] @ instrument.pen.leds.ravel()
     for by_this, step in (
-        (derivative[:, at.intrinsics.start], (0.1, 0.0, 0.0)),
+        (derivative[:, at.cameras[0].start], (0.1, 0.0, 0.0)),
         (by_scale, (0.0, 1e-4, 0.0)),
         (derivative[:, at.diameter.start], (0.0, 0.0, 0.1)),
     ):
@@ -94,7 +94,7 @@ def test_an_image_that_slipped_is_left_out_and_named(instrument: Instrument) -> 
         instrument.camera, instrument.pen, np.tile(R, (6, 1, 1)), t, 0.01, rng
     )
     frames = tuple(
-        TouchFrame(f"image {i}", each, R, t[i]) for i, each in enumerate(pixels)
+        TouchFrame(f"image {i}", each[None], R, t[i]) for i, each in enumerate(pixels)
     )
 
     (touch,) = measure_touches(instrument, [StillFrames(frames)])

@@ -38,7 +38,7 @@ def test_a_camera_that_moved_is_told_by_how_much() -> None:
 
     assert found is not None
     assert found.moved == pytest.approx(0.1, abs=2 * found.uncertainty)
-    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.grade is Grade.REPEAT
     assert found.assessment.reason.code == "witness.moved"
 
 
@@ -64,3 +64,19 @@ def test_without_a_lamp_or_with_few_images_nothing_is_told() -> None:
     assert witnessed_by(lamps(n_lamps=0), SCALE, LIMITS) is None
     assert witnessed_by(lamps(n_blocks=2), SCALE, LIMITS) is None
     assert witnessed(LampImages(), 4638.0, LIMITS) is None
+
+
+def test_noise_alone_hardly_counts_in_what_was_touched() -> None:
+    found = witnessed_by(lamps(n_blocks=60), SCALE, LIMITS)
+
+    assert found is not None
+    assert found.share.max() < 0.003
+    assert found.share[2] == 0
+
+
+def test_a_camera_that_moved_counts_as_if_it_had_been_anywhere_between() -> None:
+    found = witnessed_by(lamps(shift=0.5), SCALE, LIMITS)
+
+    assert found is not None
+    # GUM 4.3.7: the half-width over the square root of three.
+    assert found.share[0] == pytest.approx(0.1 / np.sqrt(3), rel=0.1)

@@ -7,7 +7,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray
 from lightpen.model.posture import Posture, posture_of
 from lightpen.verification.choices import TaskKind
-from lightpen.verification.circle import MIN_ANGLE, Circle
+from lightpen.verification.circle import MIN_ANGLE, Circle, residuals_of
 from lightpen.verification.fixed_point import (
     FixedPoint,
     Scatter,
@@ -26,6 +26,7 @@ from lightpen_app.widgets.translated import Translated
 
 AXES = ("u", "v", "w")
 DECIMALS = 4  # of mm
+LATEST = 6  # touches of a ring, which fit beside it
 TENTHS_OF_PER_MILLE = 1e4  # as the paper tells a relative error
 
 
@@ -147,7 +148,7 @@ class FixedPointFinding(TaskFinding):
 
 
 class RingFinding(TaskFinding):
-    """The ring as it fills, and the radius of each run."""
+    """The ring as it fills, how far touches are off it, and the radius of each run."""
 
     kind = TaskKind.CIRCLE
 
@@ -166,7 +167,7 @@ class RingFinding(TaskFinding):
         column = QVBoxLayout()
         column.addWidget(self._table)
         column.addStretch(1)
-        layout.addLayout(column, 3)
+        layout.addLayout(column, 2)
 
         self._retranslate()
 
@@ -179,13 +180,27 @@ class RingFinding(TaskFinding):
     def _refresh(self) -> None:
         found = None if self._shown is None else self._shown[1].circle
         self._ring.set_value(self._ring_value(found))
-        self._table.set_value(Figures() if found is None else self._runs(found))
+        self._table.set_value(self._live() if found is None else self._runs(found))
+        has_figures = found is not None or bool(self._own_touches())
+        self._table.setVisible(has_figures)
 
     def _ring_value(self, found: Circle | None) -> RingValue:
         fit = ring_fit(self._own_touches()) if found is None else found.runs[-1].fit
         if fit is None:
             return RingValue()
         return RingValue(tuple(fit.angles.tolist()), fit.covered, MIN_ANGLE)
+
+    def _live(self) -> Figures:
+        """Return how far the last touches are off the ring so far."""
+        touches = self._own_touches()
+        fit = ring_fit(touches)
+        if fit is None:
+            return Figures()
+        off = residuals_of(fit, [touch.point_cam for touch in touches])
+        heads = self.tr("Off the ring / mm"), self.tr("Off the plane / mm")
+        names = tuple(str(i + 1) for i in range(len(touches)))
+        cells = tuple(map(_lengths, off))
+        return Figures(heads, names[-LATEST:], cells[-LATEST:])
 
     def _runs(self, found: Circle) -> Figures:
         runs, errors = found.runs, found.errors
@@ -222,7 +237,7 @@ class RingFinding(TaskFinding):
 
 
 class LengthFinding(TaskFinding):
-    """The length at each place, and the scale of the pen by all of them."""
+    """The touches of both ends, the length at each place, and the scale by all."""
 
     kind = TaskKind.LENGTH
 
@@ -252,7 +267,7 @@ class LengthFinding(TaskFinding):
     def _refresh(self) -> None:
         found = None if self._shown is None else self._shown[1].length
         if self._shown is None or found is None:
-            self._table.set_value(Figures())
+            self._table.set_value(self._ends())
             self._scale.clear()
             return
         limit = self._shown[0].choices.limits.length
@@ -275,6 +290,14 @@ class LengthFinding(TaskFinding):
                 number_text(1e6 * scale.uncertainty_before, 1),
             )
         )
+
+    def _ends(self) -> Figures:
+        """Return where the ends of the place at hand were touched."""
+        touches = self._own_touches()
+        names = (self.tr("One end"), self.tr("The other end"))[: len(touches)]
+        cells = tuple(_lengths(touch.point_cam) for touch in touches)
+        heads = tuple(f"{axis} / mm" for axis in AXES)
+        return Figures(heads, names, cells) if touches else Figures()
 
 
 def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:

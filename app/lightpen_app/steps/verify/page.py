@@ -48,7 +48,7 @@ from lightpen_app.work.workbench import Workbench
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PROGRESS_STEPS = 1000
-IMAGE_WIDTH = 56 * GRID
+IMAGE_WIDTH = 56 * GRID  # px, at least
 STATE_HEIGHT, VERDICT_HEIGHT = 9 * GRID, 13 * GRID  # px; a verdict has its reason
 
 SOUNDS: dict[SessionHappening, Sound] = {
@@ -282,7 +282,7 @@ class VerifyPage(Rearranged, Page):
         body.setSpacing(2 * GRID)
         scroll = PageScroll()
         scroll.setWidget(Squeezed(self._tabs))
-        body.addWidget(scroll, 1)
+        body.addWidget(scroll, 3)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
@@ -300,11 +300,11 @@ class VerifyPage(Rearranged, Page):
     def _use_room(self) -> None:
         """Put the live image beside the tasks, or in a tab of its own."""
         if self._room.is_narrow:
-            self._image.setMaximumWidth(16777215)  # QWIDGETSIZE_MAX
+            self._image.setMinimumWidth(0)
             self._tabs.addTab(self._image, self.tr("Live image"))
         else:
-            self._image.setFixedWidth(IMAGE_WIDTH)
-            self._body.addWidget(self._image)
+            self._image.setMinimumWidth(IMAGE_WIDTH)
+            self._body.addWidget(self._image, 2)
             self._image.show()  # a tab that is not the current one is hidden
 
     def _moment(self) -> VerifyMoment:

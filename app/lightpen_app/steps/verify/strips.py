@@ -137,6 +137,7 @@ class RingStrip(TaskStrip):
         self._radius = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
         self._surface = QComboBox()
+        self._surface.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         for surface in Surface:
             self._surface.addItem("", surface)
         self._runs = NumberField("", (1, MOST_RUNS), 0)

@@ -1,0 +1,140 @@
+"""One pose of the pen by all cameras of a rig that see it at the same moment.
+
+All LEDs in all images make one pose ``rig_from_pen``, by maximum likelihood as in
+`lightpen.detection.pose`. What one camera hardly sees, the depth along its view, the
+others do, so that its covariance is that of all of them together.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.detection.pose import (
+    CameraReprojection,
+    Poses,
+    fit_reprojection,
+)
+from lightpen.detection.reasons import Reason
+from lightpen.detection.sighting import Sighting
+from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class RigReprojection:
+    """Reprojection errors in the images of all cameras, those of one after another.
+
+    Attributes
+    ----------
+    cameras : tuple of CameraReprojection
+        With the pixels of each.
+    """
+
+    rig: Rig
+    cameras: tuple[CameraReprojection, ...]
+
+    @property
+    def pixels(self) -> FloatArray:
+        """Observed centres, (N, C L, 2), px; NaN where an LED was not seen."""
+        return np.concatenate([each.pixels for each in self.cameras], axis=1)
+
+    def residuals_with_jacobian(
+        self, R: FloatArray, t: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return residuals (N, C L, 2) at poses rig_from_pen, and their Jacobian."""
+        residuals, jacobians = [], []
+        places = zip(self.rig.rotations, self.rig.translations, strict=True)
+        for camera, (turn, shift) in zip(self.cameras, places, strict=True):
+            errors, J = camera.residuals_with_jacobian(turn @ R, t @ turn.T + shift)
+            residuals.append(errors)
+            jacobians.append(in_rig(J, turn))
+        return np.concatenate(residuals, axis=1), np.concatenate(jacobians, axis=1)
+
+
+def in_rig(J: FloatArray, turn: FloatArray) -> FloatArray:
+    """Return derivatives (..., 6) by a pose in a camera as those by it in the rig.
+
+    Parameters
+    ----------
+    turn : (3, 3) array
+        Of cam_from_rig.
+    """
+    return np.concatenate([J[..., :3] @ turn, J[..., 3:] @ turn], axis=-1)
+
+
+def fit_rig_poses(
+    rig: Rig,
+    pen: Pen,
+    pixels: FloatArray,
+    rotations: FloatArray,
+    translations: FloatArray,
+) -> Poses:
+    """Fit poses rig_from_pen, each to what all cameras saw.
+
+    Parameters
+    ----------
+    pixels : (N, C, L, 2) array
+        Ellipse centres of the LEDs, px; NaN where a camera did not see one. Every
+        moment needs four.
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        Start, rig_from_pen, mm.
+
+    Returns
+    -------
+    Poses
+        Residuals and weights are those of the first camera, of the second, and so on.
+    """
+    cameras = tuple(
+        CameraReprojection(camera, pen.leds, pen.normals, pen.diameter / 2, seen)
+        for camera, seen in zip(rig.cameras, np.moveaxis(pixels, 1, 0), strict=True)
+    )
+    problem = cameras[0] if rig.n_cameras == 1 else RigReprojection(rig, cameras)
+    return fit_reprojection(problem, rotations, translations)
+
+
+def see_together(rig: Rig, pen: Pen, sighting: Sighting) -> Sighting:
+    """Return what the cameras of a rig saw at a moment with one pose by all of them.
+
+    A camera that has no pose, or a blurred image, counts for nothing; where none is
+    left, the sighting stays as it is.
+
+    Parameters
+    ----------
+    sighting : Sighting
+        By the first camera, with those by the others.
+
+    Returns
+    -------
+    Sighting
+        Its pose is rig_from_pen, with its cofactors and its noise.
+    """
+    views = (sighting, *sighting.others)
+    if len(views) == 1:
+        return sighting
+    fit = [view.has_pose and not view.is_blurred for view in views]
+    if not any(fit):
+        return sighting
+    nowhere = np.full_like(sighting.pixels, np.nan)
+    clean = [
+        view if is_fit else replace(view, pixels=nowhere)
+        for view, is_fit in zip(views, fit, strict=True)
+    ]
+    start = fit.index(True)
+    back = rig.rotations[start].T
+    poses = fit_rig_poses(
+        *(rig, pen, np.stack([view.pixels for view in clean])[None]),
+        (back @ views[start].rotation)[None],
+        (back @ (views[start].translation - rig.translations[start]))[None],
+    )
+    return replace(
+        clean[0],
+        reason=Reason.NONE,
+        rotation=poses.rotations[0],
+        translation=poses.translations[0],
+        cofactors=poses.covariances[0] / poses.sigma**2,
+        sigma=poses.sigma,
+        spots=views[start].spots,
+        labels=views[start].labels,
+        others=tuple(clean[1:]),
+    )

@@ -1,0 +1,85 @@
+"""How a verification ended: accepted, refused or abandoned, in a file that stays.
+
+A verification is concluded when all that was chosen is done: accepted where the limits
+are kept, refused where they are not. Who accepts the tip all the same concludes it once
+more, with a reason, and so does who does one of its tasks again: the last conclusion of
+a session counts. One that is given up before all is done is abandoned. Each names all
+records of its session by their hashes, so that it stands for the whole.
+"""
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import StrEnum
+from importlib.metadata import version
+from typing import Any
+
+from lightpen.estimation.report import plain
+from lightpen.formats.hashes import InputFile
+from lightpen.verification.assessment import Conformity
+from lightpen.verification.keeping import file_entry
+from lightpen.verification.tip_in_force import TipInForce
+
+CONCLUSION = "conclusion"
+
+
+class Outcome(StrEnum):
+    """What became of a verification."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"
+    ABANDONED = "abandoned"
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """The end of a verification.
+
+    Attributes
+    ----------
+    session : datetime
+        When it began.
+    found : Conformity or None
+        The worst of what was found; None before anything was.
+    reason : str
+        Why the tip is used though something was found against it; else empty.
+    supervisor : str
+        Who allowed it; empty where it took none.
+    """
+
+    outcome: Outcome
+    session: datetime
+    at: datetime
+    found: Conformity | None = None
+    reason: str = ""
+    supervisor: str = ""
+
+
+def conclusion_record(
+    tip: TipInForce, conclusion: Conclusion, files: tuple[InputFile, ...]
+) -> dict[str, Any]:
+    """Return the record of a conclusion.
+
+    Parameters
+    ----------
+    files : tuple of InputFile
+        All records of the session.
+    """
+    names, found = tip.names, conclusion.found
+    return {
+        "program": {"name": "lightpen", "version": version("lightpen")},
+        "created": conclusion.at.isoformat(timespec="seconds"),
+        "verification": CONCLUSION,
+        "outcome": conclusion.outcome,
+        "session": conclusion.session.isoformat(timespec="seconds"),
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": tip.origin,
+        "grade": None if found is None else found.grade.value,
+        "verdict": None if found is None else plain(found.reason),
+        "supervisor": conclusion.supervisor,
+        "reason": conclusion.reason,
+        "inputs": {"tip": file_entry(tip.tip_file)},
+        "records": [file_entry(file) for file in files],
+    }
