@@ -502,6 +502,7 @@ def open_wizard(
 
     def start(source: Surroundings = around) -> Walker:
         folder = tmp_path / "data"
+        dressed.setStyleSheet("")  # which the wizard gives it
         wizard = Wizard(dressed, make_pages, settings, folder, source)
         opened.append(Walker(qtbot, wizard))
         return opened[-1]
