@@ -224,8 +224,7 @@ class Walker:
 
     def seen(self, root: QWidget | None = None) -> list[QWidget]:
         """The visible widgets of a window; that of the wizard unless given."""
-        root = root or self.window
-        return [w for w in (root, *root.findChildren(QWidget)) if w.isVisible()]
+        return list(_visible(root or self.window))
 
     def says(self, text: str) -> bool:
         """Whether a label, a button or a banner says this and no more."""
@@ -446,6 +445,15 @@ def texts_of(widget: QWidget) -> Iterator[str]:
             yield from _cells_of(widget)
     yield widget.accessibleName()
     yield widget.accessibleDescription()
+
+
+def _visible(widget: QWidget) -> Iterator[QWidget]:
+    """Yield a widget and all in it that can be seen; what is hidden holds none."""
+    if widget.isVisible():
+        yield widget
+        for child in widget.children():
+            if isinstance(child, QWidget):
+                yield from _visible(child)
 
 
 def _cells_of(table: QTableView) -> Iterator[str]:
