@@ -44,6 +44,12 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 """
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Let one more process work than there are cores: some tests wait, for a camera."""
+    return (os.cpu_count() or 1) + 1
+
+
 @pytest.fixture(scope="session", autouse=True)
 def no_power_cut() -> Iterator[None]:
     """Nothing waits for the disk; what is killed leaves its files to the system."""

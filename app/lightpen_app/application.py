@@ -72,7 +72,6 @@ class Wizard(QObject):
         self._languages = LanguageSwitch(application)
         self._languages.set_language(self._preferences.language)
         load_fonts()
-        self._apply_appearance()
         self._sounds = Mute(
             find_sounds(folder / "sounds"), muted=self._preferences.muted
         )
@@ -80,6 +79,9 @@ class Wizard(QObject):
         pages = make_pages(self.workbench, self._sounds)
         self.window = MainWindow(pages, settings, self._preferences)
         self.window.setMinimumSize(LEAST_SIZE)
+        # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,
+        # which takes four times as long as to make the window.
+        self._apply_appearance()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
 

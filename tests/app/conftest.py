@@ -224,8 +224,7 @@ class Walker:
 
     def seen(self, root: QWidget | None = None) -> list[QWidget]:
         """The visible widgets of a window; that of the wizard unless given."""
-        root = root or self.window
-        return [w for w in (root, *root.findChildren(QWidget)) if w.isVisible()]
+        return list(_visible(root or self.window))
 
     def says(self, text: str) -> bool:
         """Whether a label, a button or a banner says this and no more."""
@@ -448,6 +447,15 @@ def texts_of(widget: QWidget) -> Iterator[str]:
     yield widget.accessibleDescription()
 
 
+def _visible(widget: QWidget) -> Iterator[QWidget]:
+    """Yield a widget and all in it that can be seen; what is hidden holds none."""
+    if widget.isVisible():
+        yield widget
+        for child in widget.children():
+            if isinstance(child, QWidget):
+                yield from _visible(child)
+
+
 def _cells_of(table: QTableView) -> Iterator[str]:
     model, sideways = table.model(), Qt.Orientation.Horizontal
     for column in range(model.columnCount()):
@@ -502,6 +510,7 @@ def open_wizard(
 
     def start(source: Surroundings = around) -> Walker:
         folder = tmp_path / "data"
+        dressed.setStyleSheet("")  # which the wizard gives it
         wizard = Wizard(dressed, make_pages, settings, folder, source)
         opened.append(Walker(qtbot, wizard))
         return opened[-1]
