@@ -19,6 +19,7 @@ import cv2
 from lightpen.commands.archive import add_archive, usual_data_folder
 from lightpen.commands.console import BAD_INPUT, NO_TIP, Command, shown
 from lightpen.commands.desktop import Desktop, add_desktop, add_open, add_report
+from lightpen.commands.tips import add_tips
 from lightpen.errors import CalibrationError, LightpenError
 from lightpen.sentences import Sentence
 
@@ -146,6 +147,10 @@ def _parser(
             resolve_name(f"lightpen.commands.{function}")(command)
     add_archive(
         commands.add_parser("archive", help="check, list, send and take up entries"),
+        usual_data_folder if desktop is None else desktop.data_folder,
+    )
+    add_tips(
+        commands.add_parser("tips", help="the library of pens, tips and cones"),
         usual_data_folder if desktop is None else desktop.data_folder,
     )
     return parser, commands.choices

@@ -46,6 +46,7 @@ class Code(StrEnum):
     CAMERA_MOVED = "verdict.camera-moved"
     OUT_OF_REACH = "swing.out-of-reach"
     TIP_CHANGED = "verdict.tip-changed"
+    CHANGE_BEYOND_LIMIT = "verdict.change-beyond-limit"
     LAST_UNKNOWN = "verdict.last-unknown"
     NO_TIP = "verdict.no-tip"
     GOOD = "verdict.good"
@@ -288,6 +289,28 @@ def tip_changed(
         axis=axis,
         difference=difference,
         uncertainty=uncertainty,
+    )
+
+
+def change_beyond_limit(distance: float, date: str, limit: float) -> Sentence:
+    """Tell that a tip is further from where it was than its limit allows.
+
+    Parameters
+    ----------
+    distance : float
+        How far it is from there, mm.
+    date : str
+        Of the earlier result.
+    limit : float
+        Of the tip, mm.
+    """
+    return sentence(
+        Code.CHANGE_BEYOND_LIMIT,
+        "The tip lies {distance:.4f} mm from that of {date}; its limit is "
+        "{limit:.4f} mm. Was it exchanged, bent, or mounted anew?",
+        distance=distance,
+        date=date,
+        limit=limit,
     )
 
 

@@ -82,6 +82,7 @@ _SHORTS: dict[Code, str] = {
     Code.NOT_SIMULTANEOUS: QT_TRANSLATE_NOOP("phrases", "Not at the same time"),
     Code.OUT_OF_REACH: QT_TRANSLATE_NOOP("phrases", "Files not certain enough"),
     Code.TIP_CHANGED: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
+    Code.CHANGE_BEYOND_LIMIT: QT_TRANSLATE_NOOP("phrases", "Tip has changed"),
     Code.LAST_UNKNOWN: QT_TRANSLATE_NOOP("phrases", "Nothing to compare with"),
     Code.NO_TIP: QT_TRANSLATE_NOOP("phrases", "No tip found"),
     Code.GOOD: QT_TRANSLATE_NOOP("phrases", "Good"),

@@ -1,4 +1,4 @@
-"""What happened, told by the files of a data folder: results and records of swings."""
+"""What happened, told by the files of a data folder: results, swings, the library."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -30,6 +30,7 @@ from lightpen.record.reading import (
 )
 from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, record_inputs
+from lightpen.record.tip_library import ItemKind, Tip, item_entries, read_change
 from lightpen.sentences import Sentence
 
 
@@ -73,6 +74,37 @@ def account_of_result(results: FolderArchive, file: Path) -> Account:
     )
     taken_back = file.with_name(f"{found.takes_back}.json")
     return Account(event, takes_back=results.place_of(taken_back))
+
+
+def account_of_change(results: FolderArchive, file: Path) -> Account:
+    """Return what a file says that changed the tip library.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is damaged.
+    """
+    digest, change = file_sha256(file), read_change(file)
+    item, picture = change.item, None
+    if isinstance(item, Tip):
+        picture = item.picture
+    event = Event(
+        kind=Kind.LIBRARY,
+        at=change.at,
+        names=Names(
+            station=change.station,
+            operator=change.operator,
+            pen=item.id if item.kind is ItemKind.PEN else "",
+            tip=item.id if item.kind is ItemKind.TIP else "",
+            cone=item.id if item.kind is ItemKind.CONE else "",
+        ),
+        program=this_program(),
+        reason=change.reason,
+        settings=item_entries(item) | {"supervisor": change.supervisor},
+        result=FileHash(results.place_of(file), digest),
+        files=() if picture is None else (FileHash(picture.place, picture.sha256),),
+    )
+    return Account(event)
 
 
 def account_of_abandoned(
@@ -145,6 +177,7 @@ def _account_of_acceptance(
         reason=result.reason,
         tip_pen_mm=tuple(result.tip_pen.tolist()),
         expanded_uncertainty_mm=tuple(result.uncertainty.tolist()),
+        change=result.change,
         swing=results.place_of(result.record),
         result=place,
         concerns=result.restores,

@@ -15,7 +15,9 @@ from lightpen.archive.history import known_names
 from lightpen.archive.queries import last_accepted, of_chain
 from lightpen.archive.tables import ENTRIES
 from lightpen.record.due_rule import DueRule
+from lightpen.record.tip_library import Library
 
+EMPTY = Library()
 SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 
@@ -45,33 +47,51 @@ class DueTip:
         return now > self.due or (self.n_left is not None and self.n_left <= 0)
 
 
-def due_tips(database: Database, chain: str, rule: DueRule) -> tuple[DueTip, ...]:
+def due_tips(
+    database: Database, chain: str, rule: DueRule, library: Library = EMPTY
+) -> tuple[DueTip, ...]:
     """Return the tips of real pens in force at a station, the due ones first.
 
     Parameters
     ----------
     chain : str
         That is at home where they are in force.
+    rule : DueRule
+        Of the station, for tips that have none of their own.
+    library : Library, optional
+        Whose tips may have one, and whose retired ones are left out.
     """
     found = (
         last_accepted(database, pen, tip, chain=chain)
         for pen, tip in known_names(database).tips
+        if pen and tip and not _is_retired(library, tip)
     )
     entries = [entry for entry in found if entry is not None]
     if not entries:
         return ()
     swings = _swings(database, chain, min(each.entry.since for each in entries))
     return tuple(
-        sorted((_due_tip(each, swings, rule) for each in entries), key=_urgency)
+        sorted(
+            (_due_tip(each, swings, rule, library) for each in entries), key=_urgency
+        )
     )
+
+
+def _is_retired(library: Library, tip: str) -> bool:
+    listed = library.tips.get(tip)
+    return listed is not None and listed.is_retired
 
 
 def _urgency(tip: DueTip) -> tuple[bool, datetime]:
     return tip.n_left is None or tip.n_left > 0, tip.due
 
 
-def _due_tip(entry: Written, swings: Mapping[str, list[int]], rule: DueRule) -> DueTip:
-    of_pen = swings.get(searchable(entry.entry.event.names.pen), [])
+def _due_tip(
+    entry: Written, swings: Mapping[str, list[int]], usual: DueRule, library: Library
+) -> DueTip:
+    names = entry.entry.event.names
+    rule = library.rule_of(names.tip, usual)
+    of_pen = swings.get(searchable(names.pen), [])
     n_swings = len(of_pen) - bisect_right(of_pen, since_us(entry.entry.since))
     return DueTip(
         entry,

@@ -21,7 +21,7 @@ from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, requir
 from lightpen.model.origin import Origin
 from lightpen.record.assumed import Plain
 from lightpen.record.names import Names
-from lightpen.record.results import Why
+from lightpen.record.results import Since, Why
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
 TICK = timedelta(microseconds=1)
@@ -38,6 +38,7 @@ class Kind(StrEnum):
     ABANDONED = "abandoned"
     TAKEN_BACK = "taken back"
     NOTE = "note"
+    LIBRARY = "library"
 
 
 IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
@@ -74,14 +75,17 @@ class Event(Struct, frozen=True):
         What the grade is for.
     reason : str
         In the words of the operator; of a note its text.
+    change : Since or None
+        Since the tip as found, which was in force before.
     swing : str
         Folder of the swing that it is of, as `FileHash.place`; may be empty.
     settings : mapping
-        What the swing was captured with, and what was required of it.
+        What the swing was captured with, and what was required of it; of the library
+        the item as it is from then on.
     result : FileHash or None
-        The file that put a tip in force, or took it back.
+        The file that put a tip in force, took it back, or changed the tip library.
     files : tuple of FileHash
-        The record of the swing, without its images.
+        The record of the swing, without its images; of the library a picture.
     record_sha256 : str or None
         Of the record as JSON, which names the images with their hashes.
     concerns : str or None
@@ -98,6 +102,7 @@ class Event(Struct, frozen=True):
     reason: str = ""
     tip_pen_mm: Vector | None = None
     expanded_uncertainty_mm: Vector | None = None
+    change: Since | None = None
     swing: str = ""
     settings: Mapping[str, Plain] = {}
     result: FileHash | None = None

@@ -69,7 +69,9 @@ class FilesCheck:
     ) -> Iterator[Sentence]:
         event = entry.event
         files = [] if event.result is None else [event.result]
-        if event.files:
+        if event.files and not event.swing:
+            files += event.files
+        elif event.files:
             if (data / event.swing).is_dir():
                 files += event.files
                 files += _images(event.swing, records.get(event.record_sha256 or ""))

@@ -1,8 +1,9 @@
 """The logbook of a station: all that happens in a data folder is entered in its chain.
 
-One rule joins it to the files. A result file puts a tip in force, or takes it back, and
-the journal of a swing says that it was set aside: these files are the truth, written
-whole before anything else, and each is owed one entry. What is owed is entered as soon
+One rule joins it to the files. A result file puts a tip in force, or takes it back, a
+file of the tip library changes an item of it, and the journal of a swing says that it
+was set aside: these files are the truth, written whole before anything else, and each
+is owed one entry. What is owed is entered as soon
 as it is written; where that failed, or the program was killed, or had no archive yet,
 with whatever is entered next, and at every start. So nothing is in force or set aside
 that the archive does not tell of from the next start on, and no entry is of nothing.
@@ -20,6 +21,7 @@ from msgspec import structs
 from lightpen.archive.accounts import (
     Account,
     account_of_abandoned,
+    account_of_change,
     account_of_refused,
     account_of_result,
     account_of_unreadable,
@@ -47,6 +49,7 @@ from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
+from lightpen.record.tip_library import LIBRARY, library_files
 from lightpen.sentences import Sentence
 
 ARCHIVE = "archive.sqlite"
@@ -192,8 +195,8 @@ class Logbook:
             close_sealed(self.database)
 
     def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
-        """Yield the files of results, and then the swings, that have no entry."""
-        for file in self._results.all_files():
+        """Yield the files of results and the library without an entry, then swings."""
+        for file in (*self._results.all_files(), *library_files(self._data)):
             if not self._is_in(entered, file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):
@@ -204,6 +207,8 @@ class Logbook:
         return searchable(self._results.place_of(path)) in entered
 
     def _account_of(self, path: Path) -> Account:
+        if path.parent.name == LIBRARY:
+            return account_of_change(self._results, path)
         if path.parent.name != RECORDS:
             return account_of_result(self._results, path)
         at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)

@@ -81,4 +81,4 @@ def with_change(result: Result, last: Result | None) -> Result:
     change = change_since(
         result.tip_pen, result.uncertainty, last.tip_pen, last.uncertainty
     )
-    return replace(result, change=Since.of(last.accepted, change))
+    return replace(result, change=Since.of(last, change))

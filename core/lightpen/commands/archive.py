@@ -46,9 +46,11 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     for name in ("pen", "tip", "station"):
         listed.add_argument(f"--{name}", default="", help="list its entries only")
     listed.add_argument(
-        "--since", type=_date, metavar="YYYY-MM-DD", help="from this day on"
+        "--since", type=parse_date, metavar="YYYY-MM-DD", help="from this day on"
     )
-    listed.add_argument("--until", type=_date, metavar="YYYY-MM-DD", help="to this day")
+    listed.add_argument(
+        "--until", type=parse_date, metavar="YYYY-MM-DD", help="to this day"
+    )
     listed.add_argument(
         "--most",
         type=whole_number,
@@ -61,7 +63,8 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
     )
 
 
-def _date(text: str) -> date:
+def parse_date(text: str) -> date:
+    """Return a day."""
     try:
         return date.fromisoformat(text)
     except ValueError as error:

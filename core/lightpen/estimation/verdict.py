@@ -14,6 +14,7 @@ from lightpen.estimation.uncertainty import IMAGES_SHRINK, Halves, ShareName
 from lightpen.messages import (
     Code,
     camera_moved,
+    change_beyond_limit,
     file_contradicted,
     file_uncertain,
     halves_differ,
@@ -158,6 +159,7 @@ _NEXT_STEPS = {
     Code.NOT_SIMULTANEOUS: NextStep.REPEAT,
     Code.CAMERA_MOVED: NextStep.CLAMP,
     Code.TIP_CHANGED: NextStep.CHECK_TIP,
+    Code.CHANGE_BEYOND_LIMIT: NextStep.CHECK_TIP,
     Code.LAST_UNKNOWN: NextStep.CHECK_TIP,
 }
 
@@ -208,7 +210,24 @@ def change_since(
     return Change(tip_pen - tip_then, np.hypot(uncertainty, uncertainty_then))
 
 
-def judge_change(verdict: Verdict, change: Change | None, date: str) -> Verdict:
+def change_doubt(change: Change, date: str, limit: float | None) -> Sentence | None:
+    """Return what there is to look into about a change, if anything.
+
+    Parameters
+    ----------
+    date : str
+        Of the result in force before.
+    limit : float or None
+        Of the tip for the distance from there, mm; None if it has none.
+    """
+    if limit is not None and change.distance > limit:
+        return change_beyond_limit(change.distance, date, limit)
+    return change.told(date) if change.is_unexplained else None
+
+
+def judge_change(
+    verdict: Verdict, change: Change | None, date: str, limit: float | None = None
+) -> Verdict:
     """Judge a tip that would pass by how far it lies from the one before.
 
     Parameters
@@ -219,10 +238,13 @@ def judge_change(verdict: Verdict, change: Change | None, date: str) -> Verdict:
         Since the result in force; None if there is none.
     date : str
         Of that result.
+    limit : float, optional
+        As of `change_doubt`.
     """
-    if verdict.grade is not Grade.PASS or change is None or not change.is_unexplained:
+    if verdict.grade is not Grade.PASS or change is None:
         return verdict
-    return Verdict(Grade.CHECK, change.told(date))
+    doubt = change_doubt(change, date, limit)
+    return verdict if doubt is None else Verdict(Grade.CHECK, doubt)
 
 
 def judge_unknown(verdict: Verdict, why: Sentence) -> Verdict:

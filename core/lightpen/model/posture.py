@@ -17,6 +17,7 @@ from lightpen.arrays import FloatArray
 from lightpen.model.pen import Pen
 from lightpen.model.rigid import rotation_from_vector
 
+UPRIGHT_AXIS = np.array([0.0, 1.0, 0.0])  # of the pen, away from its tip
 FACING = np.diag([1.0, -1.0, -1.0])  # cam_from_pen upright, z to the camera
 MIN_SIDEWAYS = 0.1  # of the mean normal; LEDs along the axis have no side to face with
 

@@ -40,7 +40,10 @@ from lightpen.record.unfinished import Unfinished
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
 
-BEYOND_LIMIT = {Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED}
+BEYOND_LIMIT = {
+    *(Code.UNCERTAIN, Code.FILE_UNCERTAIN, Code.FILE_ASSUMED),
+    Code.CHANGE_BEYOND_LIMIT,
+}
 
 
 def accept(
@@ -82,6 +85,7 @@ def accept(
         result = _stored_result(archive, record)
         if result is None:
             assessment = assess(archive, record, solution)
+            _require_in_use(archive, record)
             _require_acceptable(assessment.verdict, reason)
             supervisor = _supervisor(archive.supervision(), assessment, signature)
             result = replace(
@@ -138,6 +142,25 @@ def _supervisor(
     return signature.name.strip()
 
 
+def _require_in_use(archive: Archive, record: Record) -> None:
+    """Refuse a tip that was retired: whoever retired it knows why.
+
+    A library that cannot be read is told of with the verdict.
+    """
+    tip = None
+    with suppress(FileError):
+        tip = archive.library().tips.get(recorded_names(record).tip)
+    if tip is not None and tip.is_retired:
+        raise AcceptanceError(
+            sentence(
+                "acceptance.retired",
+                "The tip {tip} is retired and cannot be put in force. Bring it back in "
+                "the tip library, or calibrate another one.",
+                tip=tip.id,
+            )
+        )
+
+
 def _require_acceptable(verdict: Verdict, reason: str) -> None:
     """Let a tip pass whose grade allows it to be accepted so."""
     if verdict.grade is Grade.REPEAT:
@@ -168,7 +191,7 @@ def _result(
 ) -> Result:
     last, change, since = assessment.last, assessment.change, None
     if last is not None and change is not None:
-        since = Since.of(last.accepted, change)
+        since = Since.of(last, change, assessment.max_change)
     return Result(
         names=recorded_names(record),
         accepted=now,

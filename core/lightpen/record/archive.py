@@ -6,6 +6,7 @@ from typing import Protocol
 
 from lightpen.record.results import Result
 from lightpen.record.supervision import Supervision
+from lightpen.record.tip_library import Library
 
 
 class Archive(Protocol):
@@ -75,6 +76,15 @@ class Archive(Protocol):
 
     def supervision(self) -> Supervision:
         """Return what supervisors have laid down for what it keeps.
+
+        Raises
+        ------
+        FileError
+            It cannot be read, or was changed.
+        """
+
+    def library(self) -> Library:
+        """Return the pens, tips and cones that are known, with their limits.
 
         Raises
         ------

@@ -10,6 +10,7 @@ from lightpen.estimation.report import warnings_of
 from lightpen.estimation.verdict import (
     Change,
     Verdict,
+    change_doubt,
     change_since,
     distance_from_nominal,
     judge,
@@ -45,6 +46,8 @@ class Assessment:
         In force for this pen and tip; None if there is none, or it cannot be read.
     change : Change or None
         Since that.
+    max_change : float or None
+        Limit of the tip for the distance from that, mm; None if it has none.
     doubts : tuple of Sentence
         What to look into besides the reason of the verdict, what matters most first.
     """
@@ -53,6 +56,7 @@ class Assessment:
     last: Result | None
     change: Change | None
     doubts: tuple[Sentence, ...]
+    max_change: float | None = None
 
 
 def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
@@ -66,25 +70,29 @@ def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
     names, origin = recorded_names(record), recorded_origin(record)
     limits = recorded_limits(record)
     verdict = judge(solution.calibration, limits)
+    last, limit, unknown = None, None, None
     try:
-        last, unknown = _last(archive, names, origin), None
+        listed = archive.library().tips.get(names.tip)
+        limit = None if listed is None else listed.max_change_mm
+        last = _last(archive, names, origin)
     except FileError as error:
-        last, unknown = None, error.sentence
+        unknown = error.sentence
         verdict = judge_unknown(verdict, unknown)
-    change, date = None, ""
+    change, doubt = None, None
     if last is not None:
         date = f"{local_time(last.accepted):%Y-%m-%d}"
         change = _change(solution, last)
-        verdict = judge_change(verdict, change, date)
+        doubt = change_doubt(change, date, limit)
+        verdict = judge_change(verdict, change, date, limit)
     all_doubts = chain(
         [] if unknown is None else [last_unknown(unknown)],
-        [] if change is None or not change.is_unexplained else [change.told(date)],
+        [] if doubt is None else [doubt],
         _far_from_nominal(solution),
         _bare_sides(solution, limits) if is_of_recording(record) else [],
         warnings_of(solution.calibration),
     )
     doubts = tuple(each for each in all_doubts if each.code != verdict.reason.code)
-    return Assessment(verdict, last, change, doubts)
+    return Assessment(verdict, last, change, doubts, limit)
 
 
 def _last(archive: Archive, names: Names, origin: Origin | None) -> Result | None:

@@ -32,6 +32,7 @@ from lightpen.record.results import (
     withdrawal_bytes,
 )
 from lightpen.record.supervision import Supervision, read_supervision
+from lightpen.record.tip_library import Library, read_library
 from lightpen.sentences import sentence
 
 RECORDS, RESULTS = "records", "results"
@@ -116,6 +117,10 @@ class FolderArchive:
     def supervision(self) -> Supervision:
         """Return what supervisors have laid down."""
         return read_supervision(self._data)
+
+    def library(self) -> Library:
+        """Return the pens, tips and cones that are known."""
+        return read_library(self._data)
 
     def of_record(self, folder: Path) -> Result | None:
         """Return the last accepted result of the swing in a folder, or None."""

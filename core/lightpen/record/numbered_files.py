@@ -32,6 +32,24 @@ def add_numbered(folder: Path, data: bytes) -> Path:
     FileError
         It cannot be written.
     """
+    make_folder(folder)
+    newest = numbered_files(folder)[:1]
+    for free in count(1 + (_number(newest[0]) if newest else 0)):
+        file = folder / f"{free:06d}.json"
+        with suppress(NameTakenError):  # by another program, just now
+            create_whole(file, data)
+            break
+    return file
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, unless it is there.
+
+    Raises
+    ------
+    FileError
+        It cannot be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         sync_folder(folder.parent)
@@ -45,13 +63,6 @@ def add_numbered(folder: Path, data: bytes) -> Path:
                 reason=strerror(error),
             )
         ) from error
-    newest = numbered_files(folder)[:1]
-    for free in count(1 + (_number(newest[0]) if newest else 0)):
-        file = folder / f"{free:06d}.json"
-        with suppress(NameTakenError):  # by another program, just now
-            create_whole(file, data)
-            break
-    return file
 
 
 def numbered_files(folder: Path) -> list[Path]:

@@ -11,6 +11,7 @@ format 2 had no checksums, and those of format 1 of the calibration no more than
 uncertainty.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -110,28 +111,56 @@ class Why(Struct, frozen=True):
 class Since(Struct, frozen=True):
     """How far a tip lies from the one that was in force before, when it was accepted.
 
+    That one is the tip as found, the one that was accepted the tip as left.
+
     Attributes
     ----------
     accepted : datetime
-        When that one was.
+        When the tip as found was.
     difference_mm : triple of float
         Now minus then, pen frame.
     expanded_uncertainty_mm : triple of float
         U (k = 2) of the difference.
+    as_found_mm, as_found_expanded_uncertainty_mm : triple of float or None
+        The tip that was in force until then, pen frame, and its U (k = 2); None where
+        an earlier version did not say.
+    limit_mm : float or None
+        Of the tip for its distance from there; None if it had none.
     """
 
     accepted: Moment
     difference_mm: Vector
     expanded_uncertainty_mm: Vector
+    as_found_mm: Vector | None = None
+    as_found_expanded_uncertainty_mm: Vector | None = None
+    limit_mm: float | None = None
 
     @classmethod
-    def of(cls, accepted: datetime, change: Change) -> Self:
-        """Return what is kept of a change since a result of some date."""
+    def of(cls, last: "Result", change: Change, limit: float | None = None) -> Self:
+        """Return what is kept of a change since the result in force."""
         return cls(
-            accepted,
-            tuple(change.difference.tolist()),
-            tuple(change.expanded_uncertainty.tolist()),
+            last.accepted,
+            _vector(change.difference),
+            _vector(change.expanded_uncertainty),
+            _vector(last.tip_pen),
+            _vector(last.uncertainty),
+            limit,
         )
+
+    @property
+    def distance_mm(self) -> float:
+        """How far apart the tips lie."""
+        return math.hypot(*self.difference_mm)
+
+    @property
+    def is_within(self) -> bool | None:
+        """Whether the tip as found was within its limit; None if it had none."""
+        return None if self.limit_mm is None else self.distance_mm <= self.limit_mm
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 class _Entries(Struct):

@@ -23,12 +23,12 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.rig_pose import fit_rig_poses, in_rig
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.pivot import GATE, MEDIAN_CHI, in_deviations, tip_covariances
+from lightpen.model.posture import UPRIGHT_AXIS
 from lightpen.model.rigid import nearest_rotation, skew
 
 KNOWN_FREEDOM = 30  # degrees, that the noise of the calibration counts for
 POSE_UNKNOWNS = 6
 NO_DRIFT = np.zeros(3)  # mm
-UPRIGHT_AXIS = np.array([0.0, 1.0, 0.0])  # of the pen, away from its tip
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,10 @@ def with_tip(touch: Touch, instrument: Instrument, tip_pen: FloatArray) -> Touch
 
 
 def on_surface(
-    touch: Touch, ball_radius: float, direction_cam: FloatArray | None = None
+    touch: Touch,
+    ball_radius: float,
+    direction_cam: FloatArray | None = None,
+    stylus_axis_pen: FloatArray = UPRIGHT_AXIS,
 ) -> Touch:
     """Return a touch moved from the centre of its ball to the surface that it touched.
 
@@ -197,13 +200,16 @@ def on_surface(
     ball_radius : float
         mm.
     direction_cam : (3,) array, optional
-        Unit vector from the ball to the surface; if not given, the approach, or the
-        axis of the pen where none is known.
+        Unit vector from the ball to the surface; if not given, the approach, or along
+        the axis of the stylus where none is known.
+    stylus_axis_pen : (3,) array
+        Axis of the stylus from the ball into the pen, pen frame, of length 1; that of
+        the pen unless given.
     """
     if direction_cam is None:
         direction_cam = touch.approach_cam
     if direction_cam is None:
-        direction_cam = -touch.rotation @ UPRIGHT_AXIS
+        direction_cam = -touch.rotation @ stylus_axis_pen
     return replace(touch, point_cam=touch.point_cam + ball_radius * direction_cam)
 
 

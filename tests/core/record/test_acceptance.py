@@ -22,9 +22,11 @@ from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.acceptance import accept, conclude_accepted
 from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.reading import open_record, recorded_names
 from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, load_image, solve_again, solve_record
+from lightpen.record.tip_library import ItemKind, Tip, library_files
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter, note_taken_out
 from lightpen.simulator.swings import swing_poses
@@ -293,6 +295,56 @@ def test_a_tip_that_passes_by_itself_is_to_be_checked_where_it_has_moved(
     np.testing.assert_allclose(
         stored.change.expanded_uncertainty_mm, np.hypot(u, u), rtol=1e-12
     )
+
+
+def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
+    case: Case,
+) -> None:
+    passing = _passing(case)
+    tip = passing.calibration.joint.tip_pen
+    u = passing.calibration.budget.expanded_uncertainty[:3]
+    _put_in_force(case, tip - 0.9 * np.hypot(u, u), u)  # which U explains
+    limit = 0.5 * float(np.linalg.norm(u))
+    name = recorded_names(open_record(passing.source.folder)).tip
+    data = case.archive.folder.parent
+    add_item(data, Tip(id=name, max_change_mm=limit), Author(), NOON)
+
+    with pytest.raises(AcceptanceError, match="its limit is"):
+        accept(case.archive, passing, LATER)
+
+    accept(case.archive, passing, LATER, REASON)
+    stored = case.in_force()
+    assert (stored.grade, stored.reason) == (Grade.CHECK, REASON)
+    found = stored.change
+    assert found is not None
+    assert (found.limit_mm, found.is_within) == (limit, False)
+    assert found.distance_mm > limit
+    assert found.as_found_mm is not None
+    np.testing.assert_allclose(
+        np.add(found.as_found_mm, found.difference_mm), stored.tip_pen, rtol=1e-12
+    )
+
+
+def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:
+    passing = _passing(case)
+    name = recorded_names(open_record(passing.source.folder)).tip
+    data = case.archive.folder.parent
+    add_item(data, Tip(id=name), Author(), NOON)
+    retire_item(data, ItemKind.TIP, name, Author(), NOON)
+
+    with pytest.raises(AcceptanceError, match="is retired and cannot be put in force"):
+        accept(case.archive, passing, LATER, REASON)
+
+
+def test_a_tip_of_a_damaged_library_is_to_be_checked(case: Case) -> None:
+    passing = _passing(case)
+    data = case.archive.folder.parent
+    add_item(data, Tip(id="T-99"), Author(), NOON)
+    (file,) = library_files(data)
+    file.write_bytes(file.read_bytes().replace(b"T-99", b"T-98"))
+
+    with pytest.raises(AcceptanceError, match="The tip library is not as it was"):
+        accept(case.archive, passing, LATER)
 
 
 def test_what_is_doubtful_besides_is_stored_with_the_result(case: Case) -> None:

@@ -1,0 +1,118 @@
+"""``lightpen tips``: the library of pens, tips and cones."""
+
+import argparse
+import getpass
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from lightpen.commands.archive import DataFolder, parse_date
+from lightpen.commands.arguments import add_pen_options, finite, whole_number
+
+T = TypeVar("T")
+
+KINDS = ("pen", "tip", "cone")
+NOTHING = "none"  # typed in place of a value that is to be forgotten
+FORGOTTEN = object()
+
+
+def add_tips(parser: argparse.ArgumentParser, data_folder: DataFolder) -> None:
+    """Add ``lightpen tips``."""
+    parser.set_defaults(run=_run)
+    actions = parser.add_subparsers(required=True, metavar="ACTION", dest="action")
+    listed = actions.add_parser("list", help="print what there is, and how it stands")
+    added = actions.add_parser("add", help="add a pen, tip or cone")
+    changed = actions.add_parser("change", help="change what is said of one")
+    retired = actions.add_parser("retire", help="take one out of use; it stays known")
+    returned = actions.add_parser("return", help="bring a retired one back")
+    spun = actions.add_parser(
+        "spin", help="find the axis of a stylus by images of its pen spun in the cone"
+    )
+    for action in (listed, added, changed, retired, returned, spun):
+        action.add_argument(
+            "--data",
+            type=Path,
+            metavar="FOLDER",
+            help="data folder; that of the program unless said",
+        )
+        action.add_argument("--json", action="store_true", help="print JSON")
+        action.set_defaults(data_folder=data_folder)
+    listed.add_argument("--all", action="store_true", help="retired ones, too")
+    listed.add_argument(
+        "--max-days",
+        type=whole_number,
+        metavar="N",
+        help="days after which a tip is due that has no rule of its own (30)",
+    )
+    for action in (added, changed, retired, returned):
+        action.add_argument("kind", choices=KINDS)
+        action.add_argument("id", metavar="ID", help="as its label has it")
+    for action in (added, changed):
+        _add_entries(action)
+    spun.add_argument("id", metavar="TIP", help="a tip in the library")
+    spun.add_argument("images", type=Path, nargs="+", metavar="IMAGES")
+    spun.add_argument("--camera", type=Path, required=True, metavar="FILE")
+    spun.add_argument("--pen", type=Path, required=True, metavar="FILE")
+    add_pen_options(spun)
+    for action in (added, changed, retired, returned, spun):
+        _add_author(action)
+
+
+def _add_entries(action: argparse.ArgumentParser) -> None:
+    of_all = action.add_argument_group("pens, tips and cones")
+    of_all.add_argument(
+        "--due",
+        type=_or_nothing(parse_date),
+        metavar="YYYY-MM-DD",
+        help="last day on which it may be used before it is looked after",
+    )
+    of_all.add_argument("--note", metavar="TEXT")
+    of_tips = action.add_argument_group(
+        "tips", f"'{NOTHING}' in place of a value forgets what was said"
+    )
+    for name, kind, unit, told in (
+        ("--ball-diameter", finite, "MM", "diameter of its ball"),
+        ("--max-change", finite, "MM", "that a calibration may find it moved"),
+        ("--max-days", whole_number, "N", "that it may be in force"),
+        ("--max-swings", whole_number, "N", "of its pen that it may be in force"),
+        ("--picture", Path, "FILE", "picture of it"),
+    ):
+        of_tips.add_argument(name, type=_or_nothing(kind), metavar=unit, help=told)
+    for name, told in (
+        ("--nominal", "its centre by design, pen frame, mm"),
+        ("--axis", "axis of its stylus, from the ball into the pen, pen frame"),
+    ):
+        of_tips.add_argument(
+            name, type=_or_nothing(finite), nargs="+", metavar="X Y Z", help=told
+        )
+
+
+def _add_author(action: argparse.ArgumentParser) -> None:
+    who = action.add_argument_group("who changes it, as the archive keeps it")
+    who.add_argument("--station", default="", metavar="NAME")
+    who.add_argument(
+        "--operator", default=getpass.getuser(), metavar="NAME", help="you unless said"
+    )
+    who.add_argument("--reason", default="", metavar="TEXT")
+    who.add_argument(
+        "--supervisor",
+        metavar="NAME",
+        help="who signs, where a supervisor's password guards the data folder; the "
+        "password is asked for, or read from LIGHTPEN_PASSWORD",
+    )
+
+
+def _or_nothing(kind: Callable[[str], T]) -> Callable[[str], T | object]:
+    """Return what reads a value, or that it is to be forgotten."""
+
+    def read(text: str) -> T | object:
+        return FORGOTTEN if text.strip() == NOTHING else kind(text)
+
+    return read
+
+
+def _run(options: argparse.Namespace) -> int:
+    # A fifth of a second, which the other commands need not take.
+    from lightpen.commands.tips_actions import ACTIONS
+
+    return ACTIONS[options.action](options)

@@ -1,0 +1,283 @@
+"""What each ``lightpen tips ...`` does."""
+
+import argparse
+import getpass
+import json
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from msgspec import structs, to_builtins
+
+from lightpen.archive.chains import chain_at_home
+from lightpen.archive.database import look_into
+from lightpen.archive.logbook import ARCHIVE, Logbook
+from lightpen.archive.standing import Standings, standings
+from lightpen.commands.console import Command, printing, progress, shown
+from lightpen.commands.tips import FORGOTTEN
+from lightpen.detection.observations import observe_images
+from lightpen.errors import ArchiveError, UsageError
+from lightpen.estimation.spin import SpinFit, fit_spin
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.images import find_images
+from lightpen.formats.pen_files import read_pen
+from lightpen.local_time import local_now
+from lightpen.record.due_rule import DueRule
+from lightpen.record.library_changes import (
+    Author,
+    add_item,
+    change_item,
+    keep_picture,
+    known_item,
+    retire_item,
+)
+from lightpen.record.supervision import Signature
+from lightpen.record.tip_library import (
+    AnyItem,
+    AxisOrigin,
+    Cone,
+    ItemKind,
+    Library,
+    Pen,
+    Tip,
+    read_library,
+)
+from lightpen.sentences import sentence
+
+PASSWORD = "LIGHTPEN_PASSWORD"  # names the variable with the password of a supervisor
+OF_TIPS = {  # options, by what they say of a tip
+    "ball_diameter_mm": "ball_diameter",
+    "nominal_tip_mm": "nominal",
+    "stylus_axis": "axis",
+    "max_change_mm": "max_change",
+    "max_days": "max_days",
+    "max_swings": "max_swings",
+    "picture": "picture",
+}
+POINTS = ("nominal", "axis")
+
+
+@printing
+def _list(options: argparse.Namespace) -> None:
+    data = _data(options)
+    library = read_library(data)
+    found = _standings(data, library, options.max_days)
+    records = [
+        _record(item, found)
+        for kind in ItemKind
+        for item in library.items(kind).values()
+        if options.all or not item.is_retired
+    ]
+    if options.json:
+        print(json.dumps(records, indent=1))
+        return
+    for record in records:
+        print(shown(_line(record)))
+
+
+@printing
+def _add(options: argparse.Namespace) -> None:
+    kinds: dict[ItemKind, type[AnyItem]] = {Pen.kind: Pen, Tip.kind: Tip}
+    made = kinds.get(ItemKind(options.kind), Cone)(id=options.id)
+    item = _with_entries(made, options)
+    _tell(options, item, add_item(_data(options), item, _author(options), local_now()))
+
+
+@printing
+def _change(options: argparse.Namespace) -> None:
+    data = _data(options)
+    there = known_item(read_library(data), ItemKind(options.kind), options.id)
+    item = _with_entries(there, options)
+    _tell(options, item, change_item(data, item, _author(options), local_now()))
+
+
+@printing
+def _retire(options: argparse.Namespace) -> None:
+    _set_retired(options, is_retired=True)
+
+
+@printing
+def _return(options: argparse.Namespace) -> None:
+    _set_retired(options, is_retired=False)
+
+
+@printing
+def _spin(options: argparse.Namespace) -> None:
+    data = _data(options)
+    tip = known_item(read_library(data), ItemKind.TIP, options.id)
+    assert isinstance(tip, Tip)
+    found = _spun(options)
+    x, y, z = found.axis_pen.tolist()
+    tip = structs.replace(tip, stylus_axis=(x, y, z), axis_origin=AxisOrigin.SPIN)
+    library = change_item(data, tip, _author(options), local_now())
+    if not options.json:
+        print(
+            f"Axis {x:.5f} {y:.5f} {z:.5f}, U (k = 2) "
+            f"{_degrees(found.expanded_uncertainty)}, turned by "
+            f"{_degrees(found.turn)}, tilted by {_degrees(found.wobble)} rms."
+        )
+    _tell(options, tip, library)
+
+
+ACTIONS: dict[str, Command] = {
+    "list": _list,
+    "add": _add,
+    "change": _change,
+    "retire": _retire,
+    "return": _return,
+    "spin": _spin,
+}
+
+
+def _spun(options: argparse.Namespace) -> SpinFit:
+    camera = read_camera(options.camera)
+    pen = read_pen(options.pen, options.units, options.led_diameter, None)
+    with progress("Finding LEDs") as report:
+        seen = observe_images(find_images(*options.images), camera, pen, report)
+    fit = [i for i, reason in enumerate(seen.reasons) if not reason]
+    return fit_spin(seen.rotations[fit])
+
+
+def _set_retired(options: argparse.Namespace, *, is_retired: bool) -> None:
+    kind = ItemKind(options.kind)
+    library = retire_item(
+        *(_data(options), kind, options.id, _author(options), local_now()),
+        is_retired=is_retired,
+    )
+    _tell(options, known_item(library, kind, options.id), library)
+
+
+def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
+    """Return an item with what was said of it."""
+    if options.note is not None:
+        item = structs.replace(item, note=options.note)
+    if options.due is not None:
+        item = structs.replace(item, due=_said(options.due))
+    said = dict(_entries_of_tip(options))
+    if said and not isinstance(item, Tip):
+        raise UsageError(
+            sentence(
+                "library.only-tips",
+                "Only a tip has a ball, an axis, limits and a picture; {id} is none.",
+                id=item.id,
+            )
+        )
+    return structs.replace(item, **said)
+
+
+def _entries_of_tip(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
+    for entry, option in OF_TIPS.items():
+        value = getattr(options, option)
+        if value is None:
+            continue
+        if option in POINTS:
+            value = _point(option, value)
+        elif option == "picture" and value is not FORGOTTEN:
+            value = keep_picture(_data(options), value)
+        yield entry, _said(value)
+        if option == "axis":
+            yield "axis_origin", None if value is FORGOTTEN else AxisOrigin.GIVEN
+
+
+def _said(value: Any) -> Any:
+    return None if value is FORGOTTEN else value
+
+
+def _point(option: str, words: list[Any]) -> Any:
+    if words == [FORGOTTEN]:
+        return FORGOTTEN
+    if len(words) != 3 or FORGOTTEN in words:
+        raise UsageError(
+            sentence(
+                "library.no-point",
+                "--{option} takes three numbers, X Y Z, or none.",
+                option=option,
+            )
+        )
+    return tuple(words)
+
+
+def _author(options: argparse.Namespace) -> Author:
+    signature = None
+    if options.supervisor is not None:
+        password = os.environ.get(PASSWORD)
+        if password is None:
+            password = getpass.getpass("Supervisor's password: ")
+        signature = Signature(options.supervisor, password)
+    return Author(options.station, options.operator, options.reason, signature)
+
+
+def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
+    """Enter a change in the archive, and say what there is now."""
+    data = _data(options)
+    try:
+        with closing(Logbook(data)) as logbook:
+            troubles = logbook.enter_owed()
+    except ArchiveError as error:  # it stays owed
+        troubles = (error.sentence,)
+    for trouble in troubles:
+        print(shown(f"It is not in the archive yet: {trouble}"))
+    kept = known_item(library, item.kind, item.id.strip())
+    record = _record(kept, _standings(data, library, None))
+    print(json.dumps(record, indent=1) if options.json else shown(_line(record)))
+
+
+def _standings(data: Path, library: Library, max_days: int | None) -> Standings:
+    rule = DueRule() if not max_days else DueRule(max_days)
+    now = local_now()
+    if not (data / ARCHIVE).is_file():
+        return Standings(library, now=now)
+    with closing(look_into(data / ARCHIVE)) as database:
+        chain = chain_at_home(database) or ""
+        return standings(database, chain, rule, library, now)
+
+
+def _record(item: AnyItem, found: Standings) -> dict[str, Any]:
+    """Return what is said of an item, and how it stands."""
+    entries: dict[str, Any] = {"kind": item.kind.value}
+    entries |= {n: e for n, e in to_builtins(item).items() if n != "type"}
+    standing = found.of_item(item.kind, item.id)
+    entries["standing"] = "" if standing is None else standing.value
+    if isinstance(item, Tip):
+        entries["in_force"] = [
+            {
+                "pen": pen,
+                "calibrated": _moment(
+                    found.in_force[pen, item.id].entry.entry.event.at
+                ),
+                "due": str(found.due(pen, item.id)),
+                "standing": found.of_tip(pen, item.id),
+            }
+            for pen in found.pens_of(item.id)
+        ]
+        if standing == "valid" and not entries["in_force"]:
+            entries["standing"] = "not calibrated"
+    return entries
+
+
+def _line(record: dict[str, Any]) -> str:
+    words = [record["kind"], record["id"]]
+    ball = record.get("ball_diameter_mm")
+    words += [] if ball is None else [f"{ball:g} mm"]
+    words += [record["standing"]]
+    for each in record.get("in_force", ()):
+        words.append(f"pen {each['pen']}: {each['standing']}, due {each['due']}")
+    if record["due"] is not None:
+        words.append(f"by {record['due']}")
+    return "  ".join(filter(None, [*words, record["note"]]))
+
+
+def _moment(moment: datetime) -> str:
+    return moment.isoformat(timespec="seconds")
+
+
+def _degrees(angle: float) -> str:
+    return f"{angle * 57.29577951308232:.2f} degrees"
+
+
+def _data(options: argparse.Namespace) -> Path:
+    folder: Path = options.data_folder() if options.data is None else options.data
+    return folder

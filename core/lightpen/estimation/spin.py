@@ -1,0 +1,145 @@
+"""The axis of a stylus, by spinning the pen about it with the tip in the cone.
+
+While the pen turns about its stylus, the stylus points one way in the camera, whatever
+the pen does about it. So every pose i gives
+
+    R_i axis_pen = axis_cam
+
+with two unknown directions. The sum of the squared differences is least for the pair of
+singular vectors of the mean rotation that belongs to its largest singular value [1]_.
+The hand tilts the pen as it turns it; by how much, the differences tell, and how that
+carries over to the axis their derivatives by both directions.
+
+References
+----------
+.. [1] G. H. Golub, C. F. Van Loan, "Matrix Computations", 4th ed., 2013, section 2.4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.model.posture import UPRIGHT_AXIS
+from lightpen.sentences import sentence
+
+MIN_POSES = 10
+MIN_TURN = np.radians(40.0)  # less, and the tilt of the hand hides the axis
+MAX_UNCERTAINTY = np.radians(2.0)  # puts the surface of a 10 mm ball 0.003 mm off
+COVERAGE_FACTOR = 2.0
+MOST_ALIKE = 0.98  # lag-1 autocorrelation that can be told from a drift
+TINY = 1e-30
+
+
+@dataclass(frozen=True, eq=False)
+class SpinFit:
+    """The axis that a pen was spun about.
+
+    Attributes
+    ----------
+    axis_pen : (3,) array
+        Unit vector from the ball into the pen, pen frame.
+    axis_cam : (3,) array
+        The same in the camera frame.
+    expanded_uncertainty : float
+        U (k = 2) of its direction, rad.
+    turn : float
+        Angle that the pen was turned through, rad.
+    wobble : float
+        By which the axis was tilted on the way, rms, rad.
+    """
+
+    axis_pen: FloatArray
+    axis_cam: FloatArray
+    expanded_uncertainty: float
+    turn: float
+    wobble: float
+
+
+def fit_spin(rotations: FloatArray, upwards: FloatArray = UPRIGHT_AXIS) -> SpinFit:
+    """Fit the axis of a stylus to poses that spin about it.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of cam_from_pen, in the order of capture.
+    upwards : (3,) array
+        Roughly from the ball into the pen, pen frame.
+
+    Raises
+    ------
+    CalibrationError
+        There are too few poses, they turn too little, or the axis was not held still
+        enough to be told.
+    """
+    n = len(rotations)
+    if n < MIN_POSES:
+        raise CalibrationError(
+            sentence(
+                "spin.few-poses",
+                "The pen is seen in {n} images of the spin; {needed} are needed. Spin "
+                "it slowly, its LEDs to the camera.",
+                n=n,
+                needed=MIN_POSES,
+            )
+        )
+    left, _, right = np.linalg.svd(rotations.mean(axis=0))
+    sign = 1.0 if right[0] @ upwards >= 0 else -1.0
+    axis_pen, axis_cam = sign * right[0], sign * left[:, 0]
+    across_pen, across_cam = right[1:].T, left[:, 1:]
+    turns = across_cam.T @ rotations @ across_pen  # 2 x 2 each
+    angles = np.arctan2(
+        turns[:, 1, 0] - turns[:, 0, 1], turns[:, 0, 0] + turns[:, 1, 1]
+    )
+    turn = float(np.ptp(np.unwrap(angles)))
+    if turn < MIN_TURN:
+        raise CalibrationError(
+            sentence(
+                "spin.little-turn",
+                "The pen was turned by {turn:.0f} degrees about its stylus; at least "
+                "{needed:.0f} are needed. Keep the tip in the cone and turn it further "
+                "to both sides.",
+                turn=float(np.degrees(turn)),
+                needed=float(np.degrees(MIN_TURN)),
+            )
+        )
+    tilts = rotations @ axis_pen @ across_cam
+    uncertainty = COVERAGE_FACTOR * _axis_deviation(turns, tilts)
+    if uncertainty > MAX_UNCERTAINTY:
+        raise CalibrationError(
+            sentence(
+                "spin.wobbling",
+                "The axis of the stylus is uncertain by {uncertainty:.1f} degrees, at "
+                "most {needed:.1f} are of use: the pen was tilted while it was spun. "
+                "Hold the stylus upright between two fingers and turn only.",
+                uncertainty=float(np.degrees(uncertainty)),
+                needed=float(np.degrees(MAX_UNCERTAINTY)),
+            )
+        )
+    wobble = float(np.sqrt(np.mean(np.sum(tilts**2, axis=1))))
+    return SpinFit(axis_pen, axis_cam, uncertainty, turn, wobble)
+
+
+def _axis_deviation(turns: FloatArray, tilts: FloatArray) -> float:
+    """Return the standard deviation of the axis along its worst direction, rad.
+
+    Parameters
+    ----------
+    turns : (N, 2, 2) array
+        Derivatives of the tilts by the axis in the pen; by that in the camera they are
+        those of minus the identity.
+    tilts : (N, 2) array
+        Of the axis in the camera, rad.
+    """
+    n = len(tilts)
+    design = np.concatenate(
+        [turns, np.broadcast_to(-np.eye(2), turns.shape)], axis=2
+    ).reshape(-1, 4)
+    variance = float(np.sum(tilts**2)) / (2 * n - 4)
+    # A hand tilts slowly: poses next to each other tell less than n of them.
+    shifted = float(np.sum(tilts[1:] * tilts[:-1])) / max(float(np.sum(tilts**2)), TINY)
+    correlation = min(max(shifted, 0.0), MOST_ALIKE)
+    covariance = variance * np.linalg.pinv(design.T @ design)[:2, :2]
+    covariance *= (1 + correlation) / (1 - correlation)
+    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))

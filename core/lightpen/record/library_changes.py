@@ -1,0 +1,309 @@
+"""Changing the tip library: each change checked, signed where it must be, and kept."""
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from hashlib import sha256
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from msgspec import structs, to_builtins
+
+from lightpen.errors import NameTakenError, UsageError
+from lightpen.estimation.report import record_bytes
+from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
+from lightpen.formats.image_headers import read_image_header
+from lightpen.record.numbered_files import add_numbered, make_folder
+from lightpen.record.supervision import (
+    Signature,
+    read_supervision,
+    require_supervisor,
+)
+from lightpen.record.tip_library import (
+    FORMAT,
+    LARGEST_BALL,
+    LARGEST_CHANGE,
+    LIBRARY,
+    LONGEST_ID,
+    MOST_DAYS,
+    MOST_SWINGS,
+    PICTURES,
+    AnyItem,
+    AxisOrigin,
+    Item,
+    ItemKind,
+    Library,
+    LibraryChange,
+    Picture,
+    Tip,
+    read_library,
+)
+from lightpen.sentences import Sentence, sentence
+
+LARGEST_PLACE = 10_000.0  # mm
+LARGEST_PICTURE = 8 * MEGABYTE
+PICTURE = sentence("file.picture", "picture")
+
+KIND_WORDS: Mapping[ItemKind, Sentence] = {
+    ItemKind.PEN: sentence("library.pen", "pen"),
+    ItemKind.TIP: sentence("library.tip", "tip"),
+    ItemKind.CONE: sentence("library.cone", "cone"),
+}
+
+
+@dataclass(frozen=True)
+class Author:
+    """Who changes the library.
+
+    Attributes
+    ----------
+    reason : str
+        In their words; may be empty.
+    signature : Signature or None
+        Of a supervisor, where there is a password.
+    """
+
+    station: str = ""
+    operator: str = ""
+    reason: str = ""
+    signature: Signature | None = None
+
+
+def add_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    """Add an item, and return the library with it.
+
+    Raises
+    ------
+    UsageError
+        Its id is in use or no id, or an entry makes no sense.
+    AcceptanceError
+        There is a password, and no supervisor has signed.
+    FileError
+        It cannot be kept; the library stays as it was.
+    """
+    item = _sensible(item)
+    there = read_library(data).alike(item.kind, item.id)
+    if there is not None:
+        raise UsageError(_in_use(there))
+    return _keep(data, item, by, now)
+
+
+def change_item(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    """Put another version of an item in its place, and return the library.
+
+    One that is as it was is not kept once more.
+
+    Raises
+    ------
+    UsageError
+        It is not in the library, or an entry makes no sense.
+    AcceptanceError, FileError
+        As of `add_item`.
+    """
+    item, library = _sensible(item), read_library(data)
+    there = library.item(item.kind, item.id)
+    if there is None:
+        raise UsageError(no_such_item(item.kind, item.id))
+    return library if there == item else _keep(data, item, by, now)
+
+
+def retire_item(
+    data: Path,
+    kind: ItemKind,
+    name: str,
+    by: Author,
+    now: datetime,
+    *,
+    is_retired: bool = True,
+) -> Library:
+    """Retire an item, or bring it back, and return the library.
+
+    Raises
+    ------
+    UsageError
+        It is not in the library.
+    AcceptanceError, FileError
+        As of `add_item`.
+    """
+    item = known_item(read_library(data), kind, name)
+    return change_item(data, structs.replace(item, is_retired=is_retired), by, now)
+
+
+def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
+    """Return an item of a library.
+
+    Raises
+    ------
+    UsageError
+        It is not in there.
+    """
+    found = library.item(kind, name)
+    if found is None:
+        raise UsageError(no_such_item(kind, name))
+    return found
+
+
+def keep_picture(data: Path, file: Path) -> Picture:
+    """Copy a picture into the data folder, by its hash, and return where it is.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, is no picture, or cannot be kept.
+    """
+    content = read_bytes(file, PICTURE, LARGEST_PICTURE)
+    read_image_header(BytesIO(content), printable(str(file)))
+    digest = sha256(content).hexdigest()
+    kept = data / LIBRARY / PICTURES / f"{digest[:16]}{file.suffix.lower()}"
+    make_folder(kept.parent)
+    with suppress(NameTakenError):  # the same picture, of another item
+        create_whole(kept, content)
+    return Picture(kept.relative_to(data).as_posix(), digest)
+
+
+def given_axis(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return the axis of a stylus along a direction, of length 1.
+
+    Raises
+    ------
+    UsageError
+        It is no direction.
+    """
+    length = float(np.linalg.norm(direction))
+    if not (math.isfinite(length) and length > 0):
+        raise UsageError(
+            sentence(
+                "library.no-direction",
+                "0 0 0 is no direction. Give the axis of the stylus from the ball "
+                "into the pen, in the frame of the pen, such as 0 1 0.",
+            )
+        )
+    x, y, z = (part / length for part in direction)
+    return x, y, z
+
+
+def no_such_item(kind: ItemKind, name: str) -> Sentence:
+    """Return that an item is not in the library."""
+    return sentence(
+        "library.no-such-item",
+        "There is no {kind} {id} in the library. Add it first.",
+        kind=KIND_WORDS[kind],
+        id=printable(name),
+    )
+
+
+def _keep(data: Path, item: AnyItem, by: Author, now: datetime) -> Library:
+    supervisor = ""
+    supervision = read_supervision(data)
+    if supervision.is_guarded:
+        signature = by.signature or Signature("", "")
+        require_supervisor(supervision, signature)
+        supervisor = signature.name.strip()
+    change = LibraryChange(
+        format=FORMAT,
+        at=now,
+        item=item,
+        station=by.station,
+        operator=by.operator,
+        supervisor=supervisor,
+        reason=by.reason.strip(),
+    )
+    add_numbered(data / LIBRARY, record_bytes(_entries(change)))
+    return read_library(data)
+
+
+def _entries(change: LibraryChange) -> dict[str, Any]:
+    entries: dict[str, Any] = to_builtins(change)
+    return entries
+
+
+def _sensible(item: AnyItem) -> AnyItem:
+    """Return an item as it is kept; refuse what makes no sense."""
+    name = item.id.strip()
+    if not (name and name.isprintable() and len(name) <= LONGEST_ID):
+        raise UsageError(
+            sentence(
+                "library.bad-id",
+                "'{id}' is no id. Give up to {most} letters and digits, as its label "
+                "has them.",
+                id=printable(name[: 2 * LONGEST_ID]),
+                most=LONGEST_ID,
+            )
+        )
+    item = structs.replace(item, id=name, note=item.note.strip())
+    return _sensible_tip(item) if isinstance(item, Tip) else item
+
+
+def _sensible_tip(tip: Tip) -> Tip:
+    ball, change = tip.ball_diameter_mm, tip.max_change_mm
+    if ball is not None and not 0 < ball <= LARGEST_BALL:
+        raise UsageError(
+            sentence(
+                "library.absurd-ball",
+                "A ball of {diameter:g} mm is not possible: above 0 and up to {most:g} "
+                "mm are. Measure it, or leave it out where it is not known.",
+                diameter=ball,
+                most=LARGEST_BALL,
+            )
+        )
+    if change is not None and not 0 < change <= LARGEST_CHANGE:
+        raise UsageError(
+            sentence(
+                "library.absurd-change",
+                "A limit of {limit:g} mm for the change is not possible: above 0 and "
+                "up to {most:g} mm are.",
+                limit=change,
+                most=LARGEST_CHANGE,
+            )
+        )
+    for count, most in ((tip.max_days, MOST_DAYS), (tip.max_swings, MOST_SWINGS)):
+        if count is not None and not 1 <= count <= most:
+            raise UsageError(
+                sentence(
+                    "library.absurd-count",
+                    "{count} is too few or too many: 1 to {most} days or swings are "
+                    "possible until a tip is due.",
+                    count=count,
+                    most=most,
+                )
+            )
+    nominal = tip.nominal_tip_mm
+    if nominal is not None and not np.abs(nominal).max() <= LARGEST_PLACE:
+        raise UsageError(
+            sentence(
+                "library.absurd-nominal",
+                "The nominal centre of tip {tip} is not possible: each coordinate is "
+                "at most {most:g} mm from the origin of the pen frame.",
+                tip=printable(tip.id),
+                most=LARGEST_PLACE,
+            )
+        )
+    axis, origin = tip.stylus_axis, tip.axis_origin
+    if axis is None:
+        return structs.replace(tip, axis_origin=None)
+    return structs.replace(
+        tip, stylus_axis=given_axis(axis), axis_origin=origin or AxisOrigin.GIVEN
+    )
+
+
+def _in_use(there: Item) -> Sentence:
+    kind, name = KIND_WORDS[there.kind], printable(there.id)
+    if there.is_retired:
+        return sentence(
+            "library.id-of-retired",
+            "The {kind} {id} is in the library already, retired. Bring it back, or "
+            "give this one another id.",
+            kind=kind,
+            id=name,
+        )
+    return sentence(
+        "library.id-in-use",
+        "The {kind} {id} is in the library already. Change that one, or give this one "
+        "another id.",
+        kind=kind,
+        id=name,
+    )

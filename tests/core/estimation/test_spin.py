@@ -1,0 +1,63 @@
+"""The axis of a stylus by a spin: exact, as certain as it says, or refused."""
+
+import numpy as np
+import pytest
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.spin import fit_spin
+from lightpen.model.posture import FACING
+from lightpen.model.rigid import rotation_from_vector
+
+AXIS = np.array([0.1, 0.97, -0.2]) / np.linalg.norm([0.1, 0.97, -0.2])
+
+
+def spun(
+    turn_deg: float, n: int = 60, wobble: float = 0.0, seed: int = 0
+) -> FloatArray:
+    """Return rotations (N, 3, 3) of a pen that is spun about `AXIS`."""
+    angles = np.radians(np.linspace(-turn_deg / 2, turn_deg / 2, n))
+    tilts = wobble * np.random.default_rng(seed).standard_normal((n, 3))
+    turns = rotation_from_vector(angles[:, None] * AXIS)
+    return np.asarray(rotation_from_vector(tilts) @ FACING @ turns)
+
+
+@pytest.mark.parametrize("turn_deg", [45.0, 120.0, 360.0])
+def test_an_exact_spin_gives_the_exact_axis(turn_deg: float) -> None:
+    found = fit_spin(spun(turn_deg))
+
+    np.testing.assert_allclose(found.axis_pen, AXIS, atol=1e-9)
+    np.testing.assert_allclose(found.axis_cam, FACING @ AXIS, atol=1e-9)
+    assert np.degrees(found.turn) == pytest.approx(turn_deg)
+    assert found.wobble == pytest.approx(0, abs=1e-9)
+    assert found.expanded_uncertainty == pytest.approx(0, abs=1e-9)
+
+
+def test_the_axis_lies_within_its_uncertainty_as_often_as_it_says() -> None:
+    within = []
+    for seed in range(200):
+        found = fit_spin(spun(100.0, wobble=np.radians(0.5), seed=seed))
+        error = np.linalg.norm(found.axis_pen - AXIS)
+        within.append(error <= found.expanded_uncertainty)
+
+    # U is along the worst direction; an error has two, so of k = 2 some 95 % or less.
+    assert 0.88 <= np.mean(within) <= 1.0
+
+
+def test_the_axis_points_from_the_ball_into_the_pen() -> None:
+    assert fit_spin(spun(90.0), upwards=-AXIS).axis_pen @ AXIS == pytest.approx(-1)
+
+
+def test_a_pen_that_is_hardly_turned_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="turned by 20 degrees about its stylus"):
+        fit_spin(spun(20.0))
+
+
+def test_too_few_images_are_refused() -> None:
+    with pytest.raises(CalibrationError, match="seen in 5 images of the spin"):
+        fit_spin(spun(90.0, n=5))
+
+
+def test_a_pen_that_is_tilted_as_it_is_spun_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="was tilted while it was spun"):
+        fit_spin(spun(45.0, n=20, wobble=np.radians(15)))

@@ -1,0 +1,76 @@
+"""What ``lightpen tips`` keeps and prints, and the exit status it ends with."""
+
+import json
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+from subprocess import CompletedProcess
+
+from lightpen.archive.chains import entries_of, own_chain
+from lightpen.archive.database import open_file
+from lightpen.archive.entries import Kind
+from lightpen.archive.logbook import ARCHIVE
+
+Run = Callable[..., CompletedProcess[str]]
+
+
+def test_a_tip_is_added_changed_retired_and_listed(
+    lightpen: Run, tmp_path: Path
+) -> None:
+    where = ("--data", tmp_path / "data", "--operator", "Ann")
+    tip = ("tip", "T-10", *where)
+    added = lightpen(
+        *("tips", "add", *tip, "--ball-diameter", "10", "--nominal", "0", "1.5"),
+        *("-150", "--axis", "0", "2", "0", "--max-change", "0.02", "--max-days", "7"),
+    )
+    assert added.stdout == "tip  T-10  10 mm  not calibrated\n", added.stderr
+
+    lightpen("tips", "change", *tip, "--max-change", "none", "--due", "2031-05-01")
+    lightpen("tips", "add", "cone", "C-1", *where, "--note", "by the door")
+    lightpen("tips", "retire", "cone", "C-1", *where, "--reason", "chipped")
+
+    listed = lightpen("tips", "list", *where[:2], "--json")
+    (record,) = json.loads(listed.stdout)
+    assert record["stylus_axis"] == [0, 1, 0]
+    assert record["nominal_tip_mm"] == [0, 1.5, -150]
+    assert (record["max_change_mm"], record["max_days"]) == (None, 7)
+    assert (record["due"], record["standing"]) == ("2031-05-01", "not calibrated")
+    everything = lightpen("tips", "list", *where[:2], "--all").stdout
+    assert "cone  C-1  retired  by the door\n" in everything
+
+    with closing(open_file(tmp_path / "data" / ARCHIVE)) as database:
+        events = [e.entry.event for e in entries_of(database, own_chain(database))]
+    assert [event.kind for event in events] == 4 * [Kind.LIBRARY]
+    assert {event.names.operator for event in events} == {"Ann"}
+    assert events[-1].reason == "chipped"
+
+
+def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
+    lightpen: Run, tmp_path: Path
+) -> None:
+    where = ("--data", tmp_path / "data")
+    for words, told in (
+        (("add", "tip", "T-1", "--ball-diameter", "0"), "A ball of 0 mm"),
+        (("add", "cone", "C-1", "--ball-diameter", "5"), "Only a tip has a ball"),
+        (("add", "tip", "T-1", "--axis", "0", "1"), "takes three numbers"),
+        (("change", "tip", "T-1"), "There is no tip T-1 in the library"),
+    ):
+        refused = lightpen("tips", *words, *where)
+        assert refused.returncode == 2
+        assert told in refused.stderr
+    assert not (tmp_path / "data" / "library").exists()
+
+
+def test_a_swing_is_no_spin(
+    lightpen: Run, scene: Callable[..., Path], tmp_path: Path
+) -> None:
+    images = scene()
+    where = ("--data", tmp_path / "data")
+    lightpen("tips", "add", "tip", "T-1", *where)
+
+    spun = lightpen(
+        *("tips", "spin", "T-1", images, "--camera", images / "camera.yaml"),
+        *("--pen", images / "leds.csv", *where),
+    )
+    assert spun.returncode == 1
+    assert "stylus" in spun.stderr
