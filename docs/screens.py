@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import numpy as np
-from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool
+from PySide6.QtCore import QDeadlineTimer, QEvent, QSize, QThreadPool, QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 from typing_extensions import override
@@ -186,12 +186,19 @@ class Stage:
         return self.still(self._grabbed)
 
     def still(self, look: Callable[[], Seen]) -> Seen:
-        """Return what a look shows, as soon as it shows the same twice."""
+        """Return what a look shows, as soon as it shows the same twice.
+
+        What a page shows after a moment, however late that is, comes before.
+        """
         before, now = None, look()
         while now != before:
-            self._settle()
+            self._wait_until(lambda: not self._is_about_to_change())
             before, now = now, look()
         return now
+
+    def _is_about_to_change(self) -> bool:
+        timers = self.wizard.window.page().findChildren(QTimer)
+        return any(timer.isActive() and timer.isSingleShot() for timer in timers)
 
     def _grabbed(self) -> QImage:
         image = self.wizard.window.grab().toImage()
@@ -286,6 +293,7 @@ class Stage:
         return Shown(pooled(image), QSize(width, height), seen)
 
     def _wait_until(self, condition: Callable[[], bool]) -> None:
+        self._settle()
         while not condition():
             time.sleep(PAUSE)  # the work that is waited for needs the processor, too
             self._settle()

@@ -56,7 +56,7 @@ def test_a_cancelled_job_stops_and_tells_only_that_it_ended(qtbot: QtBot) -> Non
     ):
         job.cancel()
 
-    assert QThreadPool.globalInstance().waitForDone(2000)
+    assert QThreadPool.globalInstance().waitForDone(60_000)
 
 
 def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
@@ -69,8 +69,8 @@ def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
     job = Job(finish)
     with qtbot.assertNotEmitted(job.succeeded):
         job.start()
-        assert done.wait(2)
-        assert QThreadPool.globalInstance().waitForDone(2000)
+        assert done.wait(60)
+        assert QThreadPool.globalInstance().waitForDone(60_000)
         job.cancel()  # the result waits in the event queue of this thread
         QApplication.processEvents()
 
@@ -78,7 +78,7 @@ def test_an_outcome_on_its_way_is_not_told_once_cancelled(qtbot: QtBot) -> None:
 def test_a_job_that_is_cancelled_before_its_turn_does_nothing(qtbot: QtBot) -> None:
     n_threads = QThreadPool.globalInstance().maxThreadCount()
     may_end, done = Event(), Event()
-    others = [Job(lambda report: may_end.wait(10)) for _ in range(n_threads)]
+    others = [Job(lambda report: may_end.wait(60)) for _ in range(n_threads)]
     for other in others:
         other.start()
     job = Job(lambda report: done.set())
@@ -111,5 +111,5 @@ def test_a_bug_reaches_the_crash_hook_and_ends_the_job(
         job.start()
 
     assert seen == [True]
-    assert QThreadPool.globalInstance().waitForDone(2000)
+    assert QThreadPool.globalInstance().waitForDone(60_000)
     assert isinstance(caught[0], ZeroDivisionError)

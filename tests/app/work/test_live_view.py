@@ -26,7 +26,7 @@ from lightpen_app.work.live_view import LiveView, Shown
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
-TIMEOUT = 20.0  # s until a test gives up
+TIMEOUT = 60.0  # s until a test gives up
 SIGNALS = (
     *("image_shown", "connection_changed", "settings_applied", "troubled", "failed"),
 )

@@ -20,7 +20,7 @@ from lightpen.cameras.protocol import (
 from lightpen.cameras.source import SourcePlace
 from lightpen.cameras.sources import SOURCES, absent_sources, source_named
 
-TIMEOUT = 5.0  # s
+TIMEOUT = 60.0  # s
 MANY = 50  # images, one of which fails
 NOWHERE = SourcePlace("none-of-this-name")
 

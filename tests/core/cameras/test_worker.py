@@ -44,7 +44,7 @@ from lightpen.simulator.hand import Operator
 from lightpen.simulator.scenes import Scene
 
 SCENE = Scene(camera=Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43))
-TIMEOUT = 20.0  # s until a test gives up
+TIMEOUT = 60.0  # s until a test gives up
 N_IMAGES = 40
 
 

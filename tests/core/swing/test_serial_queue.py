@@ -10,7 +10,7 @@ from lightpen.errors import Cancelled, LightpenError
 from lightpen.sentences import sentence
 from lightpen.swing.serial_queue import Report, SerialQueue
 
-TIMEOUT = 20.0  # s until a test gives up
+TIMEOUT = 60.0  # s until a test gives up
 FULL = sentence("disk.full", "The disk is full.")
 
 
