@@ -236,10 +236,10 @@ def _check_png(data: bytes, name: str) -> None:
 
 def _most_png_data(data: bytes) -> int:
     """Return the bytes of compressed data that the image of a PNG can come to."""
-    width, height, depth, colour = struct.unpack_from(">IIBB", data, 16)
+    width, height, depth, colour = map(int, struct.unpack_from(">IIBB", data, 16))
     row = 1 + -(-width * depth * PNG_CHANNELS.get(colour, 4) // 8)
     # What cannot be compressed grows by an eighth at most.
-    return int(height) * row * 9 // 8 + PNG_RESERVE
+    return height * row * 9 // 8 + PNG_RESERVE
 
 
 def _check_jpeg(data: bytes, name: str) -> None:
