@@ -31,6 +31,8 @@ from lightpen.sentences import Sentence, sentence
 IMAGE_FILE = sentence("file.image", "image")
 MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
 MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
+PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
+PNG_RESERVE = 2**16  # bytes of compressed data beyond what an image can come to
 MAX_SCANS = 64  # of a JPEG, each of which takes as long as the image; 10 are usual
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
 MAX_KEPT_BLOCK = 32 * 2**20  # bytes; the most that malloc takes
@@ -193,9 +195,13 @@ def grey_image(image: npt.NDArray[Any], name: str | Sentence) -> Image:
 
 
 def _check_png(data: bytes, name: str) -> None:
-    """Walk over the chunks of a PNG: the decoder would only print what is wrong."""
+    """Walk over the chunks of a PNG: the decoder would only print what is wrong.
+
+    It would also unpack what comes after the image, however much that is.
+    """
     position = len(PNG_SIGNATURE)
     kind = b""
+    left = _most_png_data(data)
     while kind != b"IEND":
         head = data[position : position + 8]
         if len(head) < 8:
@@ -221,7 +227,19 @@ def _check_png(data: bytes, name: str) -> None:
                     name=name,
                 )
             )
+        if kind == b"IDAT":
+            left -= length
+        if left < 0:
+            raise damaged_image(name)
         position += 12 + length
+
+
+def _most_png_data(data: bytes) -> int:
+    """Return the bytes of compressed data that the image of a PNG can come to."""
+    width, height, depth, colour = map(int, struct.unpack_from(">IIBB", data, 16))
+    row = 1 + -(-width * depth * PNG_CHANNELS.get(colour, 4) // 8)
+    # What cannot be compressed grows by an eighth at most.
+    return height * row * 9 // 8 + PNG_RESERVE
 
 
 def _check_jpeg(data: bytes, name: str) -> None:

@@ -150,13 +150,36 @@ def test_a_jpeg_of_endless_scans_is_refused() -> None:
         decode_image(whole[:scan] + 101 * whole[scan:-2] + whole[-2:], "long.jpg")
 
 
+def png_chunk(kind: bytes, body: bytes) -> bytes:
+    checksum = zlib.crc32(kind + body).to_bytes(4, "big")
+    return len(body).to_bytes(4, "big") + kind + body + checksum
+
+
 def test_an_animation_is_refused() -> None:
     still = png(GREY)
-    control = b"acTL" + bytes(8)
-    chunk = bytes([0, 0, 0, 8]) + control + zlib.crc32(control).to_bytes(4, "big")
+    control = png_chunk(b"acTL", bytes(8))
 
     with pytest.raises(FileError, match="animation"):
-        decode_image(still[:33] + chunk + still[33:], "moving.png")
+        decode_image(still[:33] + control + still[33:], "moving.png")
+
+
+def test_a_png_that_goes_on_behind_its_image_is_refused() -> None:
+    whole = png(GREY)
+    more = png_chunk(b"IDAT", bytes(2**17))  # which zlib could unpack to 100 MB
+
+    with pytest.raises(FileError, match="damaged"):
+        decode_image(whole[:-12] + more + whole[-12:], "endless.png")
+
+
+@pytest.mark.parametrize("level", [0, 9])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_a_png_of_noise_is_read_however_little_it_is_compressed(
+    level: int, kind: type[np.uint8 | np.uint16]
+) -> None:
+    noise = RNG.integers(0, np.iinfo(kind).max, (300, 400), dtype=kind)
+    data = bytes(cv2.imencode(".png", noise, [cv2.IMWRITE_PNG_COMPRESSION, level])[1])
+
+    assert np.array_equal(decode_image(data, "noise.png"), noise)
 
 
 def test_large_images_are_decoded_in_turn(tmp_path: Path) -> None:
