@@ -34,6 +34,7 @@ class PageScroll(QScrollArea):
     def reveal(self, widget: QWidget) -> None:
         """Scroll to a widget whose words may just have become more."""
         content, around = self.widget(), widget.parentWidget()
+        assert content is not None
         while around is not None and around is not self:
             layout = around.layout()
             if layout is not None:
