@@ -95,7 +95,7 @@ _AT_THE_SCREEN: dict[Code, str] = {
 }
 _SHARES: dict[ShareName, str] = {
     ShareName.NOISE: QT_TRANSLATE_NOOP("phrases", "noise"),
-    ShareName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centers"),
+    ShareName.CENTERS: QT_TRANSLATE_NOOP("phrases", "centres"),
     ShareName.FORM: QT_TRANSLATE_NOOP("phrases", "ball, cone"),
     ShareName.TEMPERATURE: QT_TRANSLATE_NOOP("phrases", "warmth"),
     ShareName.DISTANCE: QT_TRANSLATE_NOOP("phrases", "cone distance"),

@@ -31,6 +31,18 @@ class PageScroll(QScrollArea):
         widget.setAutoFillBackground(False)
         self.viewport().setAutoFillBackground(False)
 
+    def reveal(self, widget: QWidget) -> None:
+        """Scroll to a widget whose words may just have become more."""
+        content, around = self.widget(), widget.parentWidget()
+        assert content is not None
+        while around is not None and around is not self:
+            layout = around.layout()
+            if layout is not None:
+                layout.activate()  # as the events that are under way would by and by
+            around = around.parentWidget()
+        content.resize(content.width(), content.heightForWidth(content.width()))
+        self.ensureWidgetVisible(widget, 0, 0)
+
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -432,12 +432,12 @@ class CameraPage(Rearranged, Page):
         self._second.tell_step(seen)
         self._exposure.set_value(inspection.exposure)
         self._focus.add(inspection)
-        outcome = self._stray.outcome()
+        outcome = self._stray.outcome().value()
         self._stray.feed(seen)
-        if self._stray.outcome() != outcome:
-            self._live.hurry()  # it searches
-            self._side.ensureWidgetVisible(self._stray)
         self._adjust(seen, inspection)
+        if self._stray.outcome().value() != outcome:
+            self._live.hurry()  # it searches
+            self._side.reveal(self._stray.outcome())
 
     def _on_connection_changed(self, connection: Connection) -> None:
         if connection in (Connection.OPENING, Connection.STREAMING):

@@ -86,9 +86,9 @@ class StrayLightPanel(Translated, QGroupBox):
         """Return the circles (M, 3) that were found and are not masked yet, px."""
         return self._found
 
-    def outcome(self) -> Remark:
-        """Return what the search has come to."""
-        return self._outcome.value()
+    def outcome(self) -> SignLabel:
+        """Return the label of what the search has come to."""
+        return self._outcome
 
     def set_n_masked(self, n_masked: int) -> None:
         """Say how many circles are left out now."""

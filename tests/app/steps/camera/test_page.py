@@ -776,6 +776,7 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen: "Seen", workbench: Workbench, small_scene: Scene
 ) -> None:
     plugged(workbench, small_scene, *LAMPS)
+    seen.page.resize(764, 372)  # in the smallest window
     seen.page.entered()
     seen.wait("10 of 10 LEDs, other spots: 2")
 
@@ -783,6 +784,8 @@ def test_what_shines_beside_the_covered_pen_is_found_and_masked(
     seen.wait("too few LEDs")
     seen.click("Search")
     seen.wait("Stray spots: 2.")
+    told = next(x for x in seen.page.findChildren(QLabel) if "Stray sp" in x.text())
+    seen.until(lambda: told.visibleRegion().boundingRect() == told.rect())
     seen.until(lambda: [m.label for m in seen.markers] == ["stray", "stray"])
 
     seen.click("Mask the spots: 2")
@@ -911,7 +914,7 @@ def test_what_shines_and_moves_is_no_stray_light(qtbot: QtBot) -> None:
         frame = Frame(sealed(image), i, 0)
         panel.feed(LiveImage(frame, detect_spots(frame.image), None))
 
-    assert panel.outcome().text.startswith("What shines moves")
+    assert panel.outcome().value().text.startswith("What shines moves")
     assert len(panel.found()) == 0
 
 

@@ -346,6 +346,7 @@ def test_exchanged_leds_of_a_file_are_named_and_can_be_mended(
     numbers = seen.named("Numbers in order")
     assert numbers.accessibleDescription() == "not fulfilled"
     assert in_use(workbench) is before
+    assert seen.page.unsaved() == ""  # nobody has changed anything
     assert why_not(seen) == "Mend the LED table first: what is wrong is told above."
     assert not seen.named("Save as...").isEnabled()
 

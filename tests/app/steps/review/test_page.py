@@ -390,6 +390,7 @@ def test_without_an_earlier_result_or_a_nominal_tip_that_is_said(
 ) -> None:
     rows = differences(page)
     assert rows["no earlier result"] == ("", "", "")
+    assert page.lead() == "Next: accept the tip."  # none is in force until then
     assert "odd - even" in rows
     assert remarks(page) == ""
 
