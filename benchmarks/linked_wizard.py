@@ -2,8 +2,10 @@
 
 Usage: python benchmarks/linked_wizard.py SECONDS
 
-One line of JSON: images looked at for the swing, and what became of the others. The
-camera is `linked_camera.py`, in a process of its own.
+One line of JSON: images looked at for the swing, and what became of the others; then
+how long it took to tell that the camera was cut off, and to show its images again. The
+camera is cut off once more and the program closed, which whoever started it may time
+from the line on. The camera is `linked_camera.py`, in a process of its own.
 """
 
 import json
@@ -23,10 +25,11 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PySide6.QtCore import QEventLoop, QTimer
 
 from lightpen.cameras.protocol import CameraSettings, Region
+from lightpen.cameras.worker import Connection
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.simulator.scenes import Scene
 from lightpen.swing.state import Phase
-from lightpen_app.application import Wizard, make_application
+from lightpen_app.application import Wizard, ended, make_application
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings, Station
 
@@ -34,7 +37,7 @@ CAMERA = Path(__file__).with_name("linked_camera.py")
 ADDRESS, SERIAL = "127.0.0.1", "LP01"
 FRAME_RATE, PACKET_SIZE, EXPOSURE_US = 25.0, 16_000, 1000.0
 N_IMAGES = 10_000  # that no swing takes, so that it goes on
-LONGEST_S = 60.0  # until images are kept
+LONGEST_S = 60.0  # until something comes that is waited for
 
 
 def main() -> int:
@@ -44,14 +47,7 @@ def main() -> int:
     scene = Scene()
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
-        camera = stack.enter_context(
-            subprocess.Popen(
-                [sys.executable, str(CAMERA)], stdout=subprocess.PIPE, text=True
-            )
-        )
-        stack.callback(camera.kill)
-        assert camera.stdout is not None
-        camera.stdout.readline()
+        camera = _plugged_in(stack)
         wizard = Wizard(
             application, make_pages, _settings(Path(folder), scene), Path(folder)
         )
@@ -72,9 +68,34 @@ def main() -> int:
         _run(seconds)
         elapsed = time.perf_counter() - start
         stats = live.stats.since(before)
-        print(json.dumps({"seconds": elapsed, **asdict(stats)}))
+        connections: list[Connection] = []
+        live.connection_changed.connect(connections.append)
+        start = time.perf_counter()
+        camera.kill()
+        _until(lambda: Connection.LOST in connections)
+        told = time.perf_counter() - start
+        camera = _plugged_in(stack)
+        n_before, start = live.stats.delivered, time.perf_counter()
+        _until(lambda: live.stats.delivered > n_before)
+        back = time.perf_counter() - start
+        camera.kill()
+        found = {"seconds": elapsed, "told": told, "back": back, **asdict(stats)}
+        print(json.dumps(found), flush=True)
         wizard.window.close_unasked()
-    return 0
+        return ended(wizard, 0)
+
+
+def _plugged_in(stack: ExitStack) -> "subprocess.Popen[str]":
+    """Return a camera that is there until it is killed."""
+    camera = stack.enter_context(
+        subprocess.Popen(
+            [sys.executable, str(CAMERA)], stdout=subprocess.PIPE, text=True
+        )
+    )
+    stack.callback(camera.kill)
+    assert camera.stdout is not None
+    camera.stdout.readline()
+    return camera
 
 
 def _settings(folder: Path, scene: Scene) -> Settings:
@@ -114,7 +135,7 @@ def _until(condition: Callable[[], bool]) -> None:
     end = time.monotonic() + LONGEST_S
     while not condition():
         if time.monotonic() > end:
-            raise TimeoutError("The swing did not begin.")
+            raise TimeoutError("What is waited for did not come.")
         _run(0.05)
 
 

@@ -6,6 +6,7 @@ import shutil
 import statistics
 import subprocess
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -21,6 +22,8 @@ QUIET = ("start", "minimised")
 START_LIMIT = 2.5  # s
 LINK_SECONDS = 20
 LEAST_LINK_RATE = 20.0  # images/s
+MOST_TOLD, MOST_BACK, MOST_CLOSING = 7.0, 5.0, 3.0  # s
+LONGEST_END = 60.0  # s that a process is given to end
 SOAK_SECONDS = 600
 LEAST_RATE = 18.0  # images/s
 MOST_LATE = 50.0  # ms
@@ -83,9 +86,13 @@ def link_rows(seconds: float = LINK_SECONDS) -> list[Row]:
     aravis = source_named("aravis")
     if aravis is None or aravis.why_absent() is not None:
         return [Row(what, "needs Aravis")]
-    found = json.loads(
-        _output([sys.executable, str(HERE / "linked_wizard.py"), str(seconds)])
-    )
+    command = [sys.executable, str(HERE / "linked_wizard.py"), str(seconds)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as wizard:
+        assert wizard.stdout is not None
+        found = json.loads(wizard.stdout.readline())
+        start = time.perf_counter()
+        wizard.communicate(timeout=LONGEST_END)
+        closing = time.perf_counter() - start
     rate = (found["delivered"] - found["skipped"]) / found["seconds"]
     return [
         Row(
@@ -94,7 +101,19 @@ def link_rows(seconds: float = LINK_SECONDS) -> list[Row]:
             f"{found['missed']} missed, {found['skipped']} skipped, all counted",
             f">= {LEAST_LINK_RATE:.0f} a second",
             met=rate >= LEAST_LINK_RATE,
-        )
+        ),
+        Row(
+            "- cut off: until it is told; there again: until images come",
+            f"{found['told']:.1f} s; {found['back']:.1f} s",
+            f"<= {MOST_TOLD:.0f} s; <= {MOST_BACK:.0f} s",
+            met=found["told"] <= MOST_TOLD and found["back"] <= MOST_BACK,
+        ),
+        Row(
+            "- the program closed while it is cut off",
+            f"{closing:.1f} s",
+            f"<= {MOST_CLOSING:.0f} s",
+            met=closing <= MOST_CLOSING,
+        ),
     ]
 
 

@@ -163,7 +163,7 @@ def run(make_pages: MakePages, swing: Path | None = None) -> int:
             open_swing = partial(wizard.workbench.swing_wanted.emit, swing)
             QTimer.singleShot(0, open_swing)
         status = _shown(application, wizard, signals)
-    return _ended(wizard, status)
+    return ended(wizard, status)
 
 
 def run_demo(make_pages: MakePages) -> int:
@@ -196,7 +196,7 @@ def run_demo(make_pages: MakePages) -> int:
         status = _shown(application, wizard, signals)
         if not is_seen and not demo.is_accepted:
             status = status or 1
-    return _ended(wizard, status)
+    return ended(wizard, status)
 
 
 def has_display() -> bool:
@@ -224,7 +224,7 @@ def _end(application: QApplication, wizard: Wizard, number: int) -> None:
     application.exit(128 + number)  # the exit status by which shells know a signal
 
 
-def _ended(wizard: Wizard, status: int) -> int:
+def ended(wizard: Wizard, status: int) -> int:
     """Return the exit status, but end the process where something has not ended.
 
     Qt and OpenBLAS wait at the end of a process for their threads, without end for one
