@@ -295,7 +295,7 @@ def _articulation(options: argparse.Namespace) -> None:
     if len(postures) == 1:
         (_, touches), n = postures[0], N_TOUCHES
         postures = [
-            (str(i + 1), touches[n * i : n * i + n])
+            (f"posture {i + 1}", touches[n * i : n * i + n])
             for i in range(max(len(touches) // n, N_POSTURES))
         ]
     found = measure_articulation(postures, measured.instrument, _limits(options))
