@@ -44,7 +44,9 @@ def verified(seed: int = 1) -> Verified:
     scene = Scene(seed=seed)
     artefacts = Artefacts()
     choices = VerificationChoices(
-        tuple(TaskKind), radius=artefacts.ring_radius, length=artefacts.length
+        (TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH),
+        radius=artefacts.ring_radius,
+        length=artefacts.length,
     )
     instrument = _instrument(scene, np.random.default_rng(seed))
     setup = SessionSetup(instrument, choices, cone_cam=scene.cone_cam)

@@ -82,7 +82,9 @@ N_RECORDED = 60  # images that are reviewed
 N_SHOWN = 40  # live images that a page is shown
 ARTEFACTS = Artefacts()
 CHOICES = VerificationChoices(
-    tuple(TaskKind), radius=ARTEFACTS.ring_radius, length=ARTEFACTS.length
+    (TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH),
+    radius=ARTEFACTS.ring_radius,
+    length=ARTEFACTS.length,
 )
 N_ON_RING = 7  # touches when the verification is drawn
 N_HELD = 10  # images through which the pen is held still

@@ -33,8 +33,7 @@ from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.verification.articulation import (
-    N_POSTURES,
-    N_TOUCHES,
+    by_posture,
     measure_articulation,
 )
 from lightpen.verification.assessment import Conformity
@@ -291,13 +290,7 @@ def _length(options: argparse.Namespace) -> None:
 @printing
 def _articulation(options: argparse.Namespace) -> None:
     measured = _measure(options, [(run,) for run in options.runs])
-    postures = measured.touches
-    if len(postures) == 1:
-        (_, touches), n = postures[0], N_TOUCHES
-        postures = [
-            (str(i + 1), touches[n * i : n * i + n])
-            for i in range(max(len(touches) // n, N_POSTURES))
-        ]
+    postures = by_posture(measured.touches)
     found = measure_articulation(postures, measured.instrument, _limits(options))
     _tell(
         *(options, measured, articulation_text, found, "articulation"),

@@ -9,6 +9,7 @@ from lightpen.arrays import FloatArray
 from lightpen.simulator.hand import Doing, Operator
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.session import SessionSetup, SessionState
+from lightpen.verification.touching import TouchPhase
 
 LEANT, LEANT_FAR = 0.2, 0.4  # rad
 RING_STEPS = 12
@@ -71,6 +72,9 @@ class Toucher:
         is_lifted = self._operator.doing in (Doing.LIFTED, Doing.ABSENT)
         if wanted == self._wanted and not (is_lifted and wanted.task is not None):
             return
+        is_taken = state.touching.phase is TouchPhase.TAKEN
+        if is_lifted and is_taken and wanted.task is TaskKind.ARTICULATION:
+            return  # it has to move on first
         before, self._wanted = self._wanted, wanted
         step, artefacts = wanted.step, self._artefacts
         if wanted.task is TaskKind.FIXED_POINT:
@@ -79,6 +83,13 @@ class Toucher:
             tilt = (LEANT, LEANT_FAR)[step % 2]
             direction = 2 * pi * step / setup.choices.n_touches
             self._operator.lean_towards(tilt, direction, 0.0)
+        elif wanted.task is TaskKind.ARTICULATION:
+            if is_taken:
+                self._operator.lift()
+            else:
+                self._operator.seat()
+                tilt = LEANT_FAR if wanted.run else 0.0
+                self._operator.lean_towards(tilt, pi / 2 * wanted.run, 0.0)
         elif wanted.task is TaskKind.CIRCLE:
             self._operator.touch(artefacts.on_ring(step))
         elif wanted.task is TaskKind.LENGTH:

@@ -113,6 +113,17 @@ def measure_articulation(
     )
 
 
+def by_posture(
+    runs: Sequence[tuple[str, Sequence[Touch]]],
+) -> list[tuple[str, Sequence[Touch]]]:
+    """Return runs of a posture each; a single one holds five, one after the other."""
+    if len(runs) != 1:
+        return list(runs)
+    (_, touches), n = runs[0], N_TOUCHES
+    n_postures = max(len(touches) // n, N_POSTURES)
+    return [(f"posture {i + 1}", touches[n * i : n * i + n]) for i in range(n_postures)]
+
+
 def smallest_diameter(points: FloatArray) -> float:
     """Return the diameter of the smallest sphere about a few points (N, 3), mm."""
     best = np.inf

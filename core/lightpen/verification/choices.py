@@ -15,6 +15,10 @@ class TaskKind(StrEnum):
     FIXED_POINT = "fixed point"
     CIRCLE = "circle"
     LENGTH = "length"
+    ARTICULATION = "articulation"
+
+
+WHOLE = TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH  # the paper's three
 
 
 class Surface(StrEnum):

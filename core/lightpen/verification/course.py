@@ -564,6 +564,7 @@ def _asks_otherwise(
             TaskKind.FIXED_POINT: (),
             TaskKind.CIRCLE: (of.radius, of.radius_uncertainty, of.surface),
             TaskKind.LENGTH: (of.length, of.length_uncertainty),
+            TaskKind.ARTICULATION: (),
         }[kind]
         for of in (one, other)
     ]

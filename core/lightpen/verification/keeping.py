@@ -15,11 +15,13 @@ from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.numbered_files import add_numbered
+from lightpen.verification.articulation import Articulation
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
 from lightpen.verification.fixed_point import FixedPoint
 from lightpen.verification.places import Viewers
 from lightpen.verification.records import (
+    articulation_entries,
     circle_entries,
     fixed_point_entries,
     length_entries,
@@ -37,6 +39,7 @@ LIMITS = {
     TaskKind.FIXED_POINT: ("across", "along"),
     TaskKind.CIRCLE: ("radius", "form"),
     TaskKind.LENGTH: ("length",),
+    TaskKind.ARTICULATION: ("location",),
 }
 
 
@@ -141,6 +144,8 @@ def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
         return fixed_point_entries(found, tip.instrument)
     if isinstance(found, Circle):
         return circle_entries(found, tip.instrument)
+    if isinstance(found, Articulation):
+        return articulation_entries(found)
     return length_entries(found, tip.instrument)
 
 

@@ -33,7 +33,7 @@ from lightpen.model.pen import Pen
 from lightpen.record.calibrations import CalibrationFile
 from lightpen.sentences import sentence
 from lightpen.verification.length import Scale
-from lightpen.verification.pen_health import require_one_pen
+from lightpen.verification.pen_health import MOVED, examine_pen, require_one_pen
 
 MIN_POOLED = 3  # swings, beside the one held out
 CONFIRMED = 2.33  # standard deviations: 99 %
@@ -123,7 +123,8 @@ def improve_pen(
     UsageError
         The swings are of different pens.
     CalibrationError
-        There are too few, or the last one does not confirm the new LEDs.
+        There are too few, an LED moved between them, or the last one does not confirm
+        the new LEDs.
     """
     require_one_pen(calibrations)
     if len(calibrations) < MIN_POOLED + 1:
@@ -136,6 +137,7 @@ def improve_pen(
                 needed=MIN_POOLED,
             )
         )
+    _require_unchanged(calibrations, pen)
     *pooled, held_out = calibrations
     improved = _pooled([calibrate_again(c, camera, pen) for c in pooled], pen, scale)
     confirming = calibrate_again(held_out, camera, pen)
@@ -159,6 +161,29 @@ def improve_pen(
         held_out=held_out.path.name,
         sigma_before=before.sigma,
         sigma_after=after.sigma,
+    )
+
+
+def _require_unchanged(calibrations: Sequence[CalibrationFile], pen: Pen) -> None:
+    """Refuse swings of before and after an LED moved: no one file is of both."""
+    health = examine_pen(calibrations, None, pen.leds)
+    if not health.moved:
+        return
+    led = health.moved[0]
+    distances = [
+        float(np.nan_to_num(np.linalg.norm(swing.shifts[led - 1])))
+        for swing in health.swings
+    ]
+    raise CalibrationError(
+        sentence(
+            "led-file.changed-meanwhile",
+            "LED {led} has moved by {distance:.3f} mm between the swings {first} and "
+            "{swing}: no LED file is right for both. Give swings of after it only.",
+            led=led,
+            distance=max(distances),
+            first=health.swings[0].name,
+            swing=health.swings[int(np.argmax(np.array(distances) > MOVED))].name,
+        )
     )
 
 

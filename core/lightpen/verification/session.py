@@ -1,4 +1,4 @@
-"""A whole verification in one go, without a key: fixed point, ring, length.
+"""A whole verification in one go, without a key: fixed point, ring, length, postures.
 
 `advance` takes the state and what the next image shows. Each task ends by itself when
 its touches suffice, and the next begins when the pen moves on; live images and recorded
@@ -16,7 +16,15 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
+from lightpen.model.posture import angles_between
 from lightpen.sentences import Sentence, sentence
+from lightpen.verification.articulation import (
+    N_POSTURES,
+    N_TOUCHES,
+    Articulation,
+    by_posture,
+    measure_articulation,
+)
 from lightpen.verification.assessment import Conformity, worst
 from lightpen.verification.choices import TaskKind, VerificationChoices, ball_offset
 from lightpen.verification.circle import (
@@ -27,14 +35,13 @@ from lightpen.verification.circle import (
     measure_circle,
     ring_so_far,
 )
-from lightpen.verification.fixed_point import FixedPoint, measure_fixed_point
+from lightpen.verification.fixed_point import LIFTED, FixedPoint, measure_fixed_point
 from lightpen.verification.length import Length, measure_length
 from lightpen.verification.sources import require_leds_fit
 from lightpen.verification.touch import NO_DRIFT, Touch, measure_touches
 from lightpen.verification.touching import (
     TouchEvent,
     TouchHappening,
-    TouchPhase,
     TouchRules,
     TouchState,
 )
@@ -46,9 +53,10 @@ OTHER_END = 10.0  # mm
 EVERYWHERE = 1e6  # mm or rad: no other place, no other posture makes a touch new
 RING_TOUCHES = 10
 ELSEWHERE = 5.0  # mm from the others: the tip was not in the cone at all
+SAME_POSTURE = np.radians(12.0)  # within which a pen is held alike
 WORTH_TELLING = 0.5  # of its images, that were held before a touch was broken off
 
-Found: TypeAlias = FixedPoint | Circle | Length
+Found: TypeAlias = FixedPoint | Circle | Length | Articulation
 Runs: TypeAlias = Sequence[tuple[str, Sequence[Touch]]]
 
 BROKEN_OFF = sentence(
@@ -60,21 +68,16 @@ STILL_IN_CONE = sentence(
     "session.still-in-cone",
     "The fixed point is done: this touch of the cone does not count. Touch the ring.",
 )
-_KNOWN = {
-    TaskKind.FIXED_POINT: sentence(
-        "session.same-posture",
-        "This posture was taken before. Leave the tip in the cone and lean the pen "
-        "another way.",
-    ),
-    TaskKind.CIRCLE: sentence(
-        "session.same-place",
-        "This place of the ring was touched before. Touch it where it was not.",
-    ),
-    TaskKind.LENGTH: sentence(
-        "session.same-end",
-        "This end was touched before. Touch the other one.",
-    ),
-}
+ALIKE = sentence(
+    "session.alike",
+    "The pen was held like this before. Lean it another way, and touch the cone five "
+    "times so.",
+)
+OTHER_POSTURE = sentence(
+    "session.other-posture",
+    "The pen leans otherwise than at the touches before, so this one does not count. "
+    "Hold it as before until the posture is done.",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +126,7 @@ class SessionState:
     fixed_point: FixedPoint | None = None
     circle: Circle | None = None
     length: Length | None = None
+    articulation: Articulation | None = None
 
     def found(self, kind: TaskKind) -> Found | None:
         """Return what a task has found; None until it is done."""
@@ -130,6 +134,7 @@ class SessionState:
             TaskKind.FIXED_POINT: self.fixed_point,
             TaskKind.CIRCLE: self.circle,
             TaskKind.LENGTH: self.length,
+            TaskKind.ARTICULATION: self.articulation,
         }
         return found[kind]
 
@@ -229,6 +234,8 @@ def measure(setup: SessionSetup, task: TaskKind, runs: Runs) -> Found:
                 ball_offset=ball_offset(choices.surface, setup.ball_diameter),
                 drift=setup.drift,
             )
+        case TaskKind.ARTICULATION:
+            return measure_articulation(by_posture(runs), instrument, choices.limits)
         case TaskKind.LENGTH:
             return measure_length(
                 *(runs, instrument, choices.length, choices.limits),
@@ -247,6 +254,8 @@ def with_found(state: SessionState, found: Found) -> SessionState:
             return replace(state, circle=found)
         case Length():
             return replace(state, length=found)
+        case Articulation():
+            return replace(state, articulation=found)
 
 
 def touched_anew(state: SessionState, task: TaskKind) -> SessionState:
@@ -259,6 +268,8 @@ def touched_anew(state: SessionState, task: TaskKind) -> SessionState:
             return replace(state, circle=None)
         case TaskKind.LENGTH:
             return replace(state, length=None)
+        case TaskKind.ARTICULATION:
+            return replace(state, articulation=None)
 
 
 def without_touches(state: SessionState) -> SessionState:
@@ -273,56 +284,9 @@ def rules_of(setup: SessionSetup, task: TaskKind) -> TouchRules:
         TaskKind.FIXED_POINT: (float(NEW_POSTURE), EVERYWHERE),
         TaskKind.CIRCLE: (EVERYWHERE, NEW_PLACE),
         TaskKind.LENGTH: (EVERYWHERE, min(OTHER_END, setup.choices.length / 2)),
+        TaskKind.ARTICULATION: (0.0, 0.0),  # the same again
     }[task]
     return TouchRules(setup.choices.n_frames, min_turn=turn, min_distance=distance)
-
-
-def instruction(setup: SessionSetup, state: SessionState) -> Sentence:
-    """Return what the operator should do now."""
-    task, n_touches, choices = state.task(setup), len(state.touches), setup.choices
-    if task is None:
-        return sentence("session.done", "The verification is done. Put the pen down.")
-    if state.touching.phase is TouchPhase.KNOWN:
-        return _KNOWN[task]
-    if state.trouble is not None:
-        return state.trouble
-    if task is TaskKind.FIXED_POINT:
-        return sentence(
-            "session.touch-cone",
-            "Put the tip into the cone and hold it still, each time leant another way: "
-            "{n_touches} of {needed}.",
-            n_touches=n_touches,
-            needed=choices.n_touches,
-        )
-    if task is TaskKind.CIRCLE:
-        return sentence(
-            "session.touch-ring",
-            "Touch the ring all round and hold still on each point: {covered:.0f} of "
-            "{needed:.0f} degrees by {n_touches} touches.",
-            covered=covered(state.touches),
-            needed=MIN_ANGLE,
-            n_touches=n_touches,
-        )
-    return sentence(
-        "session.touch-ends",
-        "Touch one end of the length, then the other, and hold still on each: "
-        "{n_touches} of 2.",
-        n_touches=n_touches,
-    )
-
-
-def fraction_done(setup: SessionSetup, state: SessionState) -> float:
-    """Return how much of the task at hand is done, 0 to 1."""
-    choices, n_touches = setup.choices, len(state.touches)
-    match state.task(setup):
-        case TaskKind.FIXED_POINT:
-            return min(n_touches / choices.n_touches, 1.0)
-        case TaskKind.CIRCLE:
-            part = min(covered(state.touches) / MIN_ANGLE, n_touches / RING_TOUCHES)
-            return (len(state.runs) + min(part, 1.0)) / choices.n_runs
-        case TaskKind.LENGTH:
-            return (len(state.runs) + n_touches / 2) / choices.n_places
-    return 1.0
 
 
 def ring_fit(touches: Sequence[Touch]) -> CircleFit | None:
@@ -354,6 +318,8 @@ def _with_touch(
         return replace(_with_touches(state, touches, kept), trouble=error.sentence)
     if task is TaskKind.FIXED_POINT:
         return _without_others(state, touches)
+    if task is TaskKind.ARTICULATION:
+        return _in_posture(state, touches)
     if task is TaskKind.CIRCLE and _is_in_cone(state, touches[-1]):
         kept = range(len(touches) - 1)
         return replace(_with_touches(state, touches, kept), trouble=STILL_IN_CONE)
@@ -370,20 +336,37 @@ def _is_in_cone(state: SessionState, touch: Touch) -> bool:
     return float(np.linalg.norm(way)) <= ELSEWHERE
 
 
-def _without_others(state: SessionState, touches: tuple[Touch, ...]) -> SessionState:
+def _without_others(
+    state: SessionState, touches: tuple[Touch, ...], limit: float = ELSEWHERE
+) -> SessionState:
     """Drop touches that are not of the cone, as of a pen that was laid down."""
     points = np.array([touch.point_cam for touch in touches])
     distances = np.linalg.norm(points - np.median(points, axis=0), axis=1)
-    kept = np.flatnonzero(distances <= ELSEWHERE).tolist()
+    kept = np.flatnonzero(distances <= limit).tolist()
     if len(touches) < 3 or len(kept) == len(touches):  # of two, nobody knows which
         return replace(state, touches=touches)
     trouble = sentence(
         "session.elsewhere",
-        "A touch {distance:.0f} mm from the others does not count: the tip was not in "
+        "A touch {distance:.1f} mm from the others does not count: the tip was not in "
         "the cone. Put it into the cone and hold it still.",
         distance=float(distances.max()),
     )
     return replace(_with_touches(state, touches, kept), trouble=trouble)
+
+
+def _in_posture(state: SessionState, touches: tuple[Touch, ...]) -> SessionState:
+    """Drop a touch in another posture than those of its run, or in an earlier one."""
+    last, kept = touches[-1].rotation[None], range(len(touches) - 1)
+    if len(touches) > 1:
+        turned = angles_between(last, touches[0].rotation[None])[0, 0]
+        if turned > SAME_POSTURE:
+            alone = _with_touches(state, touches, kept)
+            return replace(alone, trouble=OTHER_POSTURE)
+        return _without_others(state, touches, LIFTED)
+    before = [run[0].rotation for run in state.runs]
+    if before and angles_between(last, np.array(before)).min() < NEW_POSTURE:
+        return replace(_with_touches(state, touches, kept), trouble=ALIKE)
+    return replace(state, touches=touches)
 
 
 def _with_true_ends(
@@ -425,21 +408,29 @@ def _suffices(setup: SessionSetup, state: SessionState, task: TaskKind) -> bool:
             return n_touches >= RING_TOUCHES and covered(state.touches) >= MIN_ANGLE
         case TaskKind.LENGTH:
             return n_touches >= 2
+        case TaskKind.ARTICULATION:
+            return n_touches >= N_TOUCHES
 
 
 def _with_run(setup: SessionSetup, state: SessionState, task: TaskKind) -> SessionState:
     """End a run, and with the last of them the task."""
     runs = (*state.runs, state.touches)
+    has_more = len(runs) < _n_runs(setup.choices, task)
+    if has_more and task is TaskKind.ARTICULATION:  # of no use posture by posture
+        return replace(without_touches(state), runs=runs)
     found = measure(setup, task, _numbered(runs))
-    if len(runs) < _n_runs(setup.choices, task):
+    if has_more:
         return replace(without_touches(state), runs=runs)
     return with_found(state, found)
 
 
 def _n_runs(choices: VerificationChoices, task: TaskKind) -> int:
-    return {TaskKind.CIRCLE: choices.n_runs, TaskKind.LENGTH: choices.n_places}.get(
-        task, 1
-    )
+    return {
+        TaskKind.FIXED_POINT: 1,
+        TaskKind.CIRCLE: choices.n_runs,
+        TaskKind.LENGTH: choices.n_places,
+        TaskKind.ARTICULATION: N_POSTURES,
+    }[task]
 
 
 def _numbered(runs: Sequence[tuple[Touch, ...]]) -> Runs:

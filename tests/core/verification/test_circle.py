@@ -10,7 +10,12 @@ from lightpen.errors import CalibrationError
 from lightpen.estimation.instrument import Instrument
 from lightpen.estimation.verdict import Grade
 from lightpen.model.limits import VerificationLimits
-from lightpen.verification.circle import Circle, fit_circle, measure_circle
+from lightpen.verification.circle import (
+    Circle,
+    fit_circle,
+    measure_circle,
+    residuals_of,
+)
 from lightpen.verification.touch import Touch
 
 Touching = Callable[..., tuple[Touch, ...]]
@@ -129,3 +134,28 @@ def test_the_ball_is_added_to_the_circle_of_its_centres(
     found = measure_circle([run], instrument, RADIUS, LIMITS, ball_offset=1.5)
 
     assert abs(found.errors[0]) < 0.01
+
+
+def test_points_are_as_far_off_the_circle_as_it_says(ring: Ring) -> None:
+    rng = np.random.default_rng(4)
+    points = ring(9) + 0.01 * rng.standard_normal((9, 3))
+    fit = fit_circle(points)
+
+    np.testing.assert_allclose(
+        residuals_of(fit, tuple(points)),
+        np.column_stack([fit.radial, fit.axial]),
+        # The middle of the circle lies in the plane but for what was rounded.
+        atol=1e-9,
+    )
+
+
+def test_a_camera_that_moved_counts_in_the_radius(
+    instrument: Instrument, touching: Touching, ring: Ring
+) -> None:
+    run = ("run", touching(ring(), tilt=0.1))
+    still = measure_circle([run], instrument, RADIUS, LIMITS)
+    drift = np.array([0.005, 0.002, 0.0])
+    moved = measure_circle([run], instrument, RADIUS, LIMITS, drift=drift)
+
+    assert moved.uncertainty == pytest.approx(np.hypot(still.uncertainty, 0.01))
+    assert moved.runs[0].uncertainty > still.runs[0].uncertainty

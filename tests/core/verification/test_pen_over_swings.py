@@ -166,6 +166,17 @@ def test_a_swing_of_another_state_of_the_pen_does_not_confirm(swing: Swing) -> N
         improve_pen([*swings, swing(paper_pen(), 4)], paper_camera(), PEN_FILE)
 
 
+def test_swings_of_before_and_after_a_knock_are_not_pooled(swing: Swing) -> None:
+    pen = true_pen()
+    swings = [
+        swing(each, number)
+        for number, each in enumerate([pen, *[with_moved_led(pen)] * 3], start=1)
+    ]
+
+    with pytest.raises(CalibrationError, match=r"swing 1\.json and swing 2\.json"):
+        improve_pen(swings, paper_camera(), PEN_FILE)
+
+
 def test_too_few_swings_are_refused(swing: Swing) -> None:
     swings = [swing(true_pen(), number) for number in (1, 2, 3)]
 

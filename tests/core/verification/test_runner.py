@@ -41,7 +41,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
-from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
+from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
 from lightpen.verification.conclusion import CONCLUSION
 from lightpen.verification.keeping import VERIFICATIONS
 from lightpen.verification.runner import VerificationRunner
@@ -52,7 +52,7 @@ EVE = Signature("Eve", "correct horse")
 TIMEOUT = 60.0  # s until a test gives up
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 CHOICES = VerificationChoices(
-    tuple(TaskKind), n_touches=4, radius=31.751, length=150.0, n_frames=3
+    WHOLE, n_touches=4, radius=31.751, length=150.0, n_frames=3
 )
 FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
@@ -195,7 +195,7 @@ def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) 
     assert at_it.ear.events[-1] is SessionHappening.DONE
     assert at_it.ear.troubles == []
     point, circle, length = at_it.records
-    assert [each["verification"] for each in at_it.records] == list(TaskKind)
+    assert [each["verification"] for each in at_it.records] == list(WHOLE)
     assert {each["session"] for each in at_it.records} == {NOON.isoformat()}
     for record in at_it.records:
         assert record["verdict"]["grade"] == "pass"

@@ -18,14 +18,15 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen.simulator.toucher import Artefacts, Toucher
-from lightpen.verification.choices import TaskKind, VerificationChoices
+from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
+from lightpen.verification.guidance import fraction_done, instruction
 from lightpen.verification.session import (
+    ALIKE,
+    OTHER_POSTURE,
     SessionSetup,
     SessionState,
     advance,
     end_task,
-    fraction_done,
-    instruction,
     touched_anew,
 )
 from lightpen.verification.touching import TouchEvent, TouchHappening
@@ -43,7 +44,7 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
     )
     artefacts = Artefacts()
     choices = VerificationChoices(
-        tuple(TaskKind),
+        WHOLE,
         radius=artefacts.ring_radius,
         length=artefacts.length,
         n_touches=4,
@@ -76,7 +77,7 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
             finished.append(transition.finished)
     camera.close()
 
-    assert finished == list(TaskKind)
+    assert finished == list(WHOLE)
     assert first is not None
     assert (clock.now_ns() - first) * 1e-9 < LONGEST
     assert state.fixed_point is not None
@@ -98,7 +99,7 @@ def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
 
 
 CHOICES = VerificationChoices(
-    tuple(TaskKind), n_touches=4, radius=31.751, length=150.0, n_frames=3
+    WHOLE, n_touches=4, radius=31.751, length=150.0, n_frames=3
 )
 BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
 
@@ -291,3 +292,52 @@ def test_a_task_done_anew_forgets_what_it_found(session: Session) -> None:
 
     assert again.task(session.setup) is TaskKind.FIXED_POINT
     assert again.touches == ()
+
+
+# Five postures of five touches
+
+
+@pytest.fixture
+def postures(session: Session) -> Session:
+    choices = replace(session.setup.choices, kinds=(TaskKind.ARTICULATION,))
+    session.setup = replace(session.setup, choices=choices)
+    return session
+
+
+def test_a_posture_ends_with_its_fifth_touch_and_the_last_one_the_task(
+    postures: Session,
+) -> None:
+    for hold in [Hold(tilt=0.0), *leant(4)]:
+        for _ in range(5):
+            postures.touch(hold)
+            postures.see(postures.holder.away())
+
+    assert postures.state.articulation is not None
+    assert postures.state.articulation.assessment.is_accepted
+
+
+def test_a_posture_held_before_and_one_that_changes_do_not_count(
+    postures: Session,
+) -> None:
+    upright = Hold(tilt=0.0)
+    postures.touch(upright)
+    postures.see(postures.holder.away())
+    postures.touch(Hold(tilt=0.4))
+    assert postures.state.trouble is OTHER_POSTURE
+    assert len(postures.state.touches) == 1
+
+    for _ in range(5):
+        postures.see(postures.holder.away())
+        postures.touch(upright)
+    assert len(postures.state.runs) == 1
+    assert postures.state.trouble is ALIKE
+    assert not postures.state.touches
+
+
+def test_a_touch_above_the_cone_does_not_count_in_a_posture(postures: Session) -> None:
+    seated, lifted = Hold(tilt=0.0), Hold((0.0, -0.5, 0.0), tilt=0.0)
+    for hold in (seated, seated, lifted, seated, seated):
+        postures.touch(hold)
+        postures.see(postures.holder.away())
+
+    assert len(postures.state.touches) == 4

@@ -1,5 +1,7 @@
 """What the touches of a task tell, while they are taken and when they are done."""
 
+from itertools import chain
+
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -50,6 +52,13 @@ class TaskFinding(Translated, QWidget):
             return ()
         setup, state = self._shown
         return state.touches if state.task(setup) is self.kind else ()
+
+    def _own_runs(self) -> tuple[tuple[Touch, ...], ...]:
+        """Return the runs that are done of the task at hand, if it is this one."""
+        if self._shown is None:
+            return ()
+        setup, state = self._shown
+        return state.runs if state.task(setup) is self.kind else ()
 
     def _refresh(self) -> None:
         raise NotImplementedError
@@ -300,6 +309,79 @@ class LengthFinding(TaskFinding):
         return Figures(heads, names, cells) if touches else Figures()
 
 
+class ArticulationFinding(TaskFinding):
+    """The postures, and where each has the point."""
+
+    kind = TaskKind.ARTICULATION
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._dial = PostureDial()
+        self._dial.setMinimumSize(22 * GRID, 22 * GRID)
+        self._table = NumberTable()
+        self._form = text_label(TextSize.BODY, Tone.QUIET)
+        self._form.setWordWrap(True)
+
+        # Layout
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(3 * GRID)
+        layout.addWidget(self._dial, 1)
+        column = QVBoxLayout()
+        column.setSpacing(2 * GRID)
+        column.addWidget(self._table)
+        column.addWidget(self._form)
+        column.addStretch(1)
+        layout.addLayout(column, 2)
+
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        self._table.setAccessibleName(self.tr("Cone by each posture / mm"))
+        self._refresh()
+
+    @override
+    def _refresh(self) -> None:
+        found = None if self._shown is None else self._shown[1].articulation
+        self._dial.set_value(self._dial_value())
+        heads = *(f"{axis} / mm" for axis in AXES), self.tr("Spread / mm")
+        if found is None:
+            places = [scatter_of(run) for run in self._own_runs()]
+            locations = [place.mean for place in places]
+            spreads = [_farthest(place) for place in places]
+        else:
+            locations, spreads = list(found.locations), found.spreads.tolist()
+        cells = tuple(
+            (*_lengths(place), number_text(spread, DECIMALS))
+            for place, spread in zip(locations, spreads, strict=True)
+        )
+        names = tuple(str(i + 1) for i in range(len(cells)))
+        self._table.set_value(Figures(heads, names, cells))
+        words = self.tr("In the form of ISO 10360-12: five postures of five touches.")
+        if found is not None:
+            words += " " + self.tr(
+                "Location error {0} mm, {1} mm to be expected."
+            ).format(
+                number_text(found.location_error, DECIMALS),
+                number_text(found.expected, DECIMALS),
+            )
+        self._form.setText(words)
+
+    def _dial_value(self) -> DialValue:
+        if self._shown is None:
+            return DialValue()
+        setup, state = self._shown
+        touched = [*chain.from_iterable(self._own_runs()), *self._own_touches()]
+        if state.task(setup) is not self.kind:
+            return DialValue()
+        pen = setup.instrument.pen
+        postures = [posture_of(pen, touch.rotation) for touch in touched]
+        return dial_of(postures, live_posture(setup, state))
+
+
 def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:
     """Return a dial of which each field is full that was touched in."""
     counts = np.zeros((3, 8), dtype=np.int64)
@@ -332,6 +414,11 @@ def _places(found: Length, limit: float) -> tuple[tuple[str, ...], ...]:
         tuple(number_text(x, DECIMALS) for x in (run.measured, error, u, limit))
         for run, error, u in rows
     )
+
+
+def _farthest(scatter: Scatter) -> float:
+    """Return the largest distance of a point from the mean, mm."""
+    return float(np.linalg.norm(scatter.points - scatter.mean, axis=1).max())
 
 
 def _numbers(values: FloatArray, decimals: int) -> tuple[str, ...]:

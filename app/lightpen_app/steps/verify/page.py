@@ -21,11 +21,13 @@ from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.verify.findings import (
+    ArticulationFinding,
     FixedPointFinding,
     LengthFinding,
     RingFinding,
 )
 from lightpen_app.steps.verify.strips import (
+    ArticulationStrip,
     FixedPointStrip,
     LengthStrip,
     RingStrip,
@@ -102,6 +104,7 @@ class VerifyPage(Rearranged, Page):
             TaskPanel(FixedPointStrip(), FixedPointFinding()),
             TaskPanel(RingStrip(), RingFinding()),
             TaskPanel(LengthStrip(), LengthFinding()),
+            TaskPanel(ArticulationStrip(), ArticulationFinding()),
         )
         self._tabs = QTabWidget()
         for panel in self._panels:

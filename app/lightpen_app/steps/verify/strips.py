@@ -176,6 +176,25 @@ class RingStrip(TaskStrip):
         )
 
 
+class ArticulationStrip(TaskStrip):
+    """One point in five postures, which needs nothing to be known."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(TaskKind.ARTICULATION, (), parent)
+
+    @override
+    def _with_fields(self, choices: VerificationChoices) -> VerificationChoices:
+        return choices
+
+    @override
+    def _show_fields(self, choices: VerificationChoices) -> None:
+        """It has no fields."""
+
+    @override
+    def _words(self) -> tuple[str, ...]:
+        return (self.tr("Touch the cone five times in each of five postures"),)
+
+
 class LengthStrip(TaskStrip):
     """A length: its certified size, and at how many places it is touched."""
 

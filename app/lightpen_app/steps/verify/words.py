@@ -8,15 +8,15 @@ from lightpen.cameras.worker import Connection
 from lightpen.estimation.verdict import Grade
 from lightpen.model.posture import posture_of
 from lightpen.sentences import Sentence
+from lightpen.verification.articulation import N_POSTURES, N_TOUCHES
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.circle import MIN_ANGLE
+from lightpen.verification.guidance import fraction_done, instruction
 from lightpen.verification.session import (
     BROKEN_OFF,
     SessionSetup,
     SessionState,
     covered,
-    fraction_done,
-    instruction,
     rules_of,
 )
 from lightpen.verification.status import Reading, VerificationStatus
@@ -85,6 +85,9 @@ class VerifyWords(QObject):
                 text = self.tr("{0} of {1}\xb0")
                 text = text.format(round(covered(state.touches)), round(MIN_ANGLE))
                 n_runs = choices.n_runs
+            case TaskKind.ARTICULATION:
+                text = self.tr("{0} of {1} touches").format(n_touches, N_TOUCHES)
+                n_runs = N_POSTURES
             case _:
                 text = self.tr("{0} of 2 ends").format(n_touches)
                 n_runs = choices.n_places
@@ -98,6 +101,7 @@ class VerifyWords(QObject):
             TaskKind.FIXED_POINT: self.tr("Fixed point"),
             TaskKind.CIRCLE: self.tr("Ring"),
             TaskKind.LENGTH: self.tr("Length"),
+            TaskKind.ARTICULATION: self.tr("Postures"),
         }[kind]
         found = None if status.state is None else status.state.found(kind)
         is_chosen = status.setup is None or kind in status.setup.choices.kinds
@@ -156,6 +160,10 @@ class VerifyWords(QObject):
             case TaskKind.CIRCLE:
                 another = self.tr("Next point")
                 return another if is_next else self.tr("Touch the ring")
+            case TaskKind.ARTICULATION:
+                again = self.tr("Lift, touch again")
+                other = self.tr("Another posture") if state.runs else ""
+                return again if is_next else other or self.tr("Touch the cone")
             case _:
                 another = self.tr("The other end")
                 return another if is_next else self.tr("Touch one end")
@@ -200,8 +208,9 @@ class VerifyWords(QObject):
 
 
 def _dial(setup: SessionSetup, state: SessionState) -> DialValue | None:
-    if state.task(setup) is not TaskKind.FIXED_POINT:
+    if state.task(setup) not in (TaskKind.FIXED_POINT, TaskKind.ARTICULATION):
         return None
     pen = setup.instrument.pen
-    postures = [posture_of(pen, touch.rotation) for touch in state.touches]
+    touched = [touch for run in (*state.runs, state.touches) for touch in run]
+    postures = [posture_of(pen, touch.rotation) for touch in touched]
     return dial_of(postures, live_posture(setup, state))
