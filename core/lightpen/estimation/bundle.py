@@ -50,7 +50,7 @@ from lightpen.sentences import sentence
 
 CONVERGED = 1e-5  # mm
 FINEST = 1e-4  # px; exact data that weigh more drown the priors in rounding
-FINDING_PASSES = 2  # in which standard deviations are found; then they stand
+FINDING_PASSES = 4  # in which standard deviations are found; then they stand
 MAX_PASSES = 20
 Z_99 = 2.326  # normal quantile
 
@@ -196,7 +196,8 @@ def fit_bundle(
         measured, measured_right = unknowns.measured(state, taken_up)
         right = gradient + information @ taken_up + measured_right
         finding = 0 < n_pass <= FINDING_PASSES
-        if finding:
+        # The jitter first: without it, what other errors there are take it up.
+        if finding and n_pass > 1:
             components = unknowns.found(information + measured, right, components)
         prior = unknowns.prior_information(components)
         covariance = inverse(information + prior + measured)
@@ -221,7 +222,6 @@ def fit_bundle(
             change = values - taken_up
             jitter = jitter_of(unknowns, alone, spread, seen, change, covariance)
             components = components._replace(jitter=jitter)
-        if n_pass in (1, FINDING_PASSES):
             used = gate(_together(residuals)).reshape(used.shape)
         moved = np.abs((values - taken_up)[:6]).max()
         state = unknowns.moved(state, values, unknown[:, :N_TURN])

@@ -50,6 +50,7 @@ from lightpen.model.rig import Rig
 
 T = TypeVar("T", bound=np.generic)
 
+SEAT_ROUNDS = 2  # in which the jitter of the seat is found beside other errors
 GROWTH = 1.25  # of the number of images, after which all are counted anew
 ENDLESS = 100.0  # times the images, more than anyone takes
 
@@ -210,14 +211,25 @@ def _linear_bundle(
     """Return the bundle adjustment after a single step."""
     # LEDs that count by now may not have done so when they were counted.
     seen = np.trace(equations.cone_rows[..., :N_CONE], axis1=1, axis2=2) > 0
-    information, right = unknowns.system(equations)
-    components = unknowns.found(information, right, NO_COMPONENTS)
+    spread = unknowns.sensitivity(equations.cone_rows)
+    alone = information, right = unknowns.system(equations)
+    components = NO_COMPONENTS
+    for _ in range(SEAT_ROUNDS):
+        # The jitter first: without it, what other errors there are take it up.
+        covariance = inverse(information + unknowns.prior_information(components))
+        change = covariance @ right
+        jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)
+        information, right = (
+            alone
+            if jitter.covariance is None
+            else unknowns.system(_with_jitter(equations, jitter.covariance))
+        )
+        components = components._replace(jitter=jitter)
+        components = unknowns.found(information, right, components)
+        if jitter.covariance is None:
+            break
     prior = unknowns.prior_information(components)
     covariance = inverse(information + prior)
-    spread = unknowns.sensitivity(equations.cone_rows)
-    change = covariance @ right
-    jitter = jitter_of(unknowns, equations, spread, seen, change, covariance)
-    components = components._replace(jitter=jitter)
     n_cameras = unknowns.start.rig.n_cameras
     of_jitter = np.zeros_like(information)
     doubted = np.zeros_like(information)
@@ -226,15 +238,8 @@ def _linear_bundle(
         doubted = rows.T @ rows
     else:
         known = np.linalg.inv(jitter.covariance)
-        own = equations.cone_rows[..., :N_CONE]
-        gain = np.linalg.inv(own + known)
-        seat = gain @ spread
+        seat = np.linalg.inv(equations.cone_rows[..., :N_CONE] + known) @ spread
         of_jitter = np.einsum("nip,ij,njq->pq", seat, known, seat, optimize=True)
-        equations = _with_jitter(equations, gain)
-        information, right = unknowns.system(equations)
-        components = unknowns.found(information, right, components)
-        prior = unknowns.prior_information(components)
-        covariance = inverse(information + prior)
     return Bundle(
         unknowns=unknowns,
         state=unknowns.start,
@@ -253,14 +258,15 @@ def _linear_bundle(
     )
 
 
-def _with_jitter(each: NormalEquations, gain: FloatArray) -> NormalEquations:
+def _with_jitter(each: NormalEquations, jitter: FloatArray) -> NormalEquations:
     """Return equations in which the seat may be another in each image.
 
     Parameters
     ----------
-    gain : (N, 3, 3) array
-        Inverse of what each image and the jitter say of its place, mm^2.
+    jitter : (3, 3) array
+        Covariance of the seat from image to image, mm^2.
     """
+    gain = np.linalg.inv(each.cone_rows[..., :N_CONE] + np.linalg.inv(jitter))
     rows, right = each.cone_rows, each.cone_right
     left = np.eye(N_CONE) - rows[..., :N_CONE] @ gain
     by_seat = gain @ rows

@@ -14,6 +14,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.instrument import instrument_record
 from lightpen.estimation.lamp_report import lamp_warnings, lamps_record
+from lightpen.estimation.linearised import N_CONE
 from lightpen.estimation.pivot_calibration import COVERED, NOT_COVERED, PivotCalibration
 from lightpen.estimation.rig_report import (
     count_dropped,
@@ -24,6 +25,7 @@ from lightpen.estimation.rig_report import (
 from lightpen.estimation.second_cone import SecondCone
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
+from lightpen.estimation.unknowns import FORMS
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.own_json import with_checksum
@@ -262,7 +264,11 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     """Return what is told of a tip that did not rest where the model has it."""
     bundle, found = calibration.bundle, calibration.bundle.components
     warnings = []
-    if found.jitter.covariance is not None:
+    jitter = found.jitter.covariance
+    # Ball and cone that are as round as assumed move the tip by so much as well.
+    by_form = calibration.priors.form_error * float(np.sqrt(N_CONE * sum(FORMS)))
+    distance = 0.0 if jitter is None else float(np.sqrt(np.trace(jitter)))
+    if distance > by_form:
         warnings.append(
             sentence(
                 "warning.seat-jitter",
@@ -270,7 +276,7 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
                 "{distance:.4f} mm (standard deviation) from image to image. Clean tip "
                 "and cone, look for wear, and press the tip in. It is in the "
                 "uncertainty.",
-                distance=float(np.sqrt(np.trace(found.jitter.covariance))),
+                distance=distance,
             )
         )
     if any(form.is_significant for form in found.seat):

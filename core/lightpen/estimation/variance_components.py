@@ -30,7 +30,8 @@ MAX_PASSES = 12
 NO_JITTER = 1e-5  # mm, along an axis; a covariance is to be inverted
 COARSE = 4  # one in so many scales, where all images are asked for each
 SETTLED = 1e-2  # relative, of a standard deviation
-MATRIX_SIGNIFICANT = 22.46  # chi-square, 6 degrees of freedom, at 0.001
+DIRECTED = 20.52  # chi-square, 5 degrees of freedom, at 0.001
+LEAST_FREE = 4.0  # degrees of freedom; fewer leave a variance without a mean
 
 
 class Component(NamedTuple):
@@ -110,6 +111,8 @@ def find_jitter(
 ) -> Jitter:
     """Find the covariance of a vector that is another in each image.
 
+    One standard deviation along all axes unless a covariance is far likelier.
+
     Parameters
     ----------
     information : (N, 3, 3) array
@@ -122,9 +125,18 @@ def find_jitter(
 
     Notes
     -----
-    Fisher scoring, if one standard deviation along all axes is likely: with the total
-    covariance V_i of each image, the sum of ``V_i^-1 (excess_i - V_i) V_i^-1`` is
-    brought to 0. What would be negative is taken as none.
+    The covariance is found by Fisher scoring: with the total covariance V_i of each
+    image, the sum of ``V_i^-1 (excess_i - V_i) V_i^-1`` is brought to 0. What would be
+    negative is taken as none.
+
+    What is found is itself uncertain, the more the fewer images there are. One variance
+    counts as of as many degrees of freedom n as its own variance tells [1]_, and is
+    raised by ``n / (n - 2)`` to the mean of what it may be, as JCGM 101, 6.4.9 has it.
+
+    References
+    ----------
+    .. [1] F. E. Satterthwaite, "An approximate distribution of estimates of variance
+       components", Biometrics Bulletin 2 (1946) 110-114.
     """
     noise = np.linalg.inv(information)
     alone = np.einsum("nij,nj->ni", noise, right)
@@ -132,19 +144,22 @@ def find_jitter(
 
     values, vectors = np.linalg.eigh(noise)
     projected = np.sum(vectors * (excess @ vectors), axis=1)
+
+    def costs_of(sigmas: FloatArray) -> FloatArray:
+        totals = values + sigmas[:, None, None] ** 2
+        return np.asarray(np.sum(np.log(totals) + projected / totals, axis=(1, 2)))
+
     sigmas = np.array([0.0, *SCALES[::COARSE]])
-    totals = values + sigmas[:, None, None] ** 2
-    costs = np.sum(np.log(totals) + projected / totals, axis=(1, 2))
+    costs = costs_of(sigmas)
     expected = _expected(sigmas, costs)
-    if costs[0] - costs.min() < FITTED:
+    best = int(np.argmin(costs))
+    if costs[0] - costs[best] < FITTED:
         return Jitter(None, expected)
+    near = SCALES[max((best - 2) * COARSE, 0) : best * COARSE + 1]
+    fine = costs_of(near)
+    variance = float(near[int(np.argmin(fine))]) ** 2
 
-    def cost(jitter: FloatArray) -> float:
-        total = noise + jitter
-        misfit = np.einsum("nij,nji->", np.linalg.inv(total), excess)
-        return float(np.linalg.slogdet(total)[1].sum() + misfit)
-
-    jitter = sigmas[int(np.argmin(costs))] ** 2 * np.eye(3)
+    jitter = variance * np.eye(3)
     for _ in range(MAX_PASSES):
         weights = np.linalg.inv(noise + jitter)
         flat = weights.reshape(-1, 9)
@@ -157,11 +172,16 @@ def find_jitter(
         change = np.abs(np.diag(jitter) / np.diag(before) - 1)
         if change.max() < SETTLED:
             break
-    is_significant = cost(np.zeros((3, 3))) - cost(jitter) >= MATRIX_SIGNIFICANT
+    total = noise + jitter
+    misfit = np.einsum("nij,nji->", np.linalg.inv(total), excess)
+    cost = float(np.linalg.slogdet(total)[1].sum() + misfit)
+    if float(fine.min()) - cost < DIRECTED:
+        n_free = variance**2 * float(np.sum((values + variance) ** -2))
+        n_free = max(n_free, LEAST_FREE)
+        return Jitter(variance * n_free / (n_free - 2) * np.eye(3), expected)
     # The mean of what it may be, an inverse Wishart distribution.
     n_images = len(alone)
-    jitter = jitter * n_images / max(n_images - 4, 1)
-    return Jitter(np.asarray(jitter) if is_significant else None, expected)
+    return Jitter(jitter * n_images / max(n_images - 4, 1), expected)
 
 
 def _not_negative(covariance: FloatArray) -> FloatArray:

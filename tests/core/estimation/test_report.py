@@ -328,3 +328,20 @@ def test_a_pivot_calibration_is_recorded_and_shown() -> None:
     assert "30 of 30 used" in text
     assert found["uncertainty"]["covers"] in text
     assert found["uncertainty"]["leaves_out"] in text
+
+
+@pytest.mark.parametrize(("jitter", "is_told"), [(0.01, True), (0.0003, False)])
+def test_a_jitter_is_told_where_it_is_more_than_round_parts_make(
+    jitter: float, is_told: bool
+) -> None:
+    rng = np.random.default_rng(7)
+    swing = swing_poses(40, rng)
+    seat = jitter * rng.standard_normal(swing.translations.shape)
+    translations = swing.translations + seat
+    pixels = simulate_centers(CAMERA, PEN, swing.rotations, translations, 0.001, rng)
+    centers = Centers(np.arange(40) + 1, pixels, Path("centers.csv"))
+    found = calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+
+    assert found.bundle.components.jitter.covariance is not None
+    told = {warning.code for warning in warnings_of(found)}
+    assert ("warning.seat-jitter" in told) == is_told

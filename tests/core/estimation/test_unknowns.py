@@ -238,6 +238,20 @@ def test_jitter_of_the_seat_is_found_with_its_size_and_its_share() -> None:
     assert (share(result, ShareName.SEAT) > 0.5 * 0.01 / np.sqrt(60)).all()
 
 
+def test_jitter_of_the_seat_in_few_images_is_taken_for_nothing_else() -> None:
+    swing = swing_poses(15, np.random.default_rng(5))
+    pen = replace(PEN, led_sigma=0.002)
+    rng = np.random.default_rng(6)
+    seats = 0.01 * rng.standard_normal((10, len(swing), 3))
+    found = [
+        calibrated(pen, 0.03, 40 + seed, swing, seat).bundle.components
+        for seed, seat in enumerate(seats)
+    ]
+
+    assert sum(each.jitter.covariance is not None for each in found) >= 9
+    assert not any(form.is_significant for each in found for form in each.seat)
+
+
 def test_a_cone_that_drifts_is_found() -> None:
     ramp = np.linspace(-0.5, 0.5, 60)[:, None] * np.array([0.03, 0.0, 0.02])
     result = calibrated(replace(PEN, led_sigma=0.002), 0.02, 10, seat=ramp)
