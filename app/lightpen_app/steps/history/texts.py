@@ -28,6 +28,7 @@ _KINDS: dict[Kind, str] = {
     Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Set aside"),
     Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Taking back"),
     Kind.NOTE: QT_TRANSLATE_NOOP("history", "Note"),
+    Kind.LIBRARY: QT_TRANSLATE_NOOP("history", "Tip library"),
 }
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),

@@ -30,7 +30,6 @@ from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen_app.steps.history.archive_panel import ArchivePanel
-from lightpen_app.steps.history.date_field import DateField
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -46,6 +45,7 @@ from lightpen_app.steps.history.history_table import (
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.steps.history.trend_panel import TrendPanel
+from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
