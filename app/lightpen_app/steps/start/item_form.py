@@ -29,7 +29,7 @@ from lightpen.record.tip_library import (
     Pen,
     Tip,
 )
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.start.point_field import AXES, PointField
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import field_label, stacked
@@ -53,9 +53,12 @@ class ItemForm(Translated, QWidget):
     -------
     value_edited()
         Something is typed.
+    spin_toggled(bool)
+        The axis is to be found by spinning the pen, or this has ended.
     """
 
     value_edited = Signal()
+    spin_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -74,6 +77,10 @@ class ItemForm(Translated, QWidget):
         self._has_axis = QCheckBox()
         self._axis = tuple(NumberField("", (-1.0, 1.0), 5) for _ in AXES)
         self._axis_row = QWidget()
+        self._spin = PushButton()
+        self._spin.setCheckable(True)
+        self._spun: tuple[float, float, float] | None = None
+        self._spin_told = text_label(TextSize.SMALL, Tone.QUIET)
         self._picture = PathField()
         self._browse = PushButton()
         self._picture.add_button(self._browse)
@@ -92,6 +99,7 @@ class ItemForm(Translated, QWidget):
         for name, field in zip(AXES, self._axis, strict=True):
             axis.addWidget(QLabel(name))
             axis.addWidget(field, 1)
+        axis.addWidget(self._spin)
         self._tip_only = QWidget()
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -110,7 +118,8 @@ class ItemForm(Translated, QWidget):
         inner.addLayout(self._stacked(self._nominal), 1, 0, 1, 4)
         inner.addWidget(self._has_axis, 2, 0, 1, 4)
         inner.addWidget(self._axis_row, 3, 0, 1, 4)
-        inner.addLayout(self._stacked(self._picture), 4, 0, 1, 4)
+        inner.addWidget(self._spin_told, 4, 0, 1, 4)
+        inner.addLayout(self._stacked(self._picture), 5, 0, 1, 4)
         for layout in (grid, inner):
             for column in range(4):
                 layout.setColumnStretch(column, 1)
@@ -119,6 +128,7 @@ class ItemForm(Translated, QWidget):
         self._id.textChanged.connect(self.value_edited)
         self._due.textChanged.connect(self.value_edited)
         self._has_axis.toggled.connect(self._on_axis_toggled)
+        self._spin.toggled.connect(self._on_spin_toggled)
         self._browse.clicked.connect(self._on_browse_clicked)
 
         self._retranslate()
@@ -137,6 +147,10 @@ class ItemForm(Translated, QWidget):
         if not isinstance(item, Tip):
             return item
         nominal, axis = self._nominal.value(), self._typed_axis()
+        if self._spun is not None and _alike(axis, self._spun):
+            item = structs.replace(
+                item, stylus_axis=self._spun, axis_origin=AxisOrigin.SPIN
+            )
         same = item.stylus_axis is not None and _alike(axis, item.stylus_axis)
         return structs.replace(
             item,
@@ -149,13 +163,30 @@ class ItemForm(Translated, QWidget):
             axis_origin=item.axis_origin if same else AxisOrigin.GIVEN,
         )
 
+    def tell_spin(self, text: str) -> None:
+        """Say how far a spin is."""
+        self._spin_told.setText(text)
+        self._spin_told.setVisible(bool(text))
+
+    def set_spun_axis(self, axis: tuple[float, float, float]) -> None:
+        """Show the axis that a spin has found."""
+        self._spun = axis
+        for field, part in zip(self._axis, axis, strict=True):
+            field.setValue(part)
+
+    def stop_spin(self) -> None:
+        """End a spin that goes on."""
+        self._spin.setChecked(False)
+
     def picture(self) -> str:
         """Return the path of another picture; empty for that of before."""
         return self._picture.value()
 
     def set_value(self, item: AnyItem, *, is_new: bool) -> None:
         """Show an item."""
-        self._item = item
+        self.stop_spin()
+        self._item, self._spun = item, None
+        self.tell_spin("")
         self._id.setText(item.id)
         self._id.setReadOnly(not is_new)
         self._due.set_value(item.due)
@@ -193,6 +224,17 @@ class ItemForm(Translated, QWidget):
 
     def _on_axis_toggled(self, has_axis: bool) -> None:
         self._axis_row.setVisible(has_axis)
+        if not has_axis:
+            self.stop_spin()
+            self.tell_spin("")
+
+    def _on_spin_toggled(self, spins: bool) -> None:
+        self._name_spin()
+        self.spin_toggled.emit(spins)
+
+    def _name_spin(self) -> None:
+        spins = self._spin.isChecked()
+        self._spin.setText(self.tr("End the spin") if spins else self.tr("By a spin"))
 
     def _on_browse_clicked(self) -> None:
         self._picture.pick(
@@ -241,6 +283,13 @@ class ItemForm(Translated, QWidget):
         )
         for name, field in zip(AXES, self._axis, strict=True):
             field.setAccessibleName(self.tr("Axis of the stylus, {0}").format(name))
+        self._name_spin()
+        self._spin.setToolTip(
+            self.tr(
+                "Find the axis: the tip rests in the cone, and the pen is turned about "
+                "its stylus before the camera."
+            )
+        )
         self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, Tip) else None
         self._picture.edit().setPlaceholderText("" if kept is None else kept.place)

@@ -160,6 +160,16 @@ class LibraryDialog(Translated, QDialog):
         self._stop_editing()
         self._retranslate()
 
+    @property
+    def form(self) -> ItemForm:
+        """In which an item is typed."""
+        return self._form
+
+    @override
+    def done(self, result: int) -> None:
+        self._stop_editing()
+        super().done(result)
+
     def kind(self) -> ItemKind:
         """Return which items are shown."""
         return KINDS[self._tabs.currentIndex()]
@@ -265,6 +275,7 @@ class LibraryDialog(Translated, QDialog):
 
     def _stop_editing(self) -> None:
         self._item = None
+        self._form.stop_spin()
         self._panel.hide()
         self._list.show()
         self._refresh()
@@ -306,6 +317,7 @@ class LibraryDialog(Translated, QDialog):
         if self._item is None or not self._save.isEnabled():
             return
         is_typed = not self._form.isHidden()
+        self._form.stop_spin()
         item = self._form.value() if is_typed else self._item
         signature = self._supervisor.value() if self._is_guarded else None
         self._trouble.set_value(Remark())

@@ -5,6 +5,7 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
 from PySide6.QtGui import QKeyEvent
@@ -13,6 +14,7 @@ from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.local_time import local_now
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.supervision import Signature, set_password
 from lightpen.record.tip_library import (
@@ -33,6 +35,7 @@ from lightpen_app.steps.start.barcode import PACE_MS
 from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
+from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.workbench import Workbench
 
@@ -349,6 +352,35 @@ def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None
     desk.click("Keep")
     desk.settle()
     assert desk.library.tips["T-7"].axis_origin is AxisOrigin.GIVEN
+    desk.click("Close")
+
+
+def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Change...")
+    box = desk.control("Axis of the stylus, from the ball into the pen")
+    assert isinstance(box, QAbstractButton)
+    box.click()
+    desk.click("By a spin")
+    recorder = desk.page.findChild(SpinRecorder)
+    assert isinstance(recorder, SpinRecorder)
+    axis = np.array([0.0, 0.8, 0.6])
+    said: list[str] = []
+    recorder.told.connect(said.append)
+    for rotation in rotation_from_vector(
+        np.radians(np.arange(0, 90, 3))[:, None] * axis
+    ):
+        recorder.keep(rotation)
+    assert said[0].startswith("The pen is seen in 1 images of the spin")
+    assert said[-1].startswith("Turned by 87 degrees")
+
+    desk.click("End the spin")
+    desk.click("Keep")
+    desk.settle()
+    tip = desk.library.tips["T-7"]
+    assert tip.stylus_axis == pytest.approx(tuple(axis), abs=1e-9)
+    assert tip.axis_origin is AxisOrigin.SPIN
     desk.click("Close")
 
 
