@@ -8,6 +8,7 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.arrays import FloatArray
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.record.decision_rule import decision_rule
+from lightpen.record.results import Since
 from lightpen.record.statement import StatedCalibration, Statement
 from lightpen_app.look.kept_words import worded_anew
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
@@ -51,6 +52,7 @@ def result_pieces(statement: Statement) -> Iterable[Piece]:
             f"{change.accepted:%Y-%m-%d}"
         )
         difference = np.array(change.difference_mm)
+        rows += _as_found_rows(change)
         rows += [
             (since, *_texts(difference, change_u)),
             (translate("paper", "its U (k = 2) / mm"), *_texts(change_u, change_u)),
@@ -95,11 +97,50 @@ def result_pieces(statement: Statement) -> Iterable[Piece]:
         yield paragraph(
             translate("paper", "No earlier tip was in force to compare with.")
         )
+    if change is not None:
+        yield paragraph(_as_found_text(change))
     if statement.doubts:
         yield subheading(translate("paper", "To look into"))
         yield from (
             paragraph("\u2013 " + worded_anew(doubt.text)) for doubt in statement.doubts
         )
+
+
+def _as_found_rows(change: Since) -> list[tuple[str, ...]]:
+    """Return the tip that was in force before; nothing where it is not stated."""
+    found, found_u = change.as_found_mm, change.as_found_expanded_uncertainty_mm
+    if found is None or found_u is None:
+        return []
+    tip, u = np.array(found), np.array(found_u)
+    return [
+        (translate("paper", "Tip as found / mm"), *_texts(tip, u)),
+        (translate("paper", "its U (k = 2) / mm"), *_texts(u, u)),
+    ]
+
+
+def _as_found_text(change: Since) -> str:
+    """Return how far the tip as found was off, against its limit."""
+    decimals = decimals_for(max(change.expanded_uncertainty_mm))
+    off = number_text(change.distance_mm, decimals)
+    words = {
+        None: translate(
+            "paper",
+            "As found, the tip in force until then lay {0} mm from the tip as left; it "
+            "had no limit of change.",
+        ),
+        True: translate(
+            "paper",
+            "As found, the tip in force until then lay {0} mm from the tip as left, "
+            "within its limit of {1} mm.",
+        ),
+        False: translate(
+            "paper",
+            "As found, the tip in force until then lay {0} mm from the tip as left, "
+            "BEYOND its limit of {1} mm.",
+        ),
+    }
+    limit = "" if change.limit_mm is None else f"{change.limit_mm:g}"
+    return words[change.is_within].format(off, limit)
 
 
 def rule_pieces(statement: Statement) -> Iterable[Piece]:

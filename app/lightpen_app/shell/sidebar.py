@@ -15,7 +15,8 @@ from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.rearranged import Room
-from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.standing_mark import subject_remark
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.workbench import Subject
 
@@ -31,15 +32,16 @@ class Sidebar(Translated, QFrame):
         Index of the step, which may be closed.
     operator_view_chosen(), help_chosen(), options_chosen()
         The buttons.
-    subject_told(str)
-        What is calibrated, and what its images are of, in one line.
+    subject_told(str, bool)
+        What is calibrated, and what its images are of, in one line; whether some of it
+        must not be measured with.
     """
 
     step_chosen = Signal(int)
     operator_view_chosen = Signal()
     help_chosen = Signal()
     options_chosen = Signal()
-    subject_told = Signal(str)
+    subject_told = Signal(str, bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -50,6 +52,7 @@ class Sidebar(Translated, QFrame):
         self._name = text_label(TextSize.LEAD)
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
         self._origin = SignLabel()
+        self._standing = SignLabel()
         self._steps = StepList()
         self._operator_view = PushButton()
         self._help = PushButton()
@@ -61,6 +64,7 @@ class Sidebar(Translated, QFrame):
         head.setSpacing(GRID // 2)
         head.addWidget(self._name)
         head.addWidget(self._subject)
+        head.addWidget(self._standing)
         head.addWidget(self._origin)
         self._foot = foot = QVBoxLayout()
         foot.setSpacing(0)
@@ -101,6 +105,10 @@ class Sidebar(Translated, QFrame):
         """Return what is being calibrated, in words, a line for each name."""
         return self._subject.text()
 
+    def standing(self) -> Remark:
+        """Return what of it must not be measured with."""
+        return self._standing.value()
+
     def set_subject(self, subject: Subject) -> None:
         """Say what is being calibrated, and what its images are of."""
         self._value = subject
@@ -116,9 +124,12 @@ class Sidebar(Translated, QFrame):
         parts = [words.format(shortened(name)) for words, name in told if name]
         self._subject.setText("\n".join(parts))
         self._subject.setVisible(bool(parts))
+        standing = subject_remark(names, self._value.origin, self._value.standings)
+        self._standing.set_value(standing)
         origin = origin_remark(self._value.origin)
         self._origin.set_value(origin)
-        self.subject_told.emit(PARTED.join(filter(None, (*parts, origin.text))))
+        line = filter(None, (*parts, standing.text, origin.text))
+        self.subject_told.emit(PARTED.join(line), bool(standing.text))
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""

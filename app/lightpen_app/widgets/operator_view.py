@@ -144,9 +144,16 @@ class OperatorView(Translated, QWidget):
         self._tell_keys()
         self._resize_letters()
 
-    def set_subject(self, text: str) -> None:
-        """Say what is being calibrated, such as pen and tip."""
-        self._subject.set_text(text, Tone.QUIET, bold=False)
+    def set_subject(self, text: str, is_marked: bool = False) -> None:
+        """Say what is being calibrated, such as pen and tip.
+
+        Parameters
+        ----------
+        is_marked : bool
+            Whether it must not be measured with, which the text says.
+        """
+        tone = Tone.WARN if is_marked else Tone.QUIET
+        self._subject.set_text(text, tone, bold=is_marked)
 
     def set_notice(self, text: str) -> None:
         """Show a sentence that must be read, or none."""

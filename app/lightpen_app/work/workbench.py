@@ -1,7 +1,7 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -30,6 +30,7 @@ from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
 from lightpen.record.presence import Presence
 from lightpen.record.recordings import FilesBeside
+from lightpen.record.standing import Standings
 from lightpen.record.supervision import Supervision, read_supervision
 from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
@@ -42,6 +43,7 @@ from lightpen.swing.preparation import (
 from lightpen.verification.choices import VerificationChoices
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.job import Job, Report
+from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.station_choices import choices_of, with_choices
@@ -69,10 +71,13 @@ class Subject:
         Of the swing there is; else those that are chosen.
     origin : Origin or None
         What its images are of; None where a swing of an earlier version does not say.
+    standings : Standings
+        How all tips stand.
     """
 
     names: Names
     origin: Origin | None
+    standings: Standings = field(default_factory=Standings)
 
 
 class Workbench(QObject):
@@ -142,6 +147,10 @@ class Workbench(QObject):
             self.run.archive, folder, self._around.now, self
         )
         self.live = LiveView(self.run, self.verification, self)
+        self.library = LibraryWatch(
+            folder, self.run.logbook, settings.due_rule, self._around.now, self
+        )
+        self._in_force_told: tuple[object, object] = (None, None)
 
         # Connections
         self.live.image_shown.connect(self._on_image_shown)
@@ -153,8 +162,12 @@ class Workbench(QObject):
         self.run.relieved.connect(self.relieved)
         self.verification.troubled.connect(self.troubled)
         self.verification.relieved.connect(self.relieved)
+        self.library.troubled.connect(self.troubled)
+        self.library.relieved.connect(self.relieved)
+        self.library.changed.connect(self._tell_subject)
         self._counting.timeout.connect(self._count_others)
         self.run.changed.connect(self._tell_subject)
+        self.run.changed.connect(self._follow_results)
         self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
         settings.relieved.connect(self._on_settings_relieved)
@@ -210,9 +223,10 @@ class Workbench(QObject):
     def subject(self) -> Subject:
         """What is calibrated: by the swing there is, else by what is chosen."""
         status, chosen = self.run.status, self._preparation
+        standings = self.library.standings
         if status.state is not None:
-            return Subject(status.names, status.origin)
-        return Subject(chosen.names, chosen.origin)
+            return Subject(status.names, status.origin, standings)
+        return Subject(chosen.names, chosen.origin, standings)
 
     @property
     def around(self) -> Surroundings:
@@ -232,6 +246,7 @@ class Workbench(QObject):
         Job(lambda _: sweep_leftovers(folder), self).start()
         self.run.runner.open_logbook()
         self._read_supervision()
+        self.library.refresh()
         self._count_others()
         self._counting.start()
         self.choose_station(self._settings.last_station())
@@ -315,6 +330,7 @@ class Workbench(QObject):
     def set_due_rule(self, rule: DueRule) -> None:
         """Remember how long a tip may be in force."""
         self._settings.set_due_rule(rule)
+        self.library.refresh()
 
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
@@ -383,6 +399,7 @@ class Workbench(QObject):
         """
         deadline = monotonic() + timeout_s
         self._counting.stop()
+        self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
         self.live.close()
@@ -526,6 +543,13 @@ class Workbench(QObject):
         if n_others != self._n_others:
             self._n_others = n_others
             self.others_counted.emit(n_others)
+
+    def _follow_results(self) -> None:
+        """See how the tips stand once a result was accepted or taken back."""
+        now = self.run.status.result, self.run.status.taken_back
+        before, self._in_force_told = self._in_force_told, now
+        if any(one is not two for one, two in zip(now, before, strict=True)):
+            self.library.refresh()
 
     def _tell_subject(self) -> None:
         subject = self.subject

@@ -15,7 +15,7 @@ from msgspec import structs, to_builtins
 from lightpen.archive.chains import chain_at_home
 from lightpen.archive.database import look_into
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.standing import Standings, standings
+from lightpen.archive.standing import standings
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.tips import FORGOTTEN
 from lightpen.detection.observations import observe_images
@@ -34,6 +34,7 @@ from lightpen.record.library_changes import (
     known_item,
     retire_item,
 )
+from lightpen.record.standing import Standings
 from lightpen.record.supervision import Signature
 from lightpen.record.tip_library import (
     AnyItem,
@@ -245,9 +246,7 @@ def _record(item: AnyItem, found: Standings) -> dict[str, Any]:
         entries["in_force"] = [
             {
                 "pen": pen,
-                "calibrated": _moment(
-                    found.in_force[pen, item.id].entry.entry.event.at
-                ),
+                "calibrated": _moment(found.in_force[pen, item.id].calibrated),
                 "due": str(found.due(pen, item.id)),
                 "standing": found.of_tip(pen, item.id),
             }

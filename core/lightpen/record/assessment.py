@@ -1,6 +1,8 @@
 """A solved swing beside what is in force: its verdict, and what to look into."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import date
 from itertools import chain
 
 import numpy as np
@@ -33,6 +35,7 @@ from lightpen.record.reading import (
 )
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution
+from lightpen.record.tip_library import KIND_WORDS, Library
 from lightpen.sentences import Sentence, sentence
 
 
@@ -71,8 +74,10 @@ def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
     limits = recorded_limits(record)
     verdict = judge(solution.calibration, limits)
     last, limit, unknown = None, None, None
+    library = Library()
     try:
-        listed = archive.library().tips.get(names.tip)
+        library = archive.library()
+        listed = library.tips.get(names.tip)
         limit = None if listed is None else listed.max_change_mm
         last = _last(archive, names, origin)
     except FileError as error:
@@ -87,6 +92,7 @@ def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
     all_doubts = chain(
         [] if unknown is None else [last_unknown(unknown)],
         [] if doubt is None else [doubt],
+        _overdue(library, names, local_time(record.header.created).date()),
         _far_from_nominal(solution),
         _bare_sides(solution, limits) if is_of_recording(record) else [],
         warnings_of(solution.calibration),
@@ -108,6 +114,24 @@ def _change(solution: Solution, last: Result) -> Change:
         last.tip_pen,
         last.uncertainty,
     )
+
+
+def _overdue(library: Library, names: Names, day: date) -> Iterator[Sentence]:
+    """Tell what should have been looked after before the day of the swing."""
+    for item in (
+        library.pens.get(names.pen),
+        library.tips.get(names.tip),
+        library.cones.get(names.cone),
+    ):
+        if item is not None and item.is_overdue(day):
+            yield sentence(
+                "doubt.overdue",
+                "The {kind} {id} was to be used until {due} only. Have it looked "
+                "after.",
+                kind=KIND_WORDS[item.kind],
+                id=item.id,
+                due=str(item.due),
+            )
 
 
 def _far_from_nominal(solution: Solution) -> list[Sentence]:

@@ -68,4 +68,10 @@ def decision_rule(limits: StatedLimits) -> tuple[Sentence, ...]:
             "reason, a REPEAT not at all.",
             gate=CHANGE_GATE,
         ),
+        sentence(
+            "decision-rule.change-limit",
+            "Where the tip has a limit of its own for its change, the distance from "
+            "the tip that was in force before (as found) to the tip that is accepted "
+            "(as left) is compared with it by simple acceptance; beyond it is CHECK.",
+        ),
     )

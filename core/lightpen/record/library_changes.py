@@ -1,7 +1,6 @@
 """Changing the tip library: each change checked, signed where it must be, and kept."""
 
 import math
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
@@ -25,6 +24,7 @@ from lightpen.record.supervision import (
 )
 from lightpen.record.tip_library import (
     FORMAT,
+    KIND_WORDS,
     LARGEST_BALL,
     LARGEST_CHANGE,
     LIBRARY,
@@ -47,12 +47,6 @@ from lightpen.sentences import Sentence, sentence
 LARGEST_PLACE = 10_000.0  # mm
 LARGEST_PICTURE = 8 * MEGABYTE
 PICTURE = sentence("file.picture", "picture")
-
-KIND_WORDS: Mapping[ItemKind, Sentence] = {
-    ItemKind.PEN: sentence("library.pen", "pen"),
-    ItemKind.TIP: sentence("library.tip", "tip"),
-    ItemKind.CONE: sentence("library.cone", "cone"),
-}
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from lightpen.formats.own_json import (
 from lightpen.record.assumed import Plain
 from lightpen.record.due_rule import DueRule
 from lightpen.record.numbered_files import numbered_files
-from lightpen.sentences import sentence
+from lightpen.sentences import Sentence, sentence
 
 LIBRARY = "library"
 PICTURES = "pictures"  # folder in that one
@@ -53,6 +53,13 @@ class ItemKind(StrEnum):
     PEN = "pen"
     TIP = "tip"
     CONE = "cone"
+
+
+KIND_WORDS: Mapping[ItemKind, Sentence] = {
+    ItemKind.PEN: sentence("library.pen", "pen"),
+    ItemKind.TIP: sentence("library.tip", "tip"),
+    ItemKind.CONE: sentence("library.cone", "cone"),
+}
 
 
 class AxisOrigin(StrEnum):

@@ -29,6 +29,7 @@ from lightpen.record.names import Names
 from lightpen.record.reading import FileCopy, Header, RigCopies
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.record.results import Result
+from lightpen.record.tip_library import Tip
 from lightpen.swing.state import SwingSetup
 
 N_CAMERAS = 2  # that are live at once
@@ -290,6 +291,11 @@ class Preparation:
         if _same(nominal_tip, of_file):  # it is not the tip's own
             nominal_tip = None
         return replace(self, names=names, nominal_tip=nominal_tip)
+
+    def with_listed(self, tip: Tip) -> Self:
+        """Return it for a tip of the library, whose ball and nominal centre it has."""
+        names = replace(self.names, tip=tip.id, ball_diameter=tip.ball_diameter_mm)
+        return replace(self, names=names, nominal_tip=tip.nominal_tip)
 
     @property
     def aim(self) -> Aim:

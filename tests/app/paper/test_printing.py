@@ -72,7 +72,12 @@ def test_what_an_auditor_asks_for_is_there(
     doubted: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:
     day = datetime(2025, 12, 1, tzinfo=UTC)
-    since = Since(day, (0.001, 0.0301, 0.0), (0.002, 0.0142, 0.002))
+    since = Since(
+        *(day, (0.001, 0.0301, 0.0), (0.002, 0.0142, 0.002)),
+        as_found_mm=(1.0, 2.0, 3.0),
+        as_found_expanded_uncertainty_mm=(0.001, 0.002, 0.003),
+        limit_mm=0.02,
+    )
     entered = Entered(number=41, sha256=64 * "a", previous=64 * "b")
 
     told = " ".join(
@@ -90,6 +95,8 @@ def test_what_an_auditor_asks_for_is_there(
         "simple acceptance (ILAC-G8:09/2019",
         "Budget of uncertainty",
         "Change since 2025-12-01 / mm",
+        "Tip as found / mm 1.0000 2.0000 3.0000",
+        "lay 0.0301 mm from the tip as left, BEYOND its limit of 0.02 mm",
         "2026-01-02 12:00:00+00:00",
         "3.0005 mm",
         stated["inputs"]["camera"]["sha256"],

@@ -17,7 +17,7 @@ from lightpen.archive.due import due_tips
 from lightpen.archive.entries import Entry, Kind
 from lightpen.archive.history import known_names
 from lightpen.archive.logbook import ARCHIVE, Logbook
-from lightpen.archive.standing import Standing, Standings, standings
+from lightpen.archive.standing import standings
 from lightpen.record.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
@@ -26,6 +26,7 @@ from lightpen.record.library_changes import (
     keep_picture,
     retire_item,
 )
+from lightpen.record.standing import Standing, Standings
 from lightpen.record.tip_library import (
     Cone,
     ItemKind,

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import IO, Any
 
@@ -26,7 +26,7 @@ from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.reading import open_record, recorded_names
 from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, load_image, solve_again, solve_record
-from lightpen.record.tip_library import ItemKind, Tip, library_files
+from lightpen.record.tip_library import Cone, ItemKind, Tip, library_files
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter, note_taken_out
 from lightpen.simulator.swings import swing_poses
@@ -323,6 +323,16 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
     np.testing.assert_allclose(
         np.add(found.as_found_mm, found.difference_mm), stored.tip_pen, rtol=1e-12
     )
+
+
+def test_an_overdue_cone_is_told_with_the_result(case: Case) -> None:
+    cone = recorded_names(open_record(case.folder)).cone
+    data = case.archive.folder.parent
+    add_item(data, Cone(id=cone, due=date(2020, 1, 1)), Author(), NOON)
+
+    case.accept()
+    told = {doubt.code: doubt.text for doubt in case.in_force().doubts}
+    assert told["doubt.overdue"].startswith(f"The cone {cone} was to be used until")
 
 
 def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:

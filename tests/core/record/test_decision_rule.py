@@ -10,7 +10,7 @@ from lightpen.record.statement import StatedLimits
 def test_the_rule_names_the_limits_of_the_record_and_the_gates_of_the_program() -> None:
     limits = StatedLimits(max_uncertainty_mm=0.02, min_images=77, min_per_field=2)
 
-    uncertainty, consistency, change = map(str, decision_rule(limits))
+    uncertainty, consistency, change, _ = map(str, decision_rule(limits))
 
     assert "0.0200 mm by simple acceptance" in uncertainty
     assert f"{FAR_OFF * 0.02:.4f} mm, {FAR_OFF:g} times" in uncertainty

@@ -117,7 +117,7 @@ class HistoryContent(Translated, QWidget):
     def read_anew(self) -> None:
         """Read what is looked for, as it is now."""
         self._reader.open(self._filter.value())
-        self._reader.read_due(self._due.rule())
+        self._reader.read_due(self._due.rule(), self._workbench.library.library)
 
     def shut_down(self) -> None:
         """Cancel what is under way."""
@@ -183,7 +183,7 @@ class HistoryContent(Translated, QWidget):
 
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._workbench.set_due_rule(rule)
-        self._reader.read_due(rule)
+        self._reader.read_due(rule, self._workbench.library.library)
 
     # What is entered
 
@@ -202,6 +202,7 @@ class HistoryContent(Translated, QWidget):
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
+        self._workbench.library.refresh()
         told = self.tr("Tip {0} of pen {1} is in force as it was calibrated then.")
         names = result.names
         words = (shortened(names.tip), shortened(names.pen))

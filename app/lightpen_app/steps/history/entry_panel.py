@@ -10,7 +10,12 @@ from lightpen.archive.history import Line, TipState
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, breakable, moment_text
-from lightpen_app.steps.history.texts import kind_text, verdict_text, what_text
+from lightpen_app.steps.history.texts import (
+    item_text,
+    kind_text,
+    verdict_text,
+    what_text,
+)
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
@@ -199,5 +204,7 @@ def _why_of(event: Event) -> str:
     """Return verdict and reason; of a note its text."""
     if event.kind is Kind.NOTE:
         return event.reason
+    if event.kind is Kind.LIBRARY:
+        return PARTED.join(filter(None, (item_text(event), event.reason)))
     why = "" if event.why is None else event.why.text
     return PARTED.join(filter(None, (verdict_text(event.grade), why, event.reason)))

@@ -11,7 +11,7 @@ from lightpen.archive.queries import Wanted
 from lightpen.local_time import local_time
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
-from lightpen_app.steps.history.date_field import DateField
+from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import field_label, stacked
 from lightpen_app.widgets.translated import Translated
 

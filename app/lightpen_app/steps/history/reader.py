@@ -13,6 +13,7 @@ from lightpen.archive.history import KnownNames, Line, known_names, lines, remar
 from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.queries import Wanted, n_wanted
 from lightpen.record.due_rule import DueRule
+from lightpen.record.tip_library import Library
 from lightpen.verification.trend import trend_of
 from lightpen_app.work.job import Job, Report
 
@@ -117,13 +118,13 @@ class HistoryReader(QObject):
             self.remarks_read.emit,
         )
 
-    def read_due(self, rule: DueRule) -> None:
+    def read_due(self, rule: DueRule, library: Library) -> None:
         """Read when the tips in force at this station are due."""
         logbook = self._logbook
 
         def read(_: Report) -> tuple[DueTip, ...]:
             opened = logbook.opened()
-            return due_tips(opened.database, opened.chain, rule)
+            return due_tips(opened.database, opened.chain, rule, library)
 
         self._start("due", read, self.due_read.emit)
 

@@ -4,12 +4,13 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QCoreApplication
 
-from lightpen.archive.entries import Kind
+from lightpen.archive.entries import Event, Kind
 from lightpen.archive.history import Line, TipState
 from lightpen.estimation.verdict import Grade
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.theme import Tone
+from lightpen_app.look.words import PARTED
 
 CONTEXT = "history"
 
@@ -28,12 +29,26 @@ _KINDS: dict[Kind, str] = {
     Kind.ABANDONED: QT_TRANSLATE_NOOP("history", "Set aside"),
     Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Taking back"),
     Kind.NOTE: QT_TRANSLATE_NOOP("history", "Note"),
+    Kind.LIBRARY: QT_TRANSLATE_NOOP("history", "Tip library"),
 }
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),
     TipState.REPLACED: QT_TRANSLATE_NOOP("history", "replaced"),
     TipState.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "taken back"),
 }
+_SAID: dict[str, str] = {  # of an item of the tip library, by its settings
+    "id": "{0}",
+    "due": QT_TRANSLATE_NOOP("history", "to be used until {0}"),
+    "ball_diameter_mm": QT_TRANSLATE_NOOP("history", "ball {0} mm"),
+    "nominal_tip_mm": QT_TRANSLATE_NOOP("history", "nominal centre {0} mm"),
+    "stylus_axis": QT_TRANSLATE_NOOP("history", "axis {0}"),
+    "max_change_mm": QT_TRANSLATE_NOOP("history", "change at most {0} mm"),
+    "max_days": QT_TRANSLATE_NOOP("history", "{0} days at most"),
+    "max_swings": QT_TRANSLATE_NOOP("history", "{0} swings at most"),
+    "note": "{0}",
+    "supervisor": QT_TRANSLATE_NOOP("history", "signed by {0}"),
+}
+_RETIRED = QT_TRANSLATE_NOOP("history", "retired")
 _CHANGED = QT_TRANSLATE_NOOP("history", "Changed since it was entered")
 _SIMULATED = QT_TRANSLATE_NOOP("history", "practice")
 
@@ -54,6 +69,18 @@ def what_text(line: Line) -> str:
     if event.is_simulated:
         words.append(_translated(_SIMULATED))
     return ", ".join(words)
+
+
+def item_text(event: Event) -> str:
+    """Return what a change of the tip library says of its item from then on."""
+    words = [
+        _translated(template).format(event.settings[name])
+        for name, template in _SAID.items()
+        if event.settings.get(name)
+    ]
+    if event.settings.get("is_retired"):
+        words.append(_translated(_RETIRED))
+    return PARTED.join(words)
 
 
 def verdict_text(grade: str) -> str:

@@ -26,7 +26,7 @@ from lightpen.local_time import local_time
 from lightpen.record.acceptance import takes_supervisor
 from lightpen.record.assessment import Assessment
 from lightpen.record.exports import export_json, export_tables, tip_text
-from lightpen.record.next_tips import next_tips
+from lightpen.record.next_tips import NextTip, next_tips
 from lightpen.record.results import Result
 from lightpen.record.retraced import Retraced, retrace
 from lightpen.record.statement import Entered, Statement, read_statement
@@ -155,10 +155,12 @@ class ReviewPage(Rearranged, Page):
         self._tools.copy_requested.connect(self._copy_tip)
         self._tools.save_requested.connect(self._ask_folder)
         self._tools.paper_requested.connect(self._read_paper)
+        workbench.library.changed.connect(self._show_standings)
         self._next_tips.chosen.connect(self._on_next_tip_chosen)
         for panel in self._panels:
             panel.made.connect(self._on_panel_made)
 
+        self._show_standings()
         self._retranslate()
 
     @override
@@ -624,11 +626,18 @@ class ReviewPage(Rearranged, Page):
         job.succeeded.connect(self._next_tips.set_value)
         job.start()
 
-    def _on_next_tip_chosen(self, last: Result) -> None:
+    def _show_standings(self) -> None:
+        self._next_tips.set_standings(self._workbench.library.standings)
+
+    def _on_next_tip_chosen(self, tip: NextTip) -> None:
         workbench = self._workbench
         self._run.runner.abandon()
-        chosen = workbench.preparation.with_last(last)
-        names = replace(chosen.names, pen=last.names.pen)
+        chosen = workbench.preparation
+        if tip.last is not None:
+            chosen = chosen.with_last(tip.last)
+        if tip.listed is not None:
+            chosen = chosen.with_listed(tip.listed)
+        names = replace(chosen.names, pen=tip.pen)
         workbench.set_preparation(replace(chosen, names=names))
         self._to_next_tip = True
 

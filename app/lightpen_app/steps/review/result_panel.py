@@ -60,6 +60,7 @@ class ResultPanel(Translated, QFrame):
         self._readout = TipReadout()
         self._comparison = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = NumberTable()
+        self._as_found = SignLabel()
         self._halves = SignLabel()
         self._images = SignLabel()
 
@@ -74,6 +75,7 @@ class ResultPanel(Translated, QFrame):
         layout.addWidget(self._comparison)
         layout.addWidget(self._table)
         layout.addSpacing(GRID // 2)
+        layout.addWidget(self._as_found)
         layout.addWidget(self._halves)
         layout.addWidget(self._images)
         layout.addStretch(1)
@@ -100,6 +102,7 @@ class ResultPanel(Translated, QFrame):
         if outcome is None:
             self._readout.set_value(None)
             self._table.set_value(Figures())
+            self._as_found.set_value(Remark())
             self._halves.set_value(Remark())
             self._images.set_value(Remark())
             return
@@ -107,6 +110,7 @@ class ResultPanel(Translated, QFrame):
         u_x, u_y, u_z = outcome.uncertainty.tolist()
         self._readout.set_value(TipValue((x, y, z), (u_x, u_y, u_z)))
         self._table.set_value(self._differences(outcome))
+        self._as_found.set_value(self._as_found_remark(outcome.assessment))
         self._halves.set_value(self._halves_remark(outcome.solution))
         used = outcome.solution.calibration.used
         text = self.tr("{0} of {1} images used").format(int(used.sum()), len(used))
@@ -148,6 +152,24 @@ class ResultPanel(Translated, QFrame):
         ]
         names, cells = zip(*rows, strict=True)
         return Figures(AXES, tuple(names), tuple(cells))
+
+    def _as_found_remark(self, assessment: Assessment) -> Remark:
+        """Return how far the tip in force was found off, against its limit."""
+        change, last, limit = assessment.change, assessment.last, assessment.max_change
+        if change is None or last is None:
+            return Remark()
+        decimals = decimals_for(float(change.expanded_uncertainty.max()))
+        off = number_text(change.distance, decimals)
+        if limit is None:
+            text = self.tr("As found: {0} mm off; the tip has no limit of change")
+            return Remark(text.format(off), Sign.RING, Tone.PLAIN)
+        text = self.tr("As found: {0} mm off, limit {1} mm").format(off, f"{limit:g}")
+        is_within = change.distance <= limit
+        return (
+            Remark(text, Sign.CHECK, Tone.GOOD)
+            if is_within
+            else Remark(text, Sign.WARNING, Tone.WARN)
+        )
 
     def _halves_remark(self, solution: Solution) -> Remark:
         if halves_agree(solution.calibration.halves):

@@ -2,22 +2,28 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QGridLayout,
     QGroupBox,
+    QHBoxLayout,
     QLabel,
     QLineEdit,
     QVBoxLayout,
     QWidget,
 )
+from typing_extensions import override
 
 from lightpen.arrays import FloatArray
 from lightpen.model.limits import SwingLimits
 from lightpen.record.names import Names
+from lightpen.record.tip_library import ItemKind
 from lightpen.swing.preparation import Lack
 from lightpen_app.look.theme import GRID
+from lightpen_app.steps.start.item_button import Choice, ItemButton
 from lightpen_app.steps.start.point_field import PointField
 from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
 from lightpen_app.widgets.labelled import field_label, stacked
@@ -44,6 +50,10 @@ class NamesForm(Translated, QWidget):
         It was finished by the Enter key.
     nominal_tip_changed()
         The nominal centre of the tip is another one.
+    item_chosen(ItemKind, str)
+        A pen, tip or cone was chosen from its list.
+    library_requested(ItemKind)
+        The tip library shall be shown.
     """
 
     value_edited = Signal()
@@ -51,6 +61,8 @@ class NamesForm(Translated, QWidget):
     station_changed = Signal(str)
     station_entered = Signal()
     nominal_tip_changed = Signal()
+    item_chosen = Signal(object, str)
+    library_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -60,11 +72,12 @@ class NamesForm(Translated, QWidget):
         self._station = StationField()
         self._operator = _name_edit()
         self._probe = QGroupBox()
-        self._pen = _name_edit()
-        self._tip = _name_edit()
+        self._lists = {kind: ItemButton() for kind in ItemKind}
+        self._pen = _ListedEdit(self._lists[ItemKind.PEN])
+        self._tip = _ListedEdit(self._lists[ItemKind.TIP])
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
         self._ball.setKeyboardTracking(False)
-        self._cone = _name_edit()
+        self._cone = _ListedEdit(self._lists[ItemKind.CONE])
         self._nominal_tip = PointField()
         self._edits = (self._operator, self._pen, self._tip, self._cone)
         self._labels: dict[QWidget, QLabel] = {
@@ -77,9 +90,9 @@ class NamesForm(Translated, QWidget):
         place.addLayout(self._labelled(self._station), 0, 0)
         place.addLayout(self._labelled(self._operator), 0, 1)
         probe = _panel(self._probe)
-        probe.addLayout(self._labelled(self._pen), 0, 0)
-        probe.addLayout(self._labelled(self._cone), 0, 1)
-        probe.addLayout(self._labelled(self._tip), 1, 0)
+        probe.addLayout(self._listed(self._pen, ItemKind.PEN), 0, 0)
+        probe.addLayout(self._listed(self._cone, ItemKind.CONE), 0, 1)
+        probe.addLayout(self._listed(self._tip, ItemKind.TIP), 1, 0)
         probe.addLayout(self._labelled(self._ball), 1, 1)
         probe.addLayout(self._labelled(self._nominal_tip), 2, 0, 1, 2)
         layout = QVBoxLayout(self)
@@ -95,6 +108,9 @@ class NamesForm(Translated, QWidget):
         for edit in self._edits:
             edit.textEdited.connect(self.value_edited)
             edit.editingFinished.connect(self.value_changed)
+        for kind, button in self._lists.items():
+            button.chosen.connect(partial(self.item_chosen.emit, kind))
+            button.library_requested.connect(partial(self.library_requested.emit, kind))
         self._ball.valueChanged.connect(self.value_changed)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
 
@@ -125,6 +141,14 @@ class NamesForm(Translated, QWidget):
     def set_stations(self, names: Sequence[str]) -> None:
         """List the stations that are known."""
         self._station.set_known(names)
+
+    def set_choices(self, kind: ItemKind, choices: Sequence[Choice]) -> None:
+        """List the items of the library that can be chosen."""
+        self._lists[kind].set_choices(choices)
+
+    def list_of(self, kind: ItemKind) -> ItemButton:
+        """Return the button that lists pens, tips or cones."""
+        return self._lists[kind]
 
     def set_ball(self, diameter: float | None) -> None:
         """Show another diameter of the ball, mm; None where it is not known."""
@@ -163,7 +187,29 @@ class NamesForm(Translated, QWidget):
     def _labelled(self, field: QWidget) -> QVBoxLayout:
         return stacked(self._labels[field], field)
 
+    def _listed(self, field: QWidget, kind: ItemKind) -> QVBoxLayout:
+        """Return a name with its label above and its list beside."""
+        row = QHBoxLayout()
+        row.setSpacing(GRID // 2)
+        row.addWidget(field, 1)
+        row.addWidget(self._lists[kind])
+        layout = QVBoxLayout()
+        layout.setSpacing(GRID // 2)
+        layout.addWidget(self._labels[field])
+        layout.addLayout(row)
+        return layout
+
     def _retranslate(self) -> None:
+        lists = {
+            ItemKind.PEN: self.tr("List of pens"),
+            ItemKind.TIP: self.tr("List of tips"),
+            ItemKind.CONE: self.tr("List of cones"),
+        }
+        for kind, name in lists.items():
+            self._lists[kind].setAccessibleName(name)
+            self._lists[kind].setToolTip(
+                self.tr("Choose from the tip library, or open it. Key: arrow down")
+            )
         self._place.setTitle(self.tr("Where and who"))
         self._probe.setTitle(self.tr("What is calibrated"))
         for field, text in (
@@ -300,6 +346,22 @@ class LimitsForm(Translated, QGroupBox):
             label.setText(text)
             field.setAccessibleName(text)
             field.setToolTip(tip)
+
+
+class _ListedEdit(QLineEdit):
+    """A name whose list an arrow key opens."""
+
+    def __init__(self, button: ItemButton) -> None:
+        super().__init__()
+        self._button = button
+        self.setMaxLength(LONGEST_NAME)
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Down:
+            self._button.showMenu()
+        else:
+            super().keyPressEvent(event)
 
 
 def _name_edit() -> QLineEdit:

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from PySide6.QtCore import QSize, QTimer
-from PySide6.QtGui import QShowEvent
+from PySide6.QtCore import QEvent, QSize, QTimer
+from PySide6.QtGui import QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
@@ -17,6 +17,7 @@ from lightpen.record.opening import swing_folder
 from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, Supervision, lay_down
+from lightpen.record.tip_library import ItemKind
 from lightpen.record.unfinished import (
     Unfinished,
     discard_damaged,
@@ -30,16 +31,19 @@ from lightpen.swing.resuming import Resumable, read_resumable
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
+from lightpen_app.look.words import shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
 from lightpen_app.widgets.page_scroll import PageScroll
+from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import TRIAL, Workbench
@@ -77,6 +81,8 @@ class StartPage(Rearranged, Page):
         self._names = NamesForm()
         self._limits = LimitsForm()
         self._all_limits = LimitsDialog(self)
+        self._unknown_code = QuestionBar()
+        self._library = LibraryControl(workbench, self._names, self._unknown_code, self)
         self._assumed = AssumptionsPanel()
         self._interrupted = InterruptedPanel()
         self._last = LastResultPanel(workbench.around.now)
@@ -92,6 +98,7 @@ class StartPage(Rearranged, Page):
         # Layout
         self._left = left = QVBoxLayout()
         left.setSpacing(2 * GRID)
+        left.addWidget(self._unknown_code)
         left.addWidget(self._names)
         left.addWidget(self._limits)
         left.addWidget(self._assumed)
@@ -123,6 +130,9 @@ class StartPage(Rearranged, Page):
         self._names.station_changed.connect(self._on_station_changed)
         self._names.station_entered.connect(self.show_lack)
         self._names.nominal_tip_changed.connect(self._on_nominal_tip_changed)
+        self._library.chosen.connect(self._on_item_chosen)
+        self._library.told.connect(self.status_changed)
+        workbench.library.changed.connect(self._show_standing)
         self._limits.value_changed.connect(self._on_limits_changed)
         self._limits.all_requested.connect(self._on_all_limits_requested)
         self._all_limits.signed.connect(self._on_limits_signed)
@@ -157,13 +167,11 @@ class StartPage(Rearranged, Page):
 
     @override
     def is_complete(self) -> bool:
-        return not self._typed().start_lacks()
+        return not self._why_not_on()
 
     @override
     def main_action(self) -> MainAction:
-        lacks = self._typed().start_lacks()
-        why_not = lack_text(lacks[0]) if lacks else ""
-        return MainAction(self.tr("Continue to the camera"), why_not)
+        return MainAction(self.tr("Continue to the camera"), self._why_not_on())
 
     @override
     def run_main_action(self) -> None:
@@ -179,6 +187,7 @@ class StartPage(Rearranged, Page):
     @override
     def entered(self) -> None:
         self._names.set_stations(self._workbench.stations())
+        self._workbench.library.refresh()
         self._look_up_last()
 
     @override
@@ -208,13 +217,43 @@ class StartPage(Rearranged, Page):
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
+        self._library.barcodes.listen(self.window().windowHandle())
         if not event.spontaneous():
             self._searching.start()  # when the window is on the screen
+
+    @override
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self._library.barcodes.listen(None)
+
+    @override
+    def event(self, event: QEvent) -> bool:
+        """Let no key of a barcode be taken for a shortcut."""
+        if (
+            event.type() == QEvent.Type.ShortcutOverride
+            and isinstance(event, QKeyEvent)
+            and self._library.barcodes.is_amid(event)
+        ):
+            event.accept()
+            return True
+        return super().event(event)
 
     @override
     def _retranslate(self) -> None:
         self._tell_why_unverified()
         self.changed.emit()
+
+    def _why_not_on(self) -> str:
+        """Return what is missing, or that the tip is retired."""
+        typed = self._typed()
+        lacks, tip = typed.start_lacks(), self._library.tip(typed.names.tip)
+        if lacks:
+            return lack_text(lacks[0])
+        if tip is None or not tip.is_retired:
+            return ""
+        return self.tr(
+            "Tip {0} is retired. Choose another one, or bring it back in the library."
+        ).format(shortened(tip.id))
 
     # What is typed
 
@@ -233,8 +272,27 @@ class StartPage(Rearranged, Page):
         names = replace(self._names.value(), station=now.names.station)
         if names == now.names:
             return
-        self._wants_last = self._wants_last or names.tip != now.names.tip
-        self._choose_tip(now.renamed(names))
+        is_other = names.tip != now.names.tip
+        self._wants_last = self._wants_last or is_other
+        renamed, listed = now.renamed(names), self._library.tip(names.tip)
+        is_bare = renamed.names.ball_diameter is None
+        if is_other and listed is not None and is_bare:
+            renamed = renamed.with_listed(listed)
+        self._choose_tip(renamed)
+
+    def _on_item_chosen(self, kind: ItemKind, name: str) -> None:
+        """Take over a pen, tip or cone that was chosen; a tip with what is its own."""
+        self._take_names()
+        now = self._workbench.preparation
+        tip = self._library.tip(name)
+        if kind is ItemKind.TIP and tip is not None:
+            self._wants_last = True
+            chosen = now.with_listed(tip)
+        elif kind is ItemKind.PEN:
+            chosen = replace(now, names=replace(now.names, pen=name))
+        else:
+            chosen = replace(now, names=replace(now.names, cone=name))
+        self._workbench.set_preparation(chosen)
 
     def _on_station_changed(self, name: str) -> None:
         """Bring back a known station; a new one takes over the present choices."""
@@ -312,6 +370,18 @@ class StartPage(Rearranged, Page):
         self._limits.set_guarded(self._workbench.supervision.is_guarded)
         if _key(now) != self._looked_up:
             self._look_up_last()
+        if before.names != now.names or before.origin is not now.origin:
+            self._library.refresh()
+            self._show_standing()
+        self.changed.emit()
+
+    def _show_standing(self) -> None:
+        """Mark the tip that is named, as it stands now."""
+        now, library = self._workbench.preparation, self._workbench.library
+        standings = library.standings
+        standing = standings.of_tip(now.names.pen, now.names.tip)
+        is_simulated = now.origin is Origin.SIMULATED
+        self._last.set_standing(None if is_simulated else standing)
         self.changed.emit()
 
     def _show_changes(self, before: Preparation | None, now: Preparation) -> None:
@@ -351,7 +421,8 @@ class StartPage(Rearranged, Page):
 
     def _on_looked_up(self, result: Result | None) -> None:
         is_simulated = self._looked_up[2]
-        rule = self._workbench.due_rule()
+        library = self._workbench.library.library
+        rule = library.rule_of(self._looked_up[1], self._workbench.due_rule())
         self._last.set_value(LastResult(result, is_simulated=is_simulated, rule=rule))
         now = self._workbench.preparation
         wants_last, self._wants_last = self._wants_last, False

@@ -18,6 +18,7 @@ from lightpen.estimation.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen.record.due_rule import DueRule
 from lightpen.record.results import Result
+from lightpen.record.standing import Standing
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
@@ -28,6 +29,7 @@ from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.standing_mark import standing_remark
 from lightpen_app.widgets.translated import Translated
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
@@ -83,11 +85,13 @@ class LastResultPanel(Translated, QGroupBox):
         super().__init__(parent)
         self._now = now
         self._value = LastResult()
+        self._marked: Standing | None = None
 
         # Widgets
         self._age = text_label(TextSize.TITLE)
         self._age.setWordWrap(False)
         self._grade = SignLabel(wraps=False)
+        self._standing = SignLabel(wraps=False)
         self._when = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = QWidget()
         self._heads = [_cell(TextSize.SMALL, Tone.QUIET) for _ in range(3)]
@@ -118,6 +122,7 @@ class LastResultPanel(Translated, QGroupBox):
         first.setSpacing(2 * GRID)
         first.addWidget(self._age)
         first.addWidget(self._grade, 0, Qt.AlignmentFlag.AlignVCenter)
+        first.addWidget(self._standing, 0, Qt.AlignmentFlag.AlignVCenter)
         first.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -163,6 +168,11 @@ class LastResultPanel(Translated, QGroupBox):
         self._question.hide()
         self._retranslate()
 
+    def set_standing(self, standing: Standing | None) -> None:
+        """Mark a tip that must not be measured with; None where that is not known."""
+        self._marked = None if standing is Standing.VALID else standing
+        self._standing.set_value(standing_remark(self._marked))
+
     def set_why_unverified(self, why_not: str) -> None:
         """Say why the tip cannot be verified now, or let it."""
         told = self.tr("Prove the tip in minutes by touching what is known.")
@@ -170,7 +180,8 @@ class LastResultPanel(Translated, QGroupBox):
 
     def words(self) -> tuple[str, ...]:
         """Return what is said, line by line."""
-        lines = [self._age.text(), self._grade.value().text, self._when.text()]
+        marks = [each.value().text for each in (self._grade, self._standing)]
+        lines = [self._age.text(), *marks, self._when.text()]
         if self._value.result is not None:
             lines += [
                 f"{axis} {tip.text()} {uncertainty.text()}"
@@ -189,6 +200,7 @@ class LastResultPanel(Translated, QGroupBox):
             if value.is_simulated
             else self.tr("Last calibration of this pen and tip")
         )
+        self._standing.set_value(standing_remark(self._marked))
         self._verify.setText(self.tr("Verify it"))
         self._take_back.setText(self.tr("Take back..."))
         self._take_back.setToolTip(

@@ -11,6 +11,8 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.estimation.verdict import Grade
+from lightpen.model.origin import Origin
+from lightpen.record.standing import Standing
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.status import Reading, SessionHappening
 from lightpen_app.look.grades import GRADE_MARKS
@@ -44,6 +46,7 @@ from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.standing_mark import standing_text
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
@@ -125,6 +128,7 @@ class VerifyPage(Rearranged, Page):
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._show_soon)
         workbench.changed.connect(self._on_workbench_changed)
+        workbench.library.changed.connect(self.changed)
         self._act.clicked.connect(self.toggle_pause)
         self._start_over.clicked.connect(self._on_start_over_clicked)
         self._question.agreed.connect(self._runner.start_over)
@@ -158,7 +162,15 @@ class VerifyPage(Rearranged, Page):
         by = self._run.status.accepted_by
         accepted = self.tr("accepted by {0}").format(shortened(by)) if by else ""
         kept = self.tr("kept as {0}").format(files) if files else ""
-        return PARTED.join(filter(None, (words, kept, accepted)))
+        return PARTED.join(filter(None, (words, self._standing(), kept, accepted)))
+
+    def _standing(self) -> str:
+        """Return what is the matter with the tip, a word; nothing of a valid one."""
+        tip, standings = self._run.status.tip, self._workbench.library.standings
+        if tip is None or self._workbench.preparation.origin is Origin.SIMULATED:
+            return ""
+        standing = standings.of_tip(tip.names.pen, tip.names.tip)
+        return "" if standing in (None, Standing.VALID) else standing_text(standing)
 
     @override
     def is_complete(self) -> bool:

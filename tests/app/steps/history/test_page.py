@@ -27,10 +27,11 @@ from lightpen.archive.entries import Event, Kind
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.results import Result
+from lightpen.record.tip_library import Tip
 from lightpen_app.steps.history.archive_panel import ArchivePanel
-from lightpen_app.steps.history.date_field import DateField
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -46,6 +47,7 @@ from lightpen_app.steps.history.history_table import (
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
 from lightpen_app.steps.history.trend_panel import TrendPanel
+from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
@@ -256,6 +258,20 @@ def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     panel = desk.child(EntryPanel)
     desk.until(lambda: any("Note" in words for words in panel.words()))
     assert any("Ann: Dropped on the floor." in words for words in panel.words())
+
+
+def test_a_change_of_the_tip_library_is_shown_with_what_it_says(desk: Desk) -> None:
+    tip = Tip(id="T-10", ball_diameter_mm=6.0, max_change_mm=0.02, is_retired=True)
+    add_item(desk.workbench.folder, tip, Author("Hall 2", "Ann", "chipped"), NOON)
+    desk.workbench.run.logbook.opened().enter_owed()
+    desk.open()
+
+    assert desk.column(WHAT) == ["Tip library"]
+    assert (desk.column(TIP), desk.column(WORDS)) == (["T-10"], ["chipped"])
+    desk.show_tab(ENTRY)
+    told = desk.child(EntryPanel).words()
+    parts = ("T-10", "ball 6.0 mm", "change at most 0.02 mm", "retired", "chipped")
+    assert "  \N{MIDDLE DOT}  ".join(parts) in told
 
 
 def store(folder: Path, n: int) -> Result:

@@ -36,9 +36,11 @@ from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.results import Result
+from lightpen.record.tip_library import Tip
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.postures import Postures
@@ -67,6 +69,7 @@ from lightpen_app.steps.review.tip_readout import TipReadout
 from lightpen_app.widgets.number_table import NumberTable
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.work.workbench import Workbench
 
@@ -571,6 +574,35 @@ def test_the_next_tip_is_one_click_away_with_its_ball_and_nominal_centre(
     assert (now.names.tip, now.names.ball_diameter) == ("T-11", 5.0)
     assert now.nominal_tip is not None
     assert now.nominal_tip.tolist() == [1.0, -80.0, -20.0]
+
+
+def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) -> None:
+    workbench = bed.solve()
+    listed = Tip(id="T-12", ball_diameter_mm=3.0)
+    for each in (listed, Tip(id="T-13", is_retired=True)):
+        add_item(workbench.folder, each, Author(), THEN)
+    page = bed.show()
+    page.run_main_action()
+    bed.qtbot.waitUntil(page.is_complete)
+    row = the(page, NextTipsRow)
+    bed.qtbot.waitUntil(lambda: bool(row.value()))
+    assert [each.tip for each in row.value()] == ["T-12"]
+    with bed.qtbot.waitSignal(page.step_requested):
+        click(page, "T-12")
+
+    names = workbench.preparation.names
+    assert (names.tip, names.ball_diameter) == ("T-12", 3.0)
+
+
+def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
+    listed = Tip(id="T-10", max_change_mm=0.05)
+    add_item(bed.workbench.folder, listed, Author(), THEN)
+    bed.solve_after([0.0, 0.06, 0.08])
+
+    remarks = [each.value() for each in bed.show().findChildren(SignLabel)]
+    (found,) = [each for each in remarks if each.text.startswith("As found")]
+    assert re.fullmatch(r"As found: 0\.100\d* mm off, limit 0\.05 mm", found.text)
+    assert found.tone is Tone.WARN
 
 
 # What is taken along

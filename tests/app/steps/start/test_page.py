@@ -695,7 +695,8 @@ def test_a_simulated_tip_is_shown_for_no_real_pen(
     workbench.set_preparation(chosen)
 
     assert show(workbench).last() == (
-        *("None yet", "The tip that you accept will be the first in force."),
+        *("None yet", "NOT CALIBRATED"),
+        "The tip that you accept will be the first in force.",
     )
 
 

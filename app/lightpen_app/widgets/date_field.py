@@ -37,6 +37,10 @@ class DateField(Translated, EnterEdit):
         """Return the day; None for any."""
         return self._value
 
+    def set_value(self, day: date | None) -> None:
+        """Show another day, or none."""
+        self.setText("" if day is None else f"{day}")
+
     def _on_text_changed(self, text: str) -> None:
         before, typed = self._value, text.strip()
         try:

@@ -1,0 +1,105 @@
+"""A barcode that a scanner types, told from what somebody types by its pace."""
+
+from PySide6.QtCore import QCoreApplication, QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QWindow
+from typing_extensions import override
+
+from lightpen_app.widgets.keys import ENTER_KEYS
+
+PACE_MS = 50  # from one key of a scanner to the next at most; a hand takes longer
+PATIENCE_MS = 60  # after which no more is to come
+SHORTEST = 3  # characters; a hand may hit two keys at once
+MODIFIERS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier
+SHIFTS = (Qt.Key.Key_Shift, Qt.Key.Key_CapsLock)
+
+
+class BarcodeListener(QObject):
+    """Takes a barcode and its Enter out of the keys of a window, wherever the focus is.
+
+    Keys are held back for a moment, which nobody notices, and handed on as they came
+    unless they are a barcode. When they were pressed, the windowing system says: keys
+    that had to wait for a busy program are not taken for a scanner's.
+
+    Signals
+    -------
+    scanned(str)
+        The characters of a barcode.
+    """
+
+    scanned = Signal(str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._window: QWindow | None = None
+        self._held: list[QKeyEvent] = []
+        self._last_ms = 0
+        self._hands_on = False
+        self._patience = QTimer(self)
+        self._patience.setSingleShot(True)
+        self._patience.setInterval(PATIENCE_MS)
+
+        # Connections
+        self._patience.timeout.connect(self._let_go)
+
+    def listen(self, window: QWindow | None) -> None:
+        """Listen to the keys of another window, or of none."""
+        if self._window is not None:
+            self._let_go()
+            self._window.removeEventFilter(self)
+        self._window = window
+        if window is not None:
+            window.installEventFilter(self)
+
+    def is_amid(self, event: QKeyEvent) -> bool:
+        """Return whether a key follows those that are held back at their pace."""
+        pressed = event.timestamp()
+        return bool(self._held) and pressed - self._last_ms <= PACE_MS
+
+    @override
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if self._hands_on or not isinstance(event, QKeyEvent):
+            return False
+        if event.type() != QEvent.Type.KeyPress or event.key() in SHIFTS:
+            return False
+        if self._held and not self.is_amid(event):
+            self._let_go()
+        if event.key() in ENTER_KEYS:
+            return self._ends_with(event)
+        if not _is_of_barcode(event) or (event.text() == " " and not self._held):
+            self._let_go()
+            return False
+        self._held.append(event.clone())
+        self._last_ms = event.timestamp()
+        self._patience.start()
+        return True
+
+    def _ends_with(self, event: QKeyEvent) -> bool:
+        """Tell the barcode that an Enter ends, or hand on what is none."""
+        code = "".join(each.text() for each in self._held)
+        if len(code) < SHORTEST:
+            self._let_go()
+            return False
+        self._patience.stop()
+        self._held.clear()
+        self.scanned.emit(code.strip())
+        return True
+
+    def _let_go(self) -> None:
+        """Hand on what is held back."""
+        self._patience.stop()
+        held, self._held = self._held, []
+        self._hands_on = True
+        for each in held:
+            if self._window is not None:
+                QCoreApplication.sendEvent(self._window, each)
+        self._hands_on = False
+
+
+def _is_of_barcode(event: QKeyEvent) -> bool:
+    text = event.text()
+    return (
+        len(text) == 1
+        and text.isprintable()
+        and not event.isAutoRepeat()
+        and not event.modifiers() & ~MODIFIERS
+    )

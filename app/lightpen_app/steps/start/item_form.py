@@ -1,0 +1,304 @@
+"""What the tip library says of one item, typed."""
+
+from collections.abc import Callable
+from datetime import date
+
+from msgspec import structs
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from lightpen.record.tip_library import (
+    LARGEST_BALL,
+    LARGEST_CHANGE,
+    LONGEST_ID,
+    MOST_DAYS,
+    MOST_SWINGS,
+    AnyItem,
+    AxisOrigin,
+    Cone,
+    ItemKind,
+    Pen,
+    Tip,
+)
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.start.point_field import AXES, PointField
+from lightpen_app.widgets.date_field import DateField
+from lightpen_app.widgets.labelled import field_label, stacked
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.path_field import PathField
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.translated import Translated
+
+LONGEST_NOTE = 500  # characters
+MADE: dict[ItemKind, Callable[..., AnyItem]] = {
+    ItemKind.PEN: Pen,
+    ItemKind.TIP: Tip,
+    ItemKind.CONE: Cone,
+}
+
+
+class ItemForm(Translated, QWidget):
+    """Shows an item; the id of one that is known cannot be changed.
+
+    Signals
+    -------
+    value_edited()
+        Something is typed.
+    spin_toggled(bool)
+        The axis is to be found by spinning the pen, or this has ended.
+    """
+
+    value_edited = Signal()
+    spin_toggled = Signal(bool)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._item: AnyItem = Tip(id="?")
+
+        # Widgets
+        self._id = QLineEdit()
+        self._id.setMaxLength(LONGEST_ID)
+        self._due = DateField()
+        self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
+        self._change = NumberField("mm", (0.0, LARGEST_CHANGE), 4)
+        self._change.setSingleStep(0.01)
+        self._days = NumberField("", (0, MOST_DAYS), 0)
+        self._swings = NumberField("", (0, MOST_SWINGS), 0)
+        self._nominal = PointField()
+        self._has_axis = QCheckBox()
+        self._axis = tuple(NumberField("", (-1.0, 1.0), 5) for _ in AXES)
+        self._axis_row = QWidget()
+        self._spin = PushButton()
+        self._spin.setCheckable(True)
+        self._spun: tuple[float, float, float] | None = None
+        self._spin_told = text_label(TextSize.SMALL, Tone.QUIET)
+        self._picture = PathField()
+        self._browse = PushButton()
+        self._picture.add_button(self._browse)
+        self._note = QLineEdit()
+        self._note.setMaxLength(LONGEST_NOTE)
+        own = (self._ball, self._change, self._days, self._swings)
+        fields = (self._id, self._due, *own, self._picture, self._note)
+        self._labels: dict[QWidget, QLabel] = {
+            field: field_label(field) for field in (*fields, self._nominal)
+        }
+
+        # Layout
+        axis = QHBoxLayout(self._axis_row)
+        axis.setContentsMargins(0, 0, 0, 0)
+        axis.setSpacing(GRID)
+        for name, field in zip(AXES, self._axis, strict=True):
+            axis.addWidget(QLabel(name))
+            axis.addWidget(field, 1)
+        axis.addWidget(self._spin)
+        self._tip_only = QWidget()
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(2 * GRID)
+        grid.setVerticalSpacing(GRID)
+        grid.addLayout(self._stacked(self._id), 0, 0)
+        grid.addLayout(self._stacked(self._due), 0, 1)
+        grid.addLayout(self._stacked(self._note), 0, 2, 1, 2)
+        grid.addWidget(self._tip_only, 1, 0, 1, 4)
+        inner = QGridLayout(self._tip_only)
+        inner.setContentsMargins(0, 0, 0, 0)
+        inner.setHorizontalSpacing(2 * GRID)
+        inner.setVerticalSpacing(GRID)
+        for column, field in enumerate(own):
+            inner.addLayout(self._stacked(field), 0, column)
+        inner.addLayout(self._stacked(self._nominal), 1, 0, 1, 4)
+        inner.addWidget(self._has_axis, 2, 0, 1, 4)
+        inner.addWidget(self._axis_row, 3, 0, 1, 4)
+        inner.addWidget(self._spin_told, 4, 0, 1, 4)
+        inner.addLayout(self._stacked(self._picture), 5, 0, 1, 4)
+        for layout in (grid, inner):
+            for column in range(4):
+                layout.setColumnStretch(column, 1)
+
+        # Connections
+        self._id.textChanged.connect(self.value_edited)
+        self._due.textChanged.connect(self.value_edited)
+        self._has_axis.toggled.connect(self._on_axis_toggled)
+        self._spin.toggled.connect(self._on_spin_toggled)
+        self._browse.clicked.connect(self._on_browse_clicked)
+
+        self._retranslate()
+
+    def value(self) -> AnyItem:
+        """Return the item as it is typed; its picture is that of before."""
+        for field in (self._ball, self._change, self._days, self._swings, *self._axis):
+            field.interpretText()
+        self._nominal.settle()
+        item = structs.replace(
+            self._item,
+            id=self._id.text().strip(),
+            due=self._due.value(),
+            note=self._note.text().strip(),
+        )
+        if not isinstance(item, Tip):
+            return item
+        nominal, axis = self._nominal.value(), self._typed_axis()
+        if self._spun is not None and _alike(axis, self._spun):
+            item = structs.replace(
+                item, stylus_axis=self._spun, axis_origin=AxisOrigin.SPIN
+            )
+        same = item.stylus_axis is not None and _alike(axis, item.stylus_axis)
+        return structs.replace(
+            item,
+            ball_diameter_mm=self._ball.value() or None,
+            max_change_mm=self._change.value() or None,
+            max_days=round(self._days.value()) or None,
+            max_swings=round(self._swings.value()) or None,
+            nominal_tip_mm=None if nominal is None else tuple(nominal.tolist()),
+            stylus_axis=item.stylus_axis if same else axis,
+            axis_origin=item.axis_origin if same else AxisOrigin.GIVEN,
+        )
+
+    def tell_spin(self, text: str) -> None:
+        """Say how far a spin is."""
+        self._spin_told.setText(text)
+        self._spin_told.setVisible(bool(text))
+
+    def set_spun_axis(self, axis: tuple[float, float, float]) -> None:
+        """Show the axis that a spin has found."""
+        self._spun = axis
+        for field, part in zip(self._axis, axis, strict=True):
+            field.setValue(part)
+
+    def stop_spin(self) -> None:
+        """End a spin that goes on."""
+        self._spin.setChecked(False)
+
+    def picture(self) -> str:
+        """Return the path of another picture; empty for that of before."""
+        return self._picture.value()
+
+    def set_value(self, item: AnyItem, *, is_new: bool) -> None:
+        """Show an item."""
+        self.stop_spin()
+        self._item, self._spun = item, None
+        self.tell_spin("")
+        self._id.setText(item.id)
+        self._id.setReadOnly(not is_new)
+        self._due.set_value(item.due)
+        self._note.setText(item.note)
+        self._picture.set_value("")
+        is_tip = isinstance(item, Tip)
+        self._tip_only.setVisible(is_tip)
+        if isinstance(item, Tip):
+            self._ball.setValue(item.ball_diameter_mm or 0.0)
+            self._change.setValue(item.max_change_mm or 0.0)
+            self._days.setValue(item.max_days or 0)
+            self._swings.setValue(item.max_swings or 0)
+            self._nominal.set_value(item.nominal_tip)
+            self._has_axis.setChecked(item.stylus_axis is not None)
+            self._axis_row.setVisible(item.stylus_axis is not None)
+            for field, part in zip(
+                self._axis, item.stylus_axis or (0.0, 1.0, 0.0), strict=True
+            ):
+                field.setValue(part)
+        self._retranslate()
+
+    def has_id(self) -> bool:
+        """Return whether an id is typed."""
+        return bool(self._id.text().strip())
+
+    def has_day(self) -> bool:
+        """Return whether what is typed for a day is one, or nothing."""
+        return not self._due.text().strip() or self._due.value() is not None
+
+    def _typed_axis(self) -> tuple[float, float, float] | None:
+        if not self._has_axis.isChecked():
+            return None
+        x, y, z = (field.value() for field in self._axis)
+        return x, y, z
+
+    def _on_axis_toggled(self, has_axis: bool) -> None:
+        self._axis_row.setVisible(has_axis)
+        if not has_axis:
+            self.stop_spin()
+            self.tell_spin("")
+
+    def _on_spin_toggled(self, spins: bool) -> None:
+        self._name_spin()
+        self.spin_toggled.emit(spins)
+
+    def _name_spin(self) -> None:
+        spins = self._spin.isChecked()
+        self._spin.setText(self.tr("End the spin") if spins else self.tr("By a spin"))
+
+    def _on_browse_clicked(self) -> None:
+        self._picture.pick(
+            QFileDialog.FileMode.ExistingFile,
+            self.tr("Picture of the tip"),
+            self.tr("Pictures (*.png *.jpg *.jpeg *.bmp)"),
+        )
+
+    def _stacked(self, field: QWidget) -> QVBoxLayout:
+        return stacked(self._labels[field], field)
+
+    def _retranslate(self) -> None:
+        nothing = self.tr("not known")
+        usual = self.tr("as the station")
+        texts: dict[QWidget, str] = {
+            self._id: self.tr("Id, as on its label"),
+            self._due: self.tr("To be used until"),
+            self._ball: self.tr("Ball diameter"),
+            self._change: self.tr("Change at most"),
+            self._days: self.tr("Days in force at most"),
+            self._swings: self.tr("Swings of its pen at most"),
+            self._nominal: self.tr("Nominal centre of the tip"),
+            self._picture: self.tr("Picture"),
+            self._note: self.tr("Note"),
+        }
+        for field, text in texts.items():
+            self._labels[field].setText(text)
+            field.setAccessibleName(text)
+        self._due.setToolTip(
+            self.tr("The last day, such as {0}; empty for no end.").format(
+                date(2026, 8, 14)
+            )
+        )
+        self._ball.setSpecialValueText(nothing)
+        self._change.setSpecialValueText(self.tr("no limit"))
+        self._change.setToolTip(
+            self.tr(
+                "How far a calibration may find the tip from where it was. Beyond it, "
+                "the tip is to be checked."
+            )
+        )
+        for field in (self._days, self._swings):
+            field.setSpecialValueText(usual)
+        self._has_axis.setText(
+            self.tr("Axis of the stylus, from the ball into the pen")
+        )
+        for name, field in zip(AXES, self._axis, strict=True):
+            field.setAccessibleName(self.tr("Axis of the stylus, {0}").format(name))
+        self._name_spin()
+        self._spin.setToolTip(
+            self.tr(
+                "Find the axis: the tip rests in the cone, and the pen is turned about "
+                "its stylus before the camera."
+            )
+        )
+        self._browse.setText(self.tr("Browse..."))
+        kept = self._item.picture if isinstance(self._item, Tip) else None
+        self._picture.edit().setPlaceholderText("" if kept is None else kept.place)
+
+
+def _alike(
+    axis: tuple[float, float, float] | None, kept: tuple[float, float, float]
+) -> bool:
+    """Return whether an axis is the kept one, to the digits that are shown."""
+    return axis is not None and all(
+        abs(one - two) < 1e-5 for one, two in zip(axis, kept, strict=True)
+    )

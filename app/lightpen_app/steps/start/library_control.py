@@ -1,0 +1,180 @@
+"""What the step Start does with the tip library: lists, dialog and barcodes."""
+
+from datetime import datetime
+from functools import partial
+from pathlib import Path
+
+from msgspec import structs
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from lightpen.errors import CalibrationError
+from lightpen.model.origin import Origin
+from lightpen.record.library_changes import (
+    Author,
+    add_item,
+    change_item,
+    keep_picture,
+)
+from lightpen.record.tip_library import AnyItem, ItemKind, Library, Tip
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.words import shortened
+from lightpen_app.steps.start.barcode import BarcodeListener
+from lightpen_app.steps.start.form import NamesForm
+from lightpen_app.steps.start.item_button import Choice
+from lightpen_app.steps.start.library_dialog import Asked, LibraryDialog
+from lightpen_app.steps.start.spin_recorder import SpinRecorder
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.standing_mark import standing_remark
+from lightpen_app.work.workbench import Workbench
+
+
+class LibraryControl(QObject):
+    """Keeps the lists and the dialog of the library, and answers barcodes.
+
+    Parameters
+    ----------
+    names : NamesForm
+        Whose lists it fills.
+    question : QuestionBar
+        In which it asks whether an unknown barcode is to be added.
+    page : QWidget
+        Above which the dialog opens.
+
+    Signals
+    -------
+    chosen(ItemKind, str)
+        An item was chosen, in a list, in the dialog or by its barcode.
+    told(str)
+        What a barcode came to.
+    """
+
+    chosen = Signal(object, str)
+    told = Signal(str)
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        names: NamesForm,
+        question: QuestionBar,
+        page: QWidget,
+    ) -> None:
+        super().__init__(page)
+        self._page = page
+        self._workbench = workbench
+        self._watch = workbench.library
+        self._names = names
+        self._question = question
+        self._dialog: LibraryDialog | None = None  # until it is opened first
+        self._unknown = ""
+        self._spin = SpinRecorder(workbench.live, self)
+        self.barcodes = BarcodeListener(self)
+
+        # Connections
+        self._watch.changed.connect(self.refresh)
+        self.barcodes.scanned.connect(self._on_scanned)
+        names.item_chosen.connect(self.chosen)
+        names.library_requested.connect(self.open)
+        question.agreed.connect(self._on_agreed)
+
+    def refresh(self) -> None:
+        """Show the library as it is now, for the pen that is chosen."""
+        standings, pen = self._watch.standings, self._workbench.preparation.names.pen
+        for kind in ItemKind:
+            self._names.set_choices(kind, self._choices(kind, pen))
+        is_guarded = self._workbench.supervision.is_guarded
+        if self._dialog is not None:
+            self._dialog.set_value(standings, pen, is_guarded=is_guarded)
+
+    def open(self, kind: ItemKind = ItemKind.TIP) -> LibraryDialog:
+        """Show the dialog."""
+        dialog = self._dialog or self._made_dialog()
+        self._dialog = dialog
+        self.refresh()
+        dialog.set_kind(kind)
+        dialog.open()
+        return dialog
+
+    def tip(self, name: str) -> Tip | None:
+        """Return a tip of the library."""
+        return self._watch.library.tips.get(name)
+
+    def _made_dialog(self) -> LibraryDialog:
+        dialog = LibraryDialog(self._page)
+
+        # Connections
+        self._watch.change_kept.connect(dialog.tell_kept)
+        self._watch.change_failed.connect(dialog.tell)
+        dialog.chosen.connect(self.chosen)
+        dialog.change_asked.connect(self._on_change_asked)
+        dialog.form.spin_toggled.connect(self._on_spin_toggled)
+        self._spin.told.connect(dialog.form.tell_spin)
+        return dialog
+
+    def _on_spin_toggled(self, spins: bool) -> None:
+        """Begin a spin, or take over the axis that it has found."""
+        if spins:
+            self._spin.start()
+            return
+        self._spin.stop()
+        form = None if self._dialog is None else self._dialog.form
+        try:
+            x, y, z = self._spin.fit().axis_pen.tolist()
+        except CalibrationError as error:
+            if form is not None:
+                form.tell_spin(worded(error.sentence))
+        else:
+            if form is not None:
+                form.set_spun_axis((x, y, z))
+
+    def _choices(self, kind: ItemKind, pen: str) -> tuple[Choice, ...]:
+        """Return the items that can be chosen; a simulated tip is never due."""
+        found, standings = [], self._watch.standings
+        is_simulated = self._workbench.preparation.origin is Origin.SIMULATED
+        for item in self._watch.library.items(kind).values():
+            standing = standings.of_item(kind, item.id)
+            if kind is ItemKind.TIP and not is_simulated:
+                standing = standings.of_tip(pen, item.id) or standing
+            if not item.is_retired:
+                found.append(Choice(item.id, standing_remark(standing)))
+        return tuple(found)
+
+    def _on_scanned(self, code: str) -> None:
+        """Choose the tip of a barcode; offer to add one that is not known."""
+        tip = self._watch.library.tip_of_code(code)
+        if tip is None:
+            self._unknown = code
+            words = self.tr("There is no tip {0} in the library. Add it?")
+            self._question.set_words(
+                words.format(shortened(code)), self.tr("Add it"), self.tr("Not now")
+            )
+            self._question.ask()
+            return
+        self._question.hide()
+        if tip.is_retired:
+            self.told.emit(
+                self.tr("Tip {0} is retired: {1}").format(
+                    tip.id, tip.note or self.tr("choose another one.")
+                )
+            )
+            return
+        self.chosen.emit(ItemKind.TIP, tip.id)
+        self.told.emit(self.tr("Tip {0}, by its barcode.").format(tip.id))
+
+    def _on_agreed(self) -> None:
+        self.open().add(self._unknown, ItemKind.TIP)
+
+    def _on_change_asked(self, asked: Asked) -> None:
+        names = self._workbench.preparation.names
+        by = Author(names.station, names.operator, asked.reason, asked.signature)
+        folder, now = self._workbench.folder, self._workbench.around.now
+        self._watch.change(lambda: _changed(folder, asked, by, now()))
+
+
+def _changed(folder: Path, asked: Asked, by: Author, now: datetime) -> Library:
+    """Make a change; its picture first."""
+    item: AnyItem = asked.item
+    if asked.picture and isinstance(item, Tip):
+        item = structs.replace(item, picture=keep_picture(folder, Path(asked.picture)))
+    make = partial(add_item if asked.is_new else change_item, folder)
+    return make(item, by, now)

@@ -1,0 +1,388 @@
+"""The tip library: pens, tips and cones with their state, limits and due dates."""
+
+from dataclasses import dataclass
+
+from msgspec import structs
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Signal
+from PySide6.QtGui import QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QDialog,
+    QFrame,
+    QHBoxLayout,
+    QTabBar,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.record.standing import Standing, Standings
+from lightpen.record.supervision import Signature
+from lightpen.record.tip_library import AnyItem, ItemKind, Tip
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
+from lightpen_app.look.words import PARTED
+from lightpen_app.steps.start.item_form import MADE, ItemForm
+from lightpen_app.widgets.path_field import EnterEdit
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.standing_mark import standing_remark
+from lightpen_app.widgets.supervisor_fields import SupervisorFields
+from lightpen_app.widgets.translated import Translated
+
+LEAST_ROWS = 7
+WIDTHS = (16, 22, 14, 12, 14, 20)  # of the columns but the last, in GRID
+KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE)
+LONGEST_REASON = 200  # characters
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A change that is asked for.
+
+    Attributes
+    ----------
+    picture : str
+        Path of another picture; empty for none.
+    is_new : bool
+        Whether the item is to be added.
+    signature : Signature or None
+        Of a supervisor, where one has to sign.
+    """
+
+    item: AnyItem
+    picture: str
+    is_new: bool
+    reason: str
+    signature: Signature | None
+
+
+class LibraryDialog(Translated, QDialog):
+    """Shows what there is; adds, changes and retires.
+
+    Signals
+    -------
+    change_asked(Asked)
+    chosen(ItemKind, str)
+        An item is to be calibrated with.
+    """
+
+    change_asked = Signal(object)
+    chosen = Signal(object, str)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._standings = Standings()
+        self._pen = ""
+        self._is_guarded = False
+        self._item: AnyItem | None = None  # that is being added or changed
+        self._is_new = False
+
+        # Widgets
+        self._lead = text_label(TextSize.BODY)
+        self._tabs = QTabBar()
+        for _ in KINDS:
+            self._tabs.addTab("")
+        self._model = QStandardItemModel(self)
+        self._table = RowTable(self._model)
+        self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
+        self._retired = QCheckBox()
+        self._use, self._add, self._edit, self._retire, self._close = (
+            PushButton() for _ in range(5)
+        )
+        self._panel = QFrame()
+        self._panel.setProperty("area", "panel")
+        self._what = text_label(TextSize.LEAD)
+        self._form = ItemForm()
+        self._reason = EnterEdit()
+        self._reason.setMaxLength(LONGEST_REASON)
+        self._supervisor = SupervisorFields()
+        self._trouble = SignLabel()
+        self._save, self._leave = PushButton(), PushButton()
+        self._save.setDefault(True)
+
+        # Layout
+        self._list = QWidget()
+        top = QHBoxLayout()
+        top.addWidget(self._tabs, 1)
+        top.addWidget(self._retired)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(GRID)
+        for button in (self._use, self._add, self._edit, self._retire):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        buttons.addWidget(self._close)
+        ends = QHBoxLayout()
+        ends.setSpacing(GRID)
+        ends.addWidget(self._trouble, 1)
+        ends.addStretch(0)
+        ends.addWidget(self._leave)
+        ends.addWidget(self._save)
+        panel = QVBoxLayout(self._panel)
+        panel.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
+        panel.setSpacing(GRID)
+        for widget in (self._what, self._form, self._reason, self._supervisor):
+            panel.addWidget(widget)
+        panel.addLayout(ends)
+        listed = QVBoxLayout(self._list)
+        listed.setContentsMargins(0, 0, 0, 0)
+        listed.setSpacing(GRID)
+        listed.addWidget(self._lead)
+        listed.addLayout(top)
+        listed.addWidget(self._table, 1)
+        listed.addLayout(buttons)
+        layout = QVBoxLayout(self)
+        margin = 2 * GRID
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.addWidget(self._list, 1)
+        layout.addWidget(self._panel)
+        self.setMinimumWidth(112 * GRID)
+
+        # Connections
+        self._tabs.currentChanged.connect(self._on_kind_changed)
+        self._retired.toggled.connect(self._fill)
+        self._table.selectionModel().currentRowChanged.connect(self._refresh)
+        self._table.doubleClicked.connect(self._on_double_clicked)
+        self._use.clicked.connect(self._on_use_clicked)
+        self._add.clicked.connect(lambda: self.add(""))
+        self._edit.clicked.connect(self._on_edit_clicked)
+        self._retire.clicked.connect(self._on_retire_clicked)
+        self._close.clicked.connect(self.accept)
+        self._leave.clicked.connect(self._stop_editing)
+        self._save.clicked.connect(self._on_save_clicked)
+        self._form.value_edited.connect(self._refresh)
+        self._supervisor.value_edited.connect(self._refresh)
+
+        self._stop_editing()
+        self._retranslate()
+
+    @property
+    def form(self) -> ItemForm:
+        """In which an item is typed."""
+        return self._form
+
+    @override
+    def done(self, result: int) -> None:
+        self._stop_editing()
+        super().done(result)
+
+    def kind(self) -> ItemKind:
+        """Return which items are shown."""
+        return KINDS[self._tabs.currentIndex()]
+
+    def set_kind(self, kind: ItemKind) -> None:
+        """Show the items of another kind."""
+        self._tabs.setCurrentIndex(KINDS.index(kind))
+
+    def set_value(self, standings: Standings, pen: str, *, is_guarded: bool) -> None:
+        """Show how all items stand; tips on a pen, if one is named.
+
+        Parameters
+        ----------
+        is_guarded : bool
+            Whether a supervisor has to sign each change.
+        """
+        self._standings, self._pen, self._is_guarded = standings, pen, is_guarded
+        self._fill()
+
+    def add(self, name: str, kind: ItemKind | None = None) -> None:
+        """Ask for a new item, with an id that may be known already."""
+        self.set_kind(kind or self.kind())
+        made = structs.replace(MADE[self.kind()](id="?"), id=name)
+        self._start_editing(made, self.tr("A new one"), is_new=True)
+
+    def tell_kept(self) -> None:
+        """Show that what was asked for is done."""
+        self._stop_editing()
+
+    def tell(self, trouble: str) -> None:
+        """Say why it was not."""
+        self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Return what is written in the table."""
+        model = self._model
+        return tuple(
+            tuple(model.item(row, column).text() for column in range(len(WIDTHS) + 1))
+            for row in range(model.rowCount())
+        )
+
+    def current(self) -> AnyItem | None:
+        """Return the item that is chosen in the table."""
+        at = self._table.currentIndex()
+        if not at.isValid():
+            return None
+        name = self._model.item(at.row(), 0).text()
+        return self._standings.library.item(self.kind(), name)
+
+    def _fill(self) -> None:
+        present, library = self.current(), self._standings.library
+        self._model.removeRows(0, self._model.rowCount())
+        for item in library.items(self.kind()).values():
+            if self._retired.isChecked() or not item.is_retired:
+                self._model.appendRow(self._row(item))
+                if present is not None and item.id == present.id:
+                    self._choose_row(self._model.rowCount() - 1)
+        if self.current() is None and self._model.rowCount():
+            self._choose_row(0)
+        self._refresh()
+
+    def _choose_row(self, row: int) -> None:
+        flags = QItemSelectionModel.SelectionFlag
+        self._table.selectionModel().setCurrentIndex(
+            self._model.index(row, 0), flags.ClearAndSelect | flags.Rows
+        )
+
+    def _row(self, item: AnyItem) -> list[QStandardItem]:
+        standing, due = self._standings.of_item(item.kind, item.id), item.due
+        ball, change, pens = "", "", ""
+        if isinstance(item, Tip):
+            ball = "" if item.ball_diameter_mm is None else f"{item.ball_diameter_mm:g}"
+            change = "" if item.max_change_mm is None else f"{item.max_change_mm:g}"
+            pens = PARTED.join(self._standings.pens_of(item.id))
+            if self._pen and standing is not Standing.RETIRED:
+                standing = self._standings.of_tip(self._pen, item.id)
+                due = self._standings.due(self._pen, item.id) or due
+        remark = standing_remark(standing)
+        texts = (
+            *(item.id, remark.text, "" if due is None else f"{due}"),
+            *(ball, change, pens, item.note),
+        )
+        row = [QStandardItem(text) for text in texts]
+        row[1].setForeground(colors_of(self.palette()).tone(remark.tone))
+        return row
+
+    def _start_editing(self, item: AnyItem, what: str, *, is_new: bool) -> None:
+        self._item, self._is_new = item, is_new
+        self._what.setText(what)
+        self._form.set_value(item, is_new=is_new)
+        self._form.show()
+        self._open_panel()
+
+    def _open_panel(self) -> None:
+        self._reason.clear()
+        self._supervisor.clear()
+        self._supervisor.setVisible(self._is_guarded)
+        self._trouble.set_value(Remark())
+        self._list.hide()  # both are too high for a low screen
+        self._panel.show()
+        self._refresh()
+        self.adjustSize()
+
+    def _stop_editing(self) -> None:
+        self._item = None
+        self._form.stop_spin()
+        self._panel.hide()
+        self._list.show()
+        self._refresh()
+        self.adjustSize()
+
+    def _on_kind_changed(self) -> None:
+        self._stop_editing()
+        self._fill()
+        self._retranslate()
+
+    def _on_edit_clicked(self) -> None:
+        item = self.current()
+        if item is not None:
+            self._start_editing(item, item.id, is_new=False)
+
+    def _on_retire_clicked(self) -> None:
+        """Retire an item or bring it back: a reason is asked for, nothing else."""
+        item = self.current()
+        if item is None:
+            return
+        back = item.is_retired
+        self._item = structs.replace(item, is_retired=not back)
+        self._is_new = False
+        words = self.tr("Bring {0} back") if back else self.tr("Retire {0}")
+        self._what.setText(words.format(item.id))
+        self._form.hide()
+        self._open_panel()
+
+    def _on_use_clicked(self) -> None:
+        item = self.current()
+        if item is not None and not item.is_retired:
+            self.accept()
+            self.chosen.emit(item.kind, item.id)
+
+    def _on_double_clicked(self, _: QModelIndex) -> None:
+        self._on_use_clicked()
+
+    def _on_save_clicked(self) -> None:
+        if self._item is None or not self._save.isEnabled():
+            return
+        is_typed = not self._form.isHidden()
+        self._form.stop_spin()
+        item = self._form.value() if is_typed else self._item
+        signature = self._supervisor.value() if self._is_guarded else None
+        self._trouble.set_value(Remark())
+        picture = self._form.picture() if is_typed else ""
+        reason = self._reason.text().strip()
+        asked = Asked(item, picture, self._is_new, reason, signature)
+        self.change_asked.emit(asked)
+
+    def _refresh(self) -> None:
+        item = self.current()
+        nothing = "" if item is not None else self.tr("Choose one in the table.")
+        is_retired = item is not None and item.is_retired
+        why_not = self.tr("It is retired.") if is_retired else nothing
+        self._use.set_why_not(why_not, self.tr("Calibrate with it"))
+        self._edit.set_why_not(nothing, self.tr("Change what is said of it"))
+        self._retire.set_why_not(nothing, self.tr("It stays known either way"))
+        self._retire.setText(
+            self.tr("Bring back...") if is_retired else self.tr("Retire...")
+        )
+        is_typed = not self._form.isHidden()
+        lacks = ""
+        if is_typed and not self._form.has_id():
+            lacks = self.tr("Enter an id.")
+        elif is_typed and not self._form.has_day():
+            lacks = self.tr("Enter a day such as 2026-08-14, or none.")
+        if not lacks and self._is_guarded and not self._supervisor.is_filled():
+            lacks = self.tr("A supervisor signs each change.")
+        self._save.set_why_not(lacks, self.tr("With your name and the time"))
+
+    @override
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Tip library"))
+        self._lead.setText(
+            self.tr(
+                "Pens, tips and cones with their limits. Each change is kept with name "
+                "and time, and entered in the archive."
+            )
+        )
+        names = {
+            ItemKind.TIP: self.tr("Tips"),
+            ItemKind.PEN: self.tr("Pens"),
+            ItemKind.CONE: self.tr("Cones"),
+        }
+        for index, kind in enumerate(KINDS):
+            self._tabs.setTabText(index, names[kind])
+        self._model.setHorizontalHeaderLabels(
+            [
+                *(self.tr("Id"), self.tr("State"), self.tr("Until")),
+                *(self.tr("Ball / mm"), self.tr("Change / mm")),
+                *(self.tr("Calibrated on pens"), self.tr("Note")),
+            ]
+        )
+        is_tips = self.kind() is ItemKind.TIP
+        for column, width in enumerate(WIDTHS):
+            self._table.setColumnWidth(column, width * GRID)
+            self._table.setColumnHidden(column, 3 <= column <= 5 and not is_tips)
+        self._table.setAccessibleName(names[self.kind()])
+        self._retired.setText(self.tr("Show retired ones"))
+        self._use.setText(self.tr("Choose"))
+        self._add.setText(self.tr("Add..."))
+        self._edit.setText(self.tr("Change..."))
+        self._close.setText(self.tr("Close"))
+        self._save.setText(self.tr("Keep"))
+        self._leave.setText(self.tr("Leave it"))
+        reason = self.tr("Why, for the archive")
+        self._reason.setPlaceholderText(reason)
+        self._reason.setAccessibleName(reason)
+        self._fill()

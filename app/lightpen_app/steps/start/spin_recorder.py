@@ -1,0 +1,84 @@
+"""Finding the axis of a stylus live: the pen is spun in the cone before the camera."""
+
+import numpy as np
+from PySide6.QtCore import QObject, Signal
+
+from lightpen.arrays import FloatArray
+from lightpen.errors import CalibrationError
+from lightpen.estimation.spin import SpinFit, fit_spin
+from lightpen.model.posture import angles_between
+from lightpen_app.look.sentences import worded
+from lightpen_app.work.live_view import LiveView, Shown
+
+STEP = np.radians(1.0)  # from one posture that is kept to the next
+MOST = 500  # postures
+
+
+class SpinRecorder(QObject):
+    """Keeps the postures of the pen while it is spun.
+
+    Signals
+    -------
+    told(str)
+        How far the spin is, or why it does not tell the axis yet.
+    """
+
+    told = Signal(str)
+
+    def __init__(self, live: LiveView, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._live = live
+        self._rotations: list[FloatArray] = []
+        self._is_on = False
+
+    def start(self) -> None:
+        """Begin anew."""
+        self.stop()
+        self._rotations.clear()
+        self._is_on = True
+        self._live.image_shown.connect(self._on_image_shown)
+        self.told.emit(
+            self.tr("Press the tip into the cone, and turn the pen about its stylus.")
+        )
+
+    def stop(self) -> None:
+        """Look at no more images."""
+        if self._is_on:
+            self._is_on = False
+            self._live.image_shown.disconnect(self._on_image_shown)
+
+    def fit(self) -> SpinFit:
+        """Return the axis by what was seen.
+
+        Raises
+        ------
+        CalibrationError
+            The spin does not tell it.
+        """
+        return fit_spin(np.array(self._rotations).reshape(-1, 3, 3))
+
+    def _on_image_shown(self, shown: Shown) -> None:
+        sighting = shown.seen.sighting
+        is_seen = sighting is not None and sighting.has_pose and not sighting.is_blurred
+        if sighting is not None and is_seen and shown.seen.camera == 0:
+            self.keep(sighting.rotation)
+
+    def keep(self, rotation: FloatArray) -> None:
+        """Keep a posture, (3, 3) of cam_from_pen, unless the pen has hardly moved."""
+        kept = self._rotations
+        if kept and angles_between(kept[-1][None], rotation[None])[0, 0] < STEP:
+            return
+        if len(kept) < MOST:
+            kept.append(rotation)
+        try:
+            found = self.fit()
+        except CalibrationError as error:
+            self.told.emit(worded(error.sentence))
+        else:
+            told = self.tr("Turned by {0} degrees; U (k = 2) of the axis {1} degrees.")
+            self.told.emit(
+                told.format(
+                    f"{np.degrees(found.turn):.0f}",
+                    f"{np.degrees(found.expanded_uncertainty):.2f}",
+                )
+            )

@@ -1,0 +1,461 @@
+"""The tip library at the step Start: lists, its dialog, marks, and barcodes."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
+from pytestqt.qtbot import QtBot
+
+from lightpen.local_time import local_now
+from lightpen.model.rigid import rotation_from_vector
+from lightpen.record.library_changes import Author, add_item, retire_item
+from lightpen.record.supervision import Signature, set_password
+from lightpen.record.tip_library import (
+    AxisOrigin,
+    Cone,
+    ItemKind,
+    Library,
+    Pen,
+    Tip,
+    library_changes,
+    library_files,
+    read_library,
+)
+from lightpen.swing.preparation import SourceChoice, SourceKind
+from lightpen_app.look.sounds import Silence
+from lightpen_app.shell.sidebar import Sidebar
+from lightpen_app.steps.start.barcode import PACE_MS
+from lightpen_app.steps.start.form import NamesForm
+from lightpen_app.steps.start.library_dialog import LibraryDialog
+from lightpen_app.steps.start.page import StartPage
+from lightpen_app.steps.start.spin_recorder import SpinRecorder
+from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.work.workbench import Workbench
+
+LEFT = Qt.MouseButton.LeftButton
+ANN = Author("Hall 2", "Ann")
+TIP = Tip(id="T-7", ball_diameter_mm=6.0, nominal_tip_mm=(0.0, -80.0, -20.0))
+
+
+class Desk:
+    """A Start page with the library of its data folder."""
+
+    def __init__(self, qtbot: QtBot, workbench: Workbench) -> None:
+        self.qtbot, self.workbench = qtbot, workbench
+        self.page = StartPage(workbench, Silence())
+        self.told: list[str] = []
+        self.page.status_changed.connect(self.told.append)
+        qtbot.addWidget(self.page)
+        self.page.resize(1000, 640)
+        self.page.show()
+        self.page.entered()
+        self.settle()
+
+    @property
+    def data(self) -> Path:
+        return self.workbench.folder
+
+    @property
+    def library(self) -> Library:
+        return read_library(self.data)
+
+    @property
+    def dialog(self) -> LibraryDialog:
+        found = self.page.findChild(LibraryDialog)
+        assert isinstance(found, LibraryDialog)
+        return found
+
+    @property
+    def names(self) -> NamesForm:
+        found = self.page.findChild(NamesForm)
+        assert isinstance(found, NamesForm)
+        return found
+
+    def settle(self) -> None:
+        """Let jobs end, and those that they began."""
+        for _ in range(3):
+            QThreadPool.globalInstance().waitForDone()
+            QCoreApplication.processEvents()
+
+    def add(self, *items: Pen | Tip | Cone) -> None:
+        for item in items:
+            add_item(self.data, item, ANN, local_now())
+        self.workbench.library.refresh()
+        self.settle()
+
+    def control(self, name: str) -> QWidget:
+        """Return the visible control of that name or with that on it."""
+        dialog = self.page.findChild(LibraryDialog)
+        is_open = isinstance(dialog, LibraryDialog) and dialog.isVisible()
+        for each in (self.dialog if is_open else self.page).findChildren(QWidget):
+            written = each.text() if isinstance(each, QAbstractButton) else ""
+            if each.isVisible() and name in (written, each.accessibleName()):
+                return each
+        raise AssertionError(name)
+
+    def click(self, name: str) -> None:
+        QTest.mouseClick(self.control(name), LEFT)
+
+    def enter(self, name: str, text: str) -> None:
+        field = self.control(name)
+        field.setFocus()
+        QTest.keySequence(field, "Ctrl+A")
+        QTest.keyClicks(field, text)
+
+    def scan(self, code: str, pace_ms: int = 5, at: int = 100_000) -> None:
+        """Let a scanner, or somebody, type a barcode and Enter into the window."""
+        keys = [(ord(each.upper()), each) for each in code] + [
+            (Qt.Key.Key_Return, "\r")
+        ]
+        for n, (key, text) in enumerate(keys):
+            for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+                event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, text)
+                event.setTimestamp(at + n * pace_ms)
+                QCoreApplication.sendEvent(self.page.window().windowHandle(), event)
+
+    def text_of(self, name: str) -> str:
+        field = self.control(name)
+        assert isinstance(field, QLineEdit)
+        return field.text()
+
+
+@pytest.fixture
+def desk(qtbot: QtBot, workbench: Workbench) -> Iterator[Desk]:
+    desk = Desk(qtbot, workbench)
+    yield desk
+    desk.page.shut_down()
+    QThreadPool.globalInstance().waitForDone()
+
+
+@pytest.fixture
+def of_real_pen(workbench: Workbench, tmp_path: Path) -> None:
+    """Let images be of a real pen, whose tips are in force or due."""
+    source = SourceChoice(SourceKind.RECORDED, str(tmp_path))
+    workbench.set_preparation(workbench.preparation.with_source(source))
+
+
+def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -> None:
+    desk.add(TIP, Tip(id="T-8"))
+
+    assert desk.control("List of tips") is desk.names.list_of(ItemKind.TIP)
+    desk.names.list_of(ItemKind.TIP).menu().actions()[0].trigger()
+
+    now = desk.workbench.preparation
+    assert (now.names.tip, now.names.ball_diameter) == ("T-7", 6.0)
+    assert now.nominal_tip is not None
+    assert now.nominal_tip.tolist() == [0, -80, -20]
+    assert desk.text_of("Probe tip") == "T-7"
+
+
+def test_pens_and_cones_are_chosen_from_their_lists(desk: Desk) -> None:
+    desk.add(Pen(id="LP-9"), Cone(id="C-9"))
+
+    for kind in (ItemKind.PEN, ItemKind.CONE):
+        button = desk.names.list_of(kind)
+        assert [choice.name for choice in button.choices()] == [
+            {ItemKind.PEN: "LP-9", ItemKind.CONE: "C-9"}[kind]
+        ]
+        button.chosen.emit(button.choices()[0].name)
+    names = desk.workbench.preparation.names
+    assert (names.pen, names.cone) == ("LP-9", "C-9")
+
+
+def test_a_tip_that_is_typed_brings_its_ball_from_the_library(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.enter("Probe tip", "T-7")
+    QTest.keyClick(desk.control("Probe tip"), Qt.Key.Key_Tab)
+
+    assert desk.workbench.preparation.names.ball_diameter == 6.0
+
+
+@pytest.mark.usefixtures("of_real_pen")
+def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
+    desk: Desk,
+) -> None:
+    desk.add(TIP, Cone(id="C-1", due=date(2020, 1, 1)))
+    desk.names.list_of(ItemKind.TIP).chosen.emit("T-7")
+    cone = desk.workbench.preparation.names.cone
+    desk.settle()
+
+    (choice,) = desk.names.list_of(ItemKind.TIP).choices()
+    assert choice.remark.text == "NOT CALIBRATED"
+    assert desk.workbench.subject.standings.library.tips
+    sidebar = Sidebar()
+    desk.qtbot.addWidget(sidebar)
+    told: list[tuple[str, bool]] = []
+    sidebar.subject_told.connect(lambda text, marked: told.append((text, marked)))
+    subject = desk.workbench.subject
+    sidebar.set_subject(replace(subject, names=replace(subject.names, cone="C-1")))
+    assert cone
+    assert sidebar.standing().text == (
+        "Tip NOT CALIBRATED  \N{MIDDLE DOT}  Cone OVERDUE"
+    )
+    assert told[-1][0].endswith(sidebar.standing().text)
+    assert told[-1][1]
+
+
+def test_a_simulated_tip_is_not_marked(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.list_of(ItemKind.TIP).chosen.emit("T-7")
+
+    sidebar = Sidebar()
+    desk.qtbot.addWidget(sidebar)
+    sidebar.set_subject(desk.workbench.subject)
+    assert sidebar.standing().text == ""
+
+
+def test_a_retired_tip_is_no_choice_and_typed_it_leads_no_further(desk: Desk) -> None:
+    desk.add(TIP)
+    retire_item(desk.data, ItemKind.TIP, "T-7", ANN, local_now())
+    desk.workbench.library.refresh()
+    desk.settle()
+
+    assert desk.names.list_of(ItemKind.TIP).choices() == ()
+    desk.enter("Probe tip", "T-7")
+    assert not desk.page.is_complete()
+    assert desk.page.main_action().why_not == (
+        "Tip T-7 is retired. Choose another one, or bring it back in the library."
+    )
+
+
+def test_a_damaged_library_is_told_and_told_off_once_it_is_mended(desk: Desk) -> None:
+    told, relieved = list[str](), list[str]()
+    desk.workbench.troubled.connect(told.append)
+    desk.workbench.relieved.connect(relieved.append)
+    desk.add(TIP)
+    (file,) = library_files(desk.data)
+    sound = file.read_bytes()
+    file.write_bytes(sound.replace(b"T-7", b"T-6"))
+    desk.workbench.library.refresh()
+    desk.settle()
+    assert "was changed or damaged since" in told[-1]
+
+    file.write_bytes(sound)
+    desk.workbench.library.refresh()
+    desk.settle()
+    assert relieved == told[-1:]
+
+
+# The dialog
+
+
+def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
+    desk: Desk,
+) -> None:
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "T-11")
+    desk.enter("To be used until", "2031-02-03")
+    desk.enter("Why, for the archive", "new")
+    desk.click("Keep")
+    desk.settle()
+    assert desk.library.tips["T-11"].due == date(2031, 2, 3)
+    assert desk.dialog.rows()[0][0] == "T-11"
+
+    desk.click("Change...")
+    assert isinstance(field := desk.control("Id, as on its label"), QLineEdit)
+    assert field.isReadOnly()
+    desk.enter("Ball diameter", "8")
+    desk.click("Keep")
+    desk.settle()
+    tip = desk.library.tips["T-11"]
+    assert (tip.ball_diameter_mm, tip.axis_origin) == (8.0, None)
+    changes = [change for _, change in library_changes(desk.data)]
+    assert [change.operator for change in changes] == ["Ann", "Ann"]
+    assert changes[0].reason == "new"
+    desk.click("Close")
+
+
+def test_what_makes_no_sense_is_told_in_the_dialog_and_nothing_is_kept(
+    desk: Desk,
+) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "t-7")
+    desk.enter("To be used until", "soon")
+    assert not desk.control("Keep").isEnabled()
+    desk.enter("To be used until", "2031-02-03")
+    desk.click("Keep")
+    desk.settle()
+
+    assert len(library_files(desk.data)) == 1
+    assert desk.control(
+        "The tip T-7 is in the library already. Change that one, or "
+        "give this one another id."
+    )
+    desk.click("Leave it")
+    desk.click("Close")
+
+
+def test_a_tip_is_retired_and_brought_back_with_a_reason(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Retire...")
+    desk.enter("Why, for the archive", "chipped")
+    desk.click("Keep")
+    desk.settle()
+    assert desk.library.tips["T-7"].is_retired
+    assert desk.dialog.rows() == ()
+
+    box = desk.control("Show retired ones")
+    assert isinstance(box, QAbstractButton)
+    box.click()
+    assert desk.dialog.rows()[0][:2] == ("T-7", "RETIRED")
+    desk.click("Bring back...")
+    desk.click("Keep")
+    desk.settle()
+    assert not desk.library.tips["T-7"].is_retired
+    desk.click("Close")
+
+
+def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
+    eve = Signature("Eve", "correct horse")
+    set_password(desk.data, eve, eve.password, local_now())
+    desk.workbench.set_supervision(desk.workbench.run.archive.supervision())
+
+    desk.names.library_requested.emit(ItemKind.CONE)
+    desk.click("Add...")
+    desk.enter("Id, as on its label", "C-5")
+    assert not desk.control("Keep").isEnabled()
+    desk.enter("Supervisor", "Eve")
+    desk.enter("Supervisor's password", eve.password)
+    desk.click("Keep")
+    desk.settle()
+    ((_, change),) = library_changes(desk.data)
+    assert (change.item.id, change.supervisor) == ("C-5", "Eve")
+    desk.click("Close")
+
+
+def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None:
+    axis = (0.123456789, 0.98, 0.15)
+    desk.add(Tip(id="T-7", stylus_axis=axis, axis_origin=AxisOrigin.SPIN))
+    before = desk.library.tips["T-7"]
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Change...")
+    desk.enter("Note", "polished")
+    desk.click("Keep")
+    desk.settle()
+    after = desk.library.tips["T-7"]
+    assert after.stylus_axis == before.stylus_axis
+    assert after.axis_origin is AxisOrigin.SPIN
+
+    desk.click("Change...")
+    desk.enter("Axis of the stylus, x", "0.5")
+    desk.click("Keep")
+    desk.settle()
+    assert desk.library.tips["T-7"].axis_origin is AxisOrigin.GIVEN
+    desk.click("Close")
+
+
+def test_the_axis_of_a_stylus_is_found_by_a_spin(desk: Desk) -> None:
+    desk.add(TIP)
+    desk.names.library_requested.emit(ItemKind.TIP)
+    desk.click("Change...")
+    box = desk.control("Axis of the stylus, from the ball into the pen")
+    assert isinstance(box, QAbstractButton)
+    box.click()
+    desk.click("By a spin")
+    recorder = desk.page.findChild(SpinRecorder)
+    assert isinstance(recorder, SpinRecorder)
+    axis = np.array([0.0, 0.8, 0.6])
+    said: list[str] = []
+    recorder.told.connect(said.append)
+    for rotation in rotation_from_vector(
+        np.radians(np.arange(0, 90, 3))[:, None] * axis
+    ):
+        recorder.keep(rotation)
+    assert said[0].startswith("The pen is seen in 1 images of the spin")
+    assert said[-1].startswith("Turned by 87 degrees")
+
+    desk.click("End the spin")
+    desk.click("Keep")
+    desk.settle()
+    tip = desk.library.tips["T-7"]
+    assert tip.stylus_axis == pytest.approx(tuple(axis), abs=1e-9)
+    assert tip.axis_origin is AxisOrigin.SPIN
+    desk.click("Close")
+
+
+# Barcodes
+
+
+@pytest.mark.parametrize("focus", ["Operator", "Ball diameter", "All limits..."])
+def test_a_barcode_chooses_its_tip_wherever_the_focus_is(
+    desk: Desk, focus: str
+) -> None:
+    desk.add(TIP)
+    field = desk.control(focus)
+    field.setFocus()
+    before = desk.workbench.preparation.names.operator
+    desk.scan("T-7")
+
+    now = desk.workbench.preparation.names
+    assert (now.tip, now.ball_diameter, now.operator) == ("T-7", 6.0, before)
+    assert desk.text_of("Operator") == before
+    assert desk.told[-1] == "Tip T-7, by its barcode."
+    assert field.hasFocus()
+
+
+def test_what_a_hand_types_stays_in_its_field(desk: Desk) -> None:
+    desk.add(TIP)
+    field = desk.control("Operator")
+    field.setFocus()
+    QTest.keySequence(field, "Ctrl+A")
+    desk.scan("T-7", pace_ms=2 * PACE_MS)
+
+    assert desk.text_of("Operator") == "T-7"
+    assert desk.workbench.preparation.names.tip != "T-7"
+
+
+def test_two_keys_hit_at_once_are_no_barcode(desk: Desk) -> None:
+    field = desk.control("Operator")
+    field.setFocus()
+    QTest.keySequence(field, "Ctrl+A")
+    desk.scan("Jo")
+
+    assert desk.text_of("Operator") == "Jo"
+
+
+def test_a_key_alone_comes_after_a_moment(desk: Desk) -> None:
+    field = desk.control("Operator")
+    field.setFocus()
+    QTest.keySequence(field, "Ctrl+A")
+    event = QKeyEvent(
+        *(QEvent.Type.KeyPress, ord("X"), Qt.KeyboardModifier.NoModifier, "X")
+    )
+    event.setTimestamp(5000)
+    QCoreApplication.sendEvent(desk.page.window().windowHandle(), event)
+
+    desk.qtbot.waitUntil(lambda: desk.text_of("Operator") == "X")
+
+
+def test_an_unknown_barcode_is_offered_to_be_added(desk: Desk) -> None:
+    desk.scan("T-77")
+    questions = desk.page.findChildren(QuestionBar)
+    assert any(each.isVisible() for each in questions)
+    desk.click("Add it")
+
+    assert desk.text_of("Id, as on its label") == "T-77"
+    desk.click("Keep")
+    desk.settle()
+    assert "T-77" in desk.library.tips
+    desk.click("Close")
+
+
+def test_the_barcode_of_a_retired_tip_chooses_nothing(desk: Desk) -> None:
+    desk.add(TIP)
+    retire_item(desk.data, ItemKind.TIP, "T-7", ANN, local_now())
+    desk.workbench.library.refresh()
+    desk.settle()
+    desk.scan("T-7")
+
+    assert desk.workbench.preparation.names.tip != "T-7"
+    assert desk.told[-1].startswith("Tip T-7 is retired")
