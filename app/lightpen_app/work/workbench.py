@@ -30,6 +30,7 @@ from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
 from lightpen.record.presence import Presence
 from lightpen.record.recordings import FilesBeside
+from lightpen.record.results import Result
 from lightpen.record.supervision import Supervision, read_supervision
 from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
@@ -45,6 +46,7 @@ from lightpen_app.work.job import Job, Report
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.station_choices import choices_of, with_choices
+from lightpen_app.work.streaming import Streaming
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
@@ -135,13 +137,15 @@ class Workbench(QObject):
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
+        self._results_told: tuple[Result | None, Result | None] = (None, None)
         self._choices = VerificationChoices()
         self._supervision = Supervision()
         self.run = SwingRun(folder, self._around.now, self)
         self.verification = VerificationRun(
             self.run.archive, folder, self._around.now, self
         )
-        self.live = LiveView(self.run, self.verification, self)
+        self.streaming = Streaming(self.run.archive, self._around.clock, self)
+        self.live = LiveView(self.run, self.verification, self.streaming.stream, self)
 
         # Connections
         self.live.image_shown.connect(self._on_image_shown)
@@ -155,6 +159,7 @@ class Workbench(QObject):
         self.verification.relieved.connect(self.relieved)
         self._counting.timeout.connect(self._count_others)
         self.run.changed.connect(self._tell_subject)
+        self.run.changed.connect(self._on_swing_changed)
         self.changed.connect(self._tell_subject)
         settings.troubled.connect(self._on_settings_troubled)
         settings.relieved.connect(self._on_settings_relieved)
@@ -392,6 +397,7 @@ class Workbench(QObject):
             runner.await_end(max(0.0, deadline - monotonic()))
             for runner in (self.run.runner, self.verification.runner)
         )
+        self.streaming.shut_down()
         self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
@@ -494,6 +500,7 @@ class Workbench(QObject):
     def _tell_runners(self) -> None:
         self.run.runner.choose(self._preparation)
         self.verification.runner.choose(self._preparation, self._choices)
+        self.streaming.choose(self._preparation)
 
     def _read_supervision(self) -> None:
         folder = self._folder
@@ -530,6 +537,14 @@ class Workbench(QObject):
         if subject != self._subject_told:
             self._subject_told = subject
             self.subject_changed.emit(subject)
+
+    def _on_swing_changed(self) -> None:
+        """Stream another tip where another one came into force."""
+        status = self.run.status
+        results = status.result, status.taken_back
+        if results != self._results_told:
+            self._results_told = results
+            self.streaming.read_tip()
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
         self.cameras_found.emit(found)

@@ -202,6 +202,7 @@ class HistoryContent(Translated, QWidget):
 
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
+        self._workbench.streaming.read_tip()
         told = self.tr("Tip {0} of pen {1} is in force as it was calibrated then.")
         names = result.names
         words = (shortened(names.tip), shortened(names.pen))
