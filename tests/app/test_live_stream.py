@@ -13,6 +13,7 @@ from tests.accepted_tip import accept_tip
 from lightpen.streaming.server import LOOPBACK, StreamPlace
 from lightpen_app.shell.stream_dialog import StreamDialog
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -109,8 +110,8 @@ def test_an_address_beyond_this_computer_is_warned_of(qtbot: QtBot) -> None:
     qtbot.addWidget(dialog)
 
     def warns() -> bool:
-        texts = (w.accessibleName() for w in dialog.children() if hasattr(w, "value"))
-        return any("Every computer in that network" in text for text in texts)
+        remarks = (each.value().text for each in dialog.findChildren(SignLabel))
+        return any("Every computer in that network" in text for text in remarks)
 
     dialog.set_value(is_on=False, place=StreamPlace())
     assert not warns()

@@ -24,6 +24,7 @@ from lightpen.live.sources import (
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
@@ -137,6 +138,7 @@ class Workbench(QObject):
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
+        self._verified_told: tuple[Path, ...] = ()
         self._results_told: tuple[Result | None, Result | None] = (None, None)
         self._choices = VerificationChoices()
         self._supervision = Supervision()
@@ -155,6 +157,7 @@ class Workbench(QObject):
         self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
         self.run.relieved.connect(self.relieved)
+        self.verification.changed.connect(self._on_verification_changed)
         self.verification.troubled.connect(self.troubled)
         self.verification.relieved.connect(self.relieved)
         self._counting.timeout.connect(self._count_others)
@@ -302,6 +305,26 @@ class Workbench(QObject):
         self._remember_station()
         self._remember()
         self._follow(before)
+
+    def enter_owed(self) -> None:
+        """Enter in the archive what files tell of that it does not yet."""
+        logbook = self.run.logbook
+        Job(lambda _: logbook.enter_owed(), self).start()
+
+    def keep_camera_trial(self, trial: CameraTrial) -> None:
+        """Keep what became of the calibration of a camera, and enter it."""
+        logbook, folder, now = self.run.logbook, self._folder, self._around.now
+        names = self._preparation.names
+
+        def keep(_: Report) -> None:
+            keep_camera_trial(folder, trial, names, now())
+            logbook.enter_owed()
+
+        job = Job(keep, self)
+
+        # Connections
+        job.failed.connect(self.troubled)
+        job.start()
 
     def export_folder(self) -> str:
         """Return the folder that results were saved in last; empty at first."""
@@ -537,6 +560,13 @@ class Workbench(QObject):
         if subject != self._subject_told:
             self._subject_told = subject
             self.subject_changed.emit(subject)
+
+    def _on_verification_changed(self) -> None:
+        """Enter a verification as soon as it is kept."""
+        files = self.verification.status.files
+        if files != self._verified_told:
+            self._verified_told = files
+            self.enter_owed()
 
     def _on_swing_changed(self) -> None:
         """Stream another tip where another one came into force."""

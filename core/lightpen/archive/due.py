@@ -56,6 +56,7 @@ def due_tips(database: Database, chain: str, rule: DueRule) -> tuple[DueTip, ...
     found = (
         last_accepted(database, pen, tip, chain=chain)
         for pen, tip in known_names(database).tips
+        if pen and tip
     )
     entries = [entry for entry in found if entry is not None]
     if not entries:

@@ -63,11 +63,11 @@ class KnownNames:
     @property
     def pens(self) -> tuple[str, ...]:
         """The pens, each once."""
-        return tuple(dict.fromkeys(pen for pen, _ in self.tips))
+        return tuple(dict.fromkeys(pen for pen, _ in self.tips if pen))
 
     def tips_of(self, pen: str) -> tuple[str, ...]:
         """Return the tips of a pen; of all if it is empty."""
-        tips = (tip for each, tip in self.tips if pen in ("", each))
+        tips = (tip for each, tip in self.tips if tip and pen in ("", each))
         return tuple(dict.fromkeys(tips))
 
 

@@ -1,8 +1,9 @@
 """The logbook of a station: all that happens in a data folder is entered in its chain.
 
-One rule joins it to the files. A result file puts a tip in force, or takes it back, and
-the journal of a swing says that it was set aside: these files are the truth, written
-whole before anything else, and each is owed one entry. What is owed is entered as soon
+One rule joins it to the files. A result file puts a tip in force, or takes it back, the
+journal of a swing says that it was set aside, and limits, verifications and calibrated
+cameras have files of their own: these files are the truth, written whole before
+anything else, and each is owed one entry. What is owed is entered as soon
 as it is written; where that failed, or the program was killed, or had no archive yet,
 with whatever is entered next, and at every start. So nothing is in force or set aside
 that the archive does not tell of from the next start on, and no entry is of nothing.
@@ -37,6 +38,11 @@ from lightpen.archive.database import Database, open_file
 from lightpen.archive.entries import Event, Kind, Written, this_program
 from lightpen.archive.restoring import restored_result, with_change
 from lightpen.archive.seal import close_sealed
+from lightpen.archive.station_accounts import (
+    account_of_station,
+    is_station_file,
+    station_files,
+)
 from lightpen.errors import FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
@@ -192,8 +198,8 @@ class Logbook:
             close_sealed(self.database)
 
     def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
-        """Yield the files of results, and then the swings, that have no entry."""
-        for file in self._results.all_files():
+        """Yield the files, and then the swings, that have no entry."""
+        for file in (*self._results.all_files(), *station_files(self._data)):
             if not self._is_in(entered, file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):
@@ -204,6 +210,8 @@ class Logbook:
         return searchable(self._results.place_of(path)) in entered
 
     def _account_of(self, path: Path) -> Account:
+        if is_station_file(path):
+            return account_of_station(self._results, path)
         if path.parent.name != RECORDS:
             return account_of_result(self._results, path)
         at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)

@@ -4,10 +4,12 @@ Nothing here knows threads: one who owns a course makes all calls in turn, and h
 takes long done elsewhere.
 """
 
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,8 +18,9 @@ from lightpen.detection.aim import Aim
 from lightpen.detection.fixed_lamps import masked_lights
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, LightpenError
+from lightpen.estimation.report import plain
 from lightpen.estimation.verdict import Grade
-from lightpen.formats.hashes import all_hashed
+from lightpen.formats.hashes import InputFile, all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.supervision import Signature, require_supervisor
@@ -28,6 +31,7 @@ from lightpen.verification.choices import TaskKind, VerificationChoices, Wanting
 from lightpen.verification.keeping import (
     TouchedImages,
     VerificationAcceptance,
+    abandoned_record,
     acceptance_record,
     keep_verification,
     task_record,
@@ -65,6 +69,7 @@ BUG = sentence(
     "The program made a mistake of its own, and the verification is paused. What was "
     "found so far is kept; go on, or start it over.",
 )
+N_RECENT = 10  # images before a hold is noticed, of which the first belong to it
 ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
 
 T = TypeVar("T")
@@ -121,6 +126,8 @@ class VerificationCourse:
         self._trouble: Sentence | None = None
         self._task: Task | None = None
         self._lamps = LampImages()
+        self._recent = deque[InputFile](maxlen=N_RECENT)
+        self._held: dict[InputFile, None] = {}  # of the task at hand, in their order
 
     @property
     def status(self) -> VerificationStatus:
@@ -170,6 +177,7 @@ class VerificationCourse:
         """Forget all touches, and read the tip in force anew; what is kept stays."""
         self._drop_task()
         self._relieve()
+        self._abandon()
         self._publish(VerificationStatus(is_here=self._status.is_here))
         self._read_tip()
 
@@ -252,6 +260,7 @@ class VerificationCourse:
     def shut_down(self) -> None:
         """Write what is not written yet."""
         self._drop_task()
+        self._abandon()
         self._write()
 
     # Images
@@ -270,7 +279,13 @@ class VerificationCourse:
         if state.touching.phase is TouchPhase.HOLDING and sighting.has_pose:
             masked = masked_lights(frame.image, aim.mask, frame.full_scale)
             self._lamps = self._lamps.with_image(sighting, masked)
-        self._become(advance(setup, state, str(frame.seq), sighting))
+        if sighting.has_pose:
+            self._recent.extend(_hashed_images(frame))
+        transition = advance(setup, state, str(frame.seq), sighting)
+        if transition.state.touching.phase is TouchPhase.HOLDING or transition.finished:
+            self._held.update(dict.fromkeys(self._recent))
+            self._recent.clear()
+        self._become(transition)
 
     def _become(self, transition: SessionTransition) -> None:
         before, state = self._status.state, transition.state
@@ -284,7 +299,8 @@ class VerificationCourse:
             assert tip is not None
             assert found is not None
             witness = self._witness(tip)
-            images = TouchedImages(tip.origin, witness=witness)
+            images = TouchedImages(tip.origin, tuple(self._held), witness=witness)
+            self._held = {}
             self._status = replace(self._status, witness=witness)
             self._keep(_Done(finished, found, tip, images))
             happened.append(_ending(self._status))
@@ -331,6 +347,7 @@ class VerificationCourse:
         self._task = None
         status = replace(self._status, reading=Reading.NOTHING)
         if status.tip is None or not tip.is_like(status.tip):
+            self._abandon()
             setup = SessionSetup(
                 tip.instrument,
                 self._choices,
@@ -407,6 +424,18 @@ class VerificationCourse:
         self._unwritten = (*self._unwritten, _Kept(record, Origin.SIMULATED in origins))
         self._write()
 
+    def _abandon(self) -> None:
+        """Keep that the verification was left before it was done, if it had begun."""
+        tip, state, began = self._status.tip, self._status.state, self._status.began
+        if tip is None or state is None or began is None or self._status.is_done:
+            return
+        if not (state.is_begun or state.touching.taken):
+            return
+        record = abandoned_record(tip, began, len(state.touching.taken), self._now())
+        is_simulated = tip.origin is Origin.SIMULATED
+        self._unwritten = (*self._unwritten, _Kept(plain(record), is_simulated))
+        self._write()
+
     def _write(self) -> None:
         """Write what waits for it, or tell why it cannot be."""
         try:
@@ -460,6 +489,13 @@ def _read_runs(
         rejected=tuple(image for run in runs for image in run.rejected),
     )
     return _Done(task, found, tip, images)
+
+
+def _hashed_images(frame: Frame) -> Iterator[InputFile]:
+    """Yield the images of a moment, by their number, with the hash of their pixels."""
+    for c, each in enumerate((frame, *frame.others), start=1):
+        name = str(frame.seq) if c == 1 else f"{frame.seq} of camera {c}"
+        yield InputFile(Path(name), sha256(each.image.tobytes()).hexdigest())
 
 
 def _verifies_like(one: Preparation, other: Preparation) -> bool:

@@ -17,6 +17,8 @@ from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.numbered_files import add_numbered
+from lightpen.record.outcome import Outcome
+from lightpen.record.verifications import VERIFICATIONS
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
 from lightpen.verification.fixed_point import FixedPoint
@@ -32,7 +34,6 @@ from lightpen.verification.tip_in_force import TipInForce
 from lightpen.verification.touch import RejectedFrame
 from lightpen.verification.witness import LampWitness, witness_entries
 
-VERIFICATIONS = "verifications"
 LIMITS = {
     TaskKind.FIXED_POINT: ("across", "along"),
     TaskKind.CIRCLE: ("radius", "form"),
@@ -49,7 +50,8 @@ class TouchedImages:
     origin : Origin or None
         What they are of; None where a record does not say.
     files : tuple of InputFile
-        None of them of a live camera.
+        Of a live camera those through which the pen was held still: each by its
+        number, with the hash of its pixels.
     rejected : tuple of RejectedFrame
         Those that belong to no touch, and why.
     witness : LampWitness or None
@@ -159,6 +161,36 @@ def acceptance_record(
         "supervisor": acceptance.supervisor,
         "reason": acceptance.reason,
         "accepts": [_entry(file) for file in files],
+    }
+
+
+def abandoned_record(
+    tip: TipInForce, session: datetime, n_touches: int, now: datetime
+) -> dict[str, Any]:
+    """Return the record of a verification that was left before it was done.
+
+    Parameters
+    ----------
+    n_touches : int
+        Of the task that was at hand; what was done before it has records of its own.
+    """
+    names = tip.names
+    return {
+        "program": {"name": "lightpen", "version": version("lightpen")},
+        "created": now.isoformat(timespec="seconds"),
+        "verification": Outcome.ABANDONED.value,
+        "session": session.isoformat(timespec="seconds"),
+        "station": names.station,
+        "operator": names.operator,
+        "pen": names.pen,
+        "tip": names.tip,
+        "origin": tip.origin,
+        "touches": n_touches,
+        "inputs": {
+            "tip": _entry(tip.tip_file),
+            "camera": _entry(tip.camera_file),
+            "pen": _entry(tip.pen_file),
+        },
     }
 
 

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
+from hashlib import sha256
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -28,13 +29,13 @@ from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
 from lightpen.record.folder_archive import SIMULATED, FolderArchive
 from lightpen.record.supervision import Signature, set_password
+from lightpen.record.verifications import VERIFICATIONS
 from lightpen.sentences import Sentence
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import PAPER_TIP
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
-from lightpen.verification.keeping import VERIFICATIONS
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
 
@@ -308,7 +309,8 @@ def test_a_tip_that_came_into_force_meanwhile_is_verified_anew(
 
     assert at_it.status.task is TaskKind.FIXED_POINT
     assert at_it.status.files == ()
-    assert len(at_it.records) == 1
+    of_before = [each["verification"] for each in at_it.records]
+    assert of_before == [TaskKind.FIXED_POINT, "abandoned"]
 
 
 def test_recorded_images_do_a_task(
@@ -408,3 +410,32 @@ def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:
         lambda: doubted.ear.troubles == ["supervisor.wrong-password"]
     )
     assert len(doubted.records) == 1
+
+
+def test_live_images_of_touches_are_named_with_their_hashes(at_it: Verifier) -> None:
+    at_it.touch(*leant(4))
+
+    (record,) = at_it.records
+    pixels = sha256(FRAME.image.tobytes()).hexdigest()
+    assert {"file": str(FRAME.seq), "sha256": pixels} in record["inputs"]["images"]
+
+
+def test_a_verification_that_is_left_before_it_is_done_is_kept_as_abandoned(
+    at_it: Verifier,
+) -> None:
+    at_it.touch(*leant(4)[:2])
+    at_it.runner.start_over()
+    at_it.ear.wait_until(lambda: len(at_it.records) == 1)
+
+    (record,) = at_it.records
+    assert record["verification"] == "abandoned"
+    assert (record["operator"], record["session"]) == ("Ann", NOON.isoformat())
+    assert record["touches"] == 2
+
+
+def test_a_verification_that_is_done_is_not_abandoned(at_it: Verifier) -> None:
+    at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
+    at_it.runner.shut_down()
+    assert at_it.runner.await_end(TIMEOUT)
+
+    assert "abandoned" not in [each["verification"] for each in at_it.records]

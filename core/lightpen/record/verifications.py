@@ -1,0 +1,95 @@
+"""What the files of verifications say of who verified what, and what it came to."""
+
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.errors import FileError
+from lightpen.formats.files import printable
+from lightpen.formats.own_json import (
+    DamagedError,
+    Moment,
+    has_checksum,
+    parse_json,
+    require_usual,
+)
+from lightpen.model.origin import Origin
+from lightpen.record.camera_calibrations import ProgramName
+from lightpen.record.outcome import Outcome
+from lightpen.record.results import Why
+from lightpen.sentences import sentence
+
+VERIFICATIONS = "verifications"
+
+
+class _Verdict(Struct, frozen=True):
+    grade: str
+    code: str = ""
+    text: str = ""
+    limits_mm: dict[str, float] = {}
+
+
+class KeptVerification(Struct, frozen=True):
+    """A verification in a data folder.
+
+    Attributes
+    ----------
+    verification : str
+        What was verified; "acceptance" where a tip is used though it did not pass, and
+        "abandoned" where nothing was found.
+    grade, reason, supervisor : str
+        Of such an acceptance.
+    """
+
+    program: ProgramName
+    created: Moment
+    verification: str
+    station: str = ""
+    operator: str = ""
+    pen: str = ""
+    tip: str = ""
+    origin: Origin | None = None
+    verdict: _Verdict | None = None
+    grade: str = ""
+    reason: str = ""
+    supervisor: str = ""
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+    @property
+    def outcome(self) -> Outcome:
+        """What became of it: one that did not pass is refused, unless accepted so."""
+        if self.verification == Outcome.ABANDONED:
+            return Outcome.ABANDONED
+        has_passed = self.verdict is None or self.verdict.grade == "pass"
+        return Outcome.ACCEPTED if has_passed else Outcome.REFUSED
+
+    @property
+    def why(self) -> Why | None:
+        """What its grade is for."""
+        verdict = self.verdict
+        return Why(verdict.code, verdict.text) if verdict and verdict.code else None
+
+
+def read_verification(content: bytes, file: Path) -> KeptVerification:
+    """Return what the file of a verification says.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        if not has_checksum(content):
+            raise DamagedError("There is no checksum.")
+        return parse_json(content, KeptVerification)
+    except DamagedError as error:
+        raise FileError(
+            sentence(
+                "verification.damaged",
+                "The verification in {file} is not as it was written: it was changed "
+                "or damaged since. Restore the file from a copy.",
+                file=printable(str(file)),
+            )
+        ) from error
