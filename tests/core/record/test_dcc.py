@@ -1,4 +1,4 @@
-"""A record as a Digital Calibration Certificate is valid and says what the JSON says."""
+"""A record as a certificate of PTB is valid, and says what its JSON says."""
 
 import json
 import os
