@@ -36,3 +36,19 @@ def test_a_record_is_not_replaced_by_its_tip(lightpen: Run, record: Path) -> Non
     assert outcome.returncode == 2
     assert "would replace the result" in outcome.stderr
     assert record.read_bytes() == before
+
+
+def test_a_certificate_names_who_calibrated(
+    lightpen: Run, record: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "tip.xml"
+    words = ("export", record, out, "--for", "dcc", "--laboratory", "Hall 2")
+    outcome = lightpen(*words, "--email", "hall2@example.com")
+    assert outcome.returncode == 2
+    assert "--city, --country are missing" in outcome.stderr
+
+    where = ("--email", "hall2@example.com", "--city", "Berlin", "--country")
+    assert "is no code of a country" in lightpen(*words, *where, "Germany").stderr
+    assert not out.exists()
+    assert lightpen(*words, *where, "DE").returncode == 0
+    assert "<dcc:city>Berlin</dcc:city>" in out.read_text("utf-8")

@@ -23,6 +23,7 @@ from lightpen.errors import UsageError
 from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
+from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
@@ -30,6 +31,7 @@ from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
+from lightpen_app.shell.stream_dialog import StreamState
 from lightpen_app.steps.page import Page
 from lightpen_app.work.garbage import GarbageCollector
 from lightpen_app.work.settings import Preferences, Settings, data_folder, settings_file
@@ -69,6 +71,7 @@ class Wizard(QObject):
         self._settings = settings
         self._preferences = settings.preferences()
         self._others_told = ""
+        self._stream_trouble = ""
         self._languages = LanguageSwitch(application)
         self._languages.set_language(self._preferences.language)
         load_fonts()
@@ -92,9 +95,12 @@ class Wizard(QObject):
         self.workbench.others_counted.connect(self._on_others_counted)
         self.workbench.subject_changed.connect(self.window.set_subject)
         self.workbench.relieved.connect(self.window.drop_notice)
+        self.workbench.streaming.changed.connect(self._on_streaming_changed)
         self.crash_hook.reported.connect(self.window.show_crash_report)
         self.window.preferences_changed.connect(self._on_preferences_changed)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
+
+        self._stream()
 
     def _on_others_counted(self, n_others: int) -> None:
         """Say that other windows use the same data folder, while they do."""
@@ -115,6 +121,25 @@ class Wizard(QObject):
             self._languages.set_language(preferences.language)
         if preferences.appearance is not before.appearance:
             self._apply_appearance()
+
+        self._stream()
+
+    def _stream(self) -> None:
+        """Let others follow the pen where that is chosen."""
+        now = self._preferences
+        place = StreamPlace(now.stream_address, now.stream_port)
+        self.workbench.streaming.want(place if now.streams else None)
+
+    def _on_streaming_changed(self) -> None:
+        streaming = self.workbench.streaming
+        if self._stream_trouble and self._stream_trouble != streaming.trouble:
+            self.window.drop_notice(self._stream_trouble)
+        if streaming.trouble and streaming.trouble != self._stream_trouble:
+            self.window.show_notice(streaming.trouble)
+        self._stream_trouble = streaming.trouble
+        self.window.set_stream(
+            StreamState(streaming.status, streaming.has_tip, streaming.trouble)
+        )
 
     def _apply_appearance(self) -> None:
         scheme = QGuiApplication.styleHints().colorScheme()

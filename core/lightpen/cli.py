@@ -58,6 +58,7 @@ COMMANDS = (
         "check_camera:add_check_camera",
     ),
     ("export", "write a tip as other programs read it", "export:add_export"),
+    ("stream", "send pose and tip live to other programs", "stream:add_stream"),
 )
 NEGATIVE_NUMBER = re.compile(r"-\.?[0-9]")
 # What to type about what the core says, by its codes.

@@ -29,6 +29,10 @@ class ArchiveError(LightpenError):
     """The archive cannot be read or written, or is not one of this program."""
 
 
+class StreamError(LightpenError):
+    """Poses cannot be streamed as it was asked for."""
+
+
 class UsageError(LightpenError):
     """The request contradicts itself or lacks something."""
 

@@ -9,10 +9,9 @@ from PySide6.QtCore import Qt
 from tests.accepted_tip import accept_tip
 
 from lightpen.record.folder_archive import SIMULATED
+from lightpen.record.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.simulator.toucher import Artefacts
 from lightpen.verification.choices import TaskKind
-from lightpen.verification.conclusion import CONCLUSION
-from lightpen.verification.keeping import VERIFICATIONS
 from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:

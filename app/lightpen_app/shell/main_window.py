@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import versions
 from lightpen_app.look.theme import (
     GRID,
@@ -36,6 +37,7 @@ from lightpen_app.shell.page_area import PageArea
 from lightpen_app.shell.placement import FRAME, fitted_place
 from lightpen_app.shell.sidebar import Sidebar
 from lightpen_app.shell.step_states import Status, Step, list_steps
+from lightpen_app.shell.stream_dialog import StreamDialog, StreamState
 from lightpen_app.steps.page import Page
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.operator_view import OperatorView
@@ -108,6 +110,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._operator_view.set_distance_m(preferences.distance_m)
         self._help_window = HelpWindow()
         self._options = OptionsMenu(preferences, self)
+        self._stream_dialog = StreamDialog(self)
         self._make_actions()
 
         # Layout
@@ -123,7 +126,9 @@ class MainWindow(Rearranged, QMainWindow):
         self._options.value_changed.connect(self._on_options_changed)
         self._options.mute_action.toggled.connect(self._on_mute_toggled)
         self._options.data_folder_chosen.connect(self._on_data_folder_asked)
+        self._options.stream_chosen.connect(self._on_stream_asked)
         self._options.about_chosen.connect(self._on_about_chosen)
+        self._stream_dialog.value_changed.connect(self._options.set_stream)
         self._operator_view.closed.connect(self._on_operator_view_closed)
         self._operator_view.advance_requested.connect(self._on_advance_wanted_afar)
         self._operator_view.pause_requested.connect(self._on_pause_pressed)
@@ -218,6 +223,11 @@ class MainWindow(Rearranged, QMainWindow):
     def set_subject(self, subject: Subject) -> None:
         """Show on every page what is calibrated, and what its images are of."""
         self._sidebar.set_subject(subject)
+
+    def set_stream(self, state: StreamState) -> None:
+        """Show on every page where the pen can be followed live, if anywhere."""
+        self._sidebar.set_stream(state.status)
+        self._stream_dialog.set_state(state)
 
     def steps(self) -> tuple[Step, ...]:
         """Return the list of steps as it is shown."""
@@ -499,6 +509,12 @@ class MainWindow(Rearranged, QMainWindow):
             "on. Those of now stay where they are."
         )
         self.show_notice(words.format(folder), Tone.ACTIVE)
+
+    def _on_stream_asked(self) -> None:
+        now = self._options.value()
+        place = StreamPlace(now.stream_address, now.stream_port)
+        self._stream_dialog.set_value(is_on=now.streams, place=place)
+        self._stream_dialog.open()
 
     def _on_about_chosen(self) -> None:
         About(versions(), self).exec()

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction, QActionGroup
 from PySide6.QtWidgets import QMenu, QWidget
 
+from lightpen.streaming.server import StreamPlace
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.widgets.operator_view import DISTANCES_M
@@ -33,12 +34,15 @@ class OptionsMenu(Translated, QMenu):
         The user chose otherwise.
     data_folder_chosen()
         The user wants to keep swings and results elsewhere.
+    stream_chosen()
+        The user wants others to follow the pen, or to see who does.
     about_chosen()
         The user wants to know what the program is.
     """
 
     value_changed = Signal(object)
     data_folder_chosen = Signal()
+    stream_chosen = Signal()
     about_chosen = Signal()
 
     def __init__(self, preferences: Preferences, parent: QWidget | None = None) -> None:
@@ -63,11 +67,13 @@ class OptionsMenu(Translated, QMenu):
         self.addAction(self.mute_action)
         self.addSeparator()
         self._data_folder = self.addAction("")
+        self._stream = self.addAction("")
         self._about = self.addAction("")
 
         # Connections
         self.mute_action.toggled.connect(lambda muted: self._choose(muted=muted))
         self._data_folder.triggered.connect(self.data_folder_chosen)
+        self._stream.triggered.connect(self.stream_chosen)
         self._about.triggered.connect(self.about_chosen)
 
         self._retranslate()
@@ -79,6 +85,12 @@ class OptionsMenu(Translated, QMenu):
     def set_data_folder(self, folder: str) -> None:
         """Keep swings and results elsewhere, from the next start on."""
         self._choose(data_folder=folder)
+
+    def set_stream(self, is_on: bool, place: StreamPlace) -> None:
+        """Let others follow the pen from now on, or not."""
+        self._choose(
+            streams=is_on, stream_address=place.address, stream_port=place.port
+        )
 
     def _choice_menu(
         self, preference: str, choices: Sequence[object], chosen: object
@@ -120,6 +132,7 @@ class OptionsMenu(Translated, QMenu):
         self._distances.setTitle(self.tr("Viewing distance"))
         self.mute_action.setText(self.tr("Mute the sounds"))
         self._data_folder.setText(self.tr("Data folder..."))
+        self._stream.setText(self.tr("Live stream..."))
         self._about.setText(self.tr("About Lightpen"))
         for action, value in self._choices:
             action.setText(self._choice_name(value))

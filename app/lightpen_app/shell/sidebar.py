@@ -7,6 +7,8 @@ from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
+from lightpen.streaming.server import StreamStatus
+from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.shell.step_list import StepList
@@ -53,6 +55,8 @@ class Sidebar(Translated, QFrame):
         self._subject = text_label(TextSize.SMALL, Tone.QUIET)
         self._origin = SignLabel()
         self._standing = SignLabel()
+        self._stream = SignLabel()
+        self._streamed = StreamStatus()
         self._steps = StepList()
         self._operator_view = PushButton()
         self._help = PushButton()
@@ -66,6 +70,7 @@ class Sidebar(Translated, QFrame):
         head.addWidget(self._subject)
         head.addWidget(self._standing)
         head.addWidget(self._origin)
+        head.addWidget(self._stream)
         self._foot = foot = QVBoxLayout()
         foot.setSpacing(0)
         for button in buttons:
@@ -114,6 +119,18 @@ class Sidebar(Translated, QFrame):
         self._value = subject
         self._show_subject()
 
+    def set_stream(self, status: StreamStatus) -> None:
+        """Say where the pen can be followed, and how many do; nothing if nowhere."""
+        self._streamed = status
+        remark = Remark()
+        if status.place is not None:
+            text = self.tr("Live stream at {0}, listening: {1}").format(
+                status.place, status.n_clients
+            )
+            tone = Tone.ACTIVE if status.place.is_local else Tone.WARN
+            remark = Remark(text, Sign.RING, tone)
+        self._stream.set_value(remark)
+
     def _show_subject(self) -> None:
         names = self._value.names
         told = (
@@ -153,6 +170,7 @@ class Sidebar(Translated, QFrame):
 
     def _retranslate(self) -> None:
         self._show_subject()
+        self.set_stream(self._streamed)
         self._name.setText(self.tr("Pen tip calibration"))
         for button, text, key in (
             (self._operator_view, self.tr("Operator view"), "F11"),

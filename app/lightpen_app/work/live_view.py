@@ -34,6 +34,7 @@ from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.follower import Follower
 from lightpen.simulator.hand import Operator
 from lightpen.simulator.toucher import Toucher
+from lightpen.streaming.server import PoseStream
 from lightpen_app.look.pooling import pooled
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.mailbox import Mailbox
@@ -72,6 +73,8 @@ class LiveView(QObject):
         Takes every image, but for those of a verification.
     verification : VerificationRun
         Takes every image while somebody is at it.
+    stream : PoseStream
+        Tells other programs what the first camera shows.
 
     Signals
     -------
@@ -105,11 +108,13 @@ class LiveView(QObject):
         self,
         run: SwingRun,
         verification: VerificationRun,
+        stream: PoseStream,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._run = run
         self._verification = verification
+        self._stream = stream
         self._live: Live | None = None
         self._chosen = 0
         self._states = [_CameraState()]
@@ -142,6 +147,7 @@ class LiveView(QObject):
         self._live = live = Live(
             *(cameras, settings, teller, self._run.runner, clock, known),
             verifier=self._verification.runner,
+            stream=self._stream,
         )
         live.set_aim(self._aim)
         live.set_watched(self._is_watched)

@@ -22,6 +22,7 @@ from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
 from lightpen.record.due_rule import DueRule
 from lightpen.sentences import Sentence
+from lightpen.streaming.server import StreamPlace
 from lightpen_app.look.languages import Language
 from lightpen_app.look.theme import Appearance
 from lightpen_app.work.settings_store import Changes, Content, load, merged, save
@@ -39,6 +40,10 @@ class Preferences:
         From the operator's eyes to the screen, m.
     data_folder : str
         For swings and results, from the next start on; empty for the usual one.
+    streams : bool
+        Whether other programs may follow the pen,
+    stream_address, stream_port : str and int
+        and where; see `lightpen.streaming.server.StreamPlace`.
     """
 
     language: Language = Language.ENGLISH
@@ -46,6 +51,9 @@ class Preferences:
     muted: bool = False
     distance_m: float = 3.0
     data_folder: str = ""
+    streams: bool = False
+    stream_address: str = StreamPlace.address
+    stream_port: int = StreamPlace.port
 
 
 @dataclass(frozen=True)

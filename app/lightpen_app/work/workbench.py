@@ -24,6 +24,7 @@ from lightpen.live.sources import (
 from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
@@ -47,6 +48,7 @@ from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.station_choices import choices_of, with_choices
+from lightpen_app.work.streaming import Streaming
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
@@ -140,13 +142,15 @@ class Workbench(QObject):
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
+        self._verified_told: tuple[Path, ...] = ()
         self._choices = VerificationChoices()
         self._supervision = Supervision()
         self.run = SwingRun(folder, self._around.now, self)
         self.verification = VerificationRun(
             self.run.archive, folder, self._around.now, self
         )
-        self.live = LiveView(self.run, self.verification, self)
+        self.streaming = Streaming(self.run.archive, self._around.clock, self)
+        self.live = LiveView(self.run, self.verification, self.streaming.stream, self)
         self.library = LibraryWatch(
             folder, self.run.logbook, settings.due_rule, self._around.now, self
         )
@@ -160,6 +164,7 @@ class Workbench(QObject):
         self.live.relieved.connect(self.relieved)
         self.run.troubled.connect(self.troubled)
         self.run.relieved.connect(self.relieved)
+        self.verification.changed.connect(self._on_verification_changed)
         self.verification.troubled.connect(self.troubled)
         self.verification.relieved.connect(self.relieved)
         self.library.troubled.connect(self.troubled)
@@ -315,6 +320,26 @@ class Workbench(QObject):
         self._remember()
         self._follow(before)
 
+    def enter_owed(self) -> None:
+        """Enter in the archive what files tell of that it does not yet."""
+        logbook = self.run.logbook
+        Job(lambda _: logbook.enter_owed(), self).start()
+
+    def keep_camera_trial(self, trial: CameraTrial) -> None:
+        """Keep what became of the calibration of a camera, and enter it."""
+        logbook, folder, now = self.run.logbook, self._folder, self._around.now
+        names = self._preparation.names
+
+        def keep(_: Report) -> None:
+            keep_camera_trial(folder, trial, names, now())
+            logbook.enter_owed()
+
+        job = Job(keep, self)
+
+        # Connections
+        job.failed.connect(self.troubled)
+        job.start()
+
     def export_folder(self) -> str:
         """Return the folder that results were saved in last; empty at first."""
         return self._settings.export_folder()
@@ -411,6 +436,7 @@ class Workbench(QObject):
             runner.await_end(max(0.0, deadline - monotonic()))
             for runner in (self.run.runner, self.verification.runner)
         )
+        self.streaming.shut_down()
         self._presence.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
@@ -513,6 +539,7 @@ class Workbench(QObject):
     def _tell_runners(self) -> None:
         self.run.runner.choose(self._preparation)
         self.verification.runner.choose(self._preparation, self._choices)
+        self.streaming.choose(self._preparation)
 
     def _read_supervision(self) -> None:
         folder = self._folder
@@ -545,17 +572,25 @@ class Workbench(QObject):
             self.others_counted.emit(n_others)
 
     def _follow_results(self) -> None:
-        """See how the tips stand once a result was accepted or taken back."""
+        """See which tip is in force once a result was accepted or taken back."""
         now = self.run.status.result, self.run.status.taken_back
         before, self._in_force_told = self._in_force_told, now
         if any(one is not two for one, two in zip(now, before, strict=True)):
             self.library.refresh()
+            self.streaming.read_tip()
 
     def _tell_subject(self) -> None:
         subject = self.subject
         if subject != self._subject_told:
             self._subject_told = subject
             self.subject_changed.emit(subject)
+
+    def _on_verification_changed(self) -> None:
+        """Enter a verification as soon as it is kept."""
+        files = self.verification.status.files
+        if files != self._verified_told:
+            self._verified_told = files
+            self.enter_owed()
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
         self.cameras_found.emit(found)

@@ -21,6 +21,7 @@ from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, requir
 from lightpen.model.origin import Origin
 from lightpen.record.assumed import Plain
 from lightpen.record.names import Names
+from lightpen.record.outcome import Outcome
 from lightpen.record.results import Since, Why
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
@@ -39,8 +40,12 @@ class Kind(StrEnum):
     TAKEN_BACK = "taken back"
     NOTE = "note"
     LIBRARY = "library"
+    VERIFICATION = "verification"
+    CAMERA = "camera calibration"
+    LIMITS = "limits"
 
 
+BESIDE_SWINGS = (Kind.VERIFICATION, Kind.CAMERA, Kind.LIMITS)
 IN_FORCE_BY = (Kind.ACCEPTED, Kind.RESTORED)  # that put a tip in force
 
 
@@ -77,13 +82,17 @@ class Event(Struct, frozen=True):
         In the words of the operator; of a note its text.
     change : Since or None
         Since the tip as found, which was in force before.
+    outcome : Outcome or None
+        What became of a verification or the calibration of a camera.
     swing : str
         Folder of the swing that it is of, as `FileHash.place`; may be empty.
     settings : mapping
-        What the swing was captured with, and what was required of it; of the library
-        the item as it is from then on.
+        What the swing was captured with, and what was required of it; of a
+        verification what was verified, of limits what they are from then on, and of
+        the library the item likewise.
     result : FileHash or None
-        The file that put a tip in force, took it back, or changed the tip library.
+        The file that put a tip in force, or took it back; of what is no swing, the
+        file that tells of it.
     files : tuple of FileHash
         The record of the swing, without its images; of the library a picture.
     record_sha256 : str or None
@@ -100,6 +109,7 @@ class Event(Struct, frozen=True):
     grade: str = ""
     why: Why | None = None
     reason: str = ""
+    outcome: Outcome | None = None
     tip_pen_mm: Vector | None = None
     expanded_uncertainty_mm: Vector | None = None
     change: Since | None = None

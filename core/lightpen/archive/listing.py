@@ -13,7 +13,8 @@ from lightpen.estimation.verdict import AXES
 from lightpen.formats.files import write_whole
 
 COLUMNS = (
-    *("since", "station", "operator", "kind", "grade", "pen", "tip", "cone"),
+    *("since", "station", "operator", "kind", "outcome", "grade"),
+    *("pen", "tip", "cone"),
     *(f"tip_{axis}_mm" for axis in AXES),
     *(f"expanded_uncertainty_{axis}_mm" for axis in AXES),
     *("reason", "chain", "number", "sha256"),
@@ -68,6 +69,7 @@ def _row(entry: Written) -> list[object]:
     names = event.names
     return [
         *(event.at.isoformat(), names.station, names.operator, event.kind.value),
+        event.outcome or "",
         *(event.grade, names.pen, names.tip, names.cone),
         *(event.tip_pen_mm or nothing),
         *(event.expanded_uncertainty_mm or nothing),

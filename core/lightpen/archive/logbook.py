@@ -1,9 +1,10 @@
 """The logbook of a station: all that happens in a data folder is entered in its chain.
 
-One rule joins it to the files. A result file puts a tip in force, or takes it back, a
-file of the tip library changes an item of it, and the journal of a swing says that it
-was set aside: these files are the truth, written whole before anything else, and each
-is owed one entry. What is owed is entered as soon
+One rule joins it to the files. A result file puts a tip in force, or takes it back, the
+journal of a swing says that it was set aside, and changes of the tip library, limits,
+verifications and calibrated cameras have files of their own: these files are the truth,
+written whole before anything else, and each is owed one entry. What is owed is entered
+as soon
 as it is written; where that failed, or the program was killed, or had no archive yet,
 with whatever is entered next, and at every start. So nothing is in force or set aside
 that the archive does not tell of from the next start on, and no entry is of nothing.
@@ -39,6 +40,11 @@ from lightpen.archive.database import Database, open_file
 from lightpen.archive.entries import Event, Kind, Written, this_program
 from lightpen.archive.restoring import restored_result, with_change
 from lightpen.archive.seal import close_sealed
+from lightpen.archive.station_accounts import (
+    account_of_station,
+    is_station_file,
+    station_files,
+)
 from lightpen.errors import FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
@@ -195,8 +201,9 @@ class Logbook:
             close_sealed(self.database)
 
     def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
-        """Yield the files of results and the library without an entry, then swings."""
-        for file in (*self._results.all_files(), *library_files(self._data)):
+        """Yield the files, and then the swings, that have no entry."""
+        own = (*library_files(self._data), *station_files(self._data))
+        for file in (*self._results.all_files(), *own):
             if not self._is_in(entered, file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):
@@ -209,6 +216,8 @@ class Logbook:
     def _account_of(self, path: Path) -> Account:
         if path.parent.name == LIBRARY:
             return account_of_change(self._results, path)
+        if is_station_file(path):
+            return account_of_station(self._results, path)
         if path.parent.name != RECORDS:
             return account_of_result(self._results, path)
         at = datetime.fromtimestamp((path / JOURNAL).stat().st_mtime, UTC)

@@ -45,6 +45,7 @@ def add_archive(parser: argparse.ArgumentParser, data_folder: DataFolder) -> Non
         action.add_argument("file", type=Path, metavar="FILE")
     for name in ("pen", "tip", "station"):
         listed.add_argument(f"--{name}", default="", help="list its entries only")
+    listed.add_argument("--kind", default="", help="such as refused or verification")
     listed.add_argument(
         "--since", type=parse_date, metavar="YYYY-MM-DD", help="from this day on"
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from lightpen.archive.chains import own_chain
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import Database, look_into, open_file, open_server
-from lightpen.archive.entries import Written
+from lightpen.archive.entries import Kind, Written
 from lightpen.archive.exchange import deliver, export_entries, import_entries
 from lightpen.archive.late_logbook import SERVER
 from lightpen.archive.listing import entries_csv
@@ -19,6 +19,7 @@ from lightpen.archive.queries import Wanted, newest
 from lightpen.archive.seal import close_sealed
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.errors import UsageError
+from lightpen.formats.files import printable
 from lightpen.local_time import local_time
 from lightpen.sentences import sentence
 
@@ -49,6 +50,7 @@ def _list(options: argparse.Namespace) -> None:
         pen=options.pen,
         tip=options.tip,
         station=options.station,
+        kinds=_kinds(options.kind),
         begin=_midnight(options.since),
         end=_midnight(options.until and options.until + timedelta(days=1)),
     )
@@ -116,6 +118,22 @@ def _opened(data: Path) -> Iterator[Database]:
         yield database
     finally:
         close_sealed(database)
+
+
+def _kinds(name: str) -> tuple[Kind, ...]:
+    if not name:
+        return ()
+    try:
+        return (Kind(name),)
+    except ValueError as error:
+        raise UsageError(
+            sentence(
+                "archive.no-such-kind",
+                "{name} is no kind of entry. There are: {kinds}.",
+                name=printable(name),
+                kinds=", ".join(Kind),
+            )
+        ) from error
 
 
 def _midnight(day: date | None) -> datetime | None:

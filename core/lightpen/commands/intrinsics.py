@@ -186,7 +186,7 @@ def _intrinsics(options: argparse.Namespace) -> None:
     print(shown(intrinsics_text(calibration, observed)))
     print(shown(f"\nThe camera file is {options.out}."))
     if options.json is not None:
-        record = intrinsics_record(calibration, observed, tolerances)
+        record = intrinsics_record(calibration, observed.unseen, tolerances)
         write_record(options.json, plain(record))
 
 

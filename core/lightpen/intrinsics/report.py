@@ -1,5 +1,6 @@
 """The calibration of one camera, or of two, as text and as a record."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -84,9 +85,15 @@ def intrinsics_text(calibration: CameraCalibration, observed: ObservedBoard) -> 
 
 
 def intrinsics_record(
-    calibration: CameraCalibration, observed: ObservedBoard, tolerances: BoardTolerances
+    calibration: CameraCalibration, unseen: Sequence[str], tolerances: BoardTolerances
 ) -> dict[str, Any]:
-    """Return the calibration of a camera as a record."""
+    """Return the calibration of a camera as a record.
+
+    Parameters
+    ----------
+    unseen : sequence of str
+        Names of images without the board.
+    """
     camera, fitted = calibration.camera, calibration.adjustment
     return {
         "kind": "intrinsics",
@@ -112,7 +119,7 @@ def intrinsics_record(
         "views": _views_record(calibration),
         "views_left_out": calibration.left_out,
         "points_left_out": calibration.n_points_left_out,
-        "images_without_board": observed.unseen,
+        "images_without_board": unseen,
         "remarks": calibration.remarks,
     }
 

@@ -37,6 +37,7 @@ from lightpen.detection.sighting import Sighting, look
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.errors import LightpenError
 from lightpen.sentences import sentence
+from lightpen.streaming.server import PoseStream
 from lightpen.swing.runner import SwingRunner
 from lightpen.swing.state import Phase, SwingSetup
 from lightpen.verification.runner import VerificationRunner
@@ -96,6 +97,8 @@ class Live:
         By serial numbers; a camera that is among them gets these instead.
     verifier : VerificationRunner, optional
         Takes every image while somebody verifies a tip.
+    stream : PoseStream, optional
+        Tells others what the first camera shows; while they listen, nothing rests.
     """
 
     def __init__(
@@ -107,6 +110,7 @@ class Live:
         clock: Clock | None = None,
         known: Mapping[str, CameraSettings] | None = None,
         verifier: VerificationRunner | None = None,
+        stream: PoseStream | None = None,
     ) -> None:
         self._workers = tuple(
             CameraWorker(
@@ -121,6 +125,7 @@ class Live:
         self._listener = listener
         self._runner = runner
         self._verifier = verifier
+        self._stream = stream
         self._aim = Aim()
         self._wanted: Aim | SwingSetup = self._aim
         self._last: dict[int, Sighting] = {}  # of what is wanted, by camera
@@ -237,6 +242,8 @@ class Live:
 
     def _rest(self) -> float | None:
         """Return how long the camera may rest after each image, s; None for good."""
+        if self._stream is not None and self._stream.is_heard:
+            return 0.0
         if self._moved_ns is None:  # the first image tells of what size they are
             return 0.0
         still_ns = self._seen_ns - self._moved_ns
@@ -258,6 +265,11 @@ class Live:
             self._moved_ns = self._seen_ns
         self._scene = image.spots
 
+    def _tell_others(self, image: LiveImage) -> None:
+        """Stream what an image shows."""
+        if self._stream is not None:
+            self._stream.take(image.frame, image.sighting)
+
     def _take_newest(self) -> None:
         """Look at the newest image of each camera, as no swing takes them all."""
         self._ready.wait(LONGEST_WAIT)
@@ -270,6 +282,7 @@ class Live:
             image = self._look(frame, self._aim, c)
             if c == 0:
                 self._notice(image)
+                self._tell_others(image)
                 self._hand_over(frame, image.sighting, None)
             self._listener.on_image(image)
 
@@ -290,6 +303,7 @@ class Live:
         frames = (frame, *frame.others)[: len(wanted.aims)]
         images = [self._look(each, wanted, c) for c, each in enumerate(frames)]
         self._notice(images[0])
+        self._tell_others(images[0])
         sightings = [i.sighting for i in images if i.sighting is not None]
         sighting = None
         if len(sightings) == len(images):

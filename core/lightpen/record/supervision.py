@@ -11,7 +11,7 @@ References
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -72,18 +72,35 @@ class _SwingLimits(Struct):
     max_images: int
 
 
-class _Limits(Struct):
+class KeptLimits(Struct):
+    """Limits as they are kept."""
+
     swing: _SwingLimits
     verification_mm: VerificationLimits
 
+    def entries(self) -> dict[str, float]:
+        """Return each limit by its name."""
+        verification = asdict(self.verification_mm)
+        of_verification = {f"max_{name}_mm": v for name, v in verification.items()}
+        swing: dict[str, float] = to_builtins(self.swing)
+        return swing | of_verification
 
-class _Change(Struct):
+
+class LimitsChange(Struct):
+    """What was laid down at one time: a password, or the limits of a station.
+
+    Attributes
+    ----------
+    password : str
+        As Argon2 makes it; empty where it stays.
+    """
+
     format: int
     at: Moment
     supervisor: str
     station: str = ""
     password: str = ""
-    limits: _Limits | None = None
+    limits: KeptLimits | None = None
 
     def __post_init__(self) -> None:
         require_usual(self.at)
@@ -102,11 +119,34 @@ def read_supervision(data: Path) -> Supervision:
     """
     password, limits = "", dict[str, StationLimits]()
     for file in reversed(numbered_files(data / LIMITS)):
-        change = _read(file)
+        change = read_limits_change(read_bytes(file, WHAT, MEGABYTE), file)
         password = change.password or password
         if change.limits is not None:
             limits[change.station] = _limits_of(change.limits)
     return Supervision(password, limits)
+
+
+def read_limits_change(content: bytes, file: Path) -> LimitsChange:
+    """Return what a file of limits says.
+
+    Raises
+    ------
+    FileError
+        It was changed since.
+    """
+    try:
+        if not has_checksum(content):
+            raise DamagedError("There is no checksum.")
+        return parse_json(content, LimitsChange)
+    except DamagedError as error:
+        raise FileError(
+            sentence(
+                "limits.damaged",
+                "The limits in {file} are not as they were laid down: they were "
+                "changed or damaged since. Restore the file from a copy.",
+                file=printable(str(file)),
+            )
+        ) from error
 
 
 def set_password(data: Path, signature: Signature, new: str, now: datetime) -> None:
@@ -137,7 +177,8 @@ def set_password(data: Path, signature: Signature, new: str, now: datetime) -> N
             )
         )
     _add(
-        data, _Change(FORMAT, now, signature.name, password=PasswordHasher().hash(new))
+        data,
+        LimitsChange(FORMAT, now, signature.name, password=PasswordHasher().hash(new)),
     )
 
 
@@ -155,11 +196,11 @@ def set_limits(
     """
     require_supervisor(read_supervision(data), signature)
     swing = limits.swing
-    entry = _Limits(
+    entry = KeptLimits(
         _SwingLimits(swing.max_uncertainty, swing.min_images, swing.max_images),
         limits.verification,
     )
-    _add(data, _Change(FORMAT, now, signature.name, station=station, limits=entry))
+    _add(data, LimitsChange(FORMAT, now, signature.name, station=station, limits=entry))
 
 
 def lay_down(
@@ -230,7 +271,7 @@ def _require_name(signature: Signature) -> None:
         )
 
 
-def _add(data: Path, change: _Change) -> None:
+def _add(data: Path, change: LimitsChange) -> None:
     entries = {
         name: entry
         for name, entry in to_builtins(change).items()
@@ -239,24 +280,7 @@ def _add(data: Path, change: _Change) -> None:
     add_numbered(data / LIMITS, record_bytes(entries))
 
 
-def _read(file: Path) -> _Change:
-    text = read_bytes(file, WHAT, MEGABYTE)
-    try:
-        if not has_checksum(text):
-            raise DamagedError("There is no checksum.")
-        return parse_json(text, _Change)
-    except DamagedError as error:
-        raise FileError(
-            sentence(
-                "limits.damaged",
-                "The limits in {file} are not as they were laid down: they were "
-                "changed or damaged since. Restore the file from a copy.",
-                file=printable(str(file)),
-            )
-        ) from error
-
-
-def _limits_of(entry: _Limits) -> StationLimits:
+def _limits_of(entry: KeptLimits) -> StationLimits:
     swing = entry.swing
     return StationLimits(
         SwingLimits(swing.max_uncertainty_mm, swing.min_images, swing.max_images),

@@ -9,25 +9,16 @@ records of its session by their hashes, so that it stands for the whole.
 
 from dataclasses import dataclass
 from datetime import datetime
-from enum import StrEnum
 from importlib.metadata import version
 from typing import Any
 
 from lightpen.estimation.report import plain
 from lightpen.formats.hashes import InputFile
+from lightpen.record.outcome import Outcome
+from lightpen.record.verifications import CONCLUSION
 from lightpen.verification.assessment import Conformity
 from lightpen.verification.keeping import file_entry
 from lightpen.verification.tip_in_force import TipInForce
-
-CONCLUSION = "conclusion"
-
-
-class Outcome(StrEnum):
-    """What became of a verification."""
-
-    ACCEPTED = "accepted"
-    REFUSED = "refused"
-    ABANDONED = "abandoned"
 
 
 @dataclass(frozen=True)
@@ -76,8 +67,9 @@ def conclusion_record(
         "pen": names.pen,
         "tip": names.tip,
         "origin": tip.origin,
-        "grade": None if found is None else found.grade.value,
-        "verdict": None if found is None else plain(found.reason),
+        "verdict": None
+        if found is None
+        else {"grade": found.grade.value, **plain(found.reason)},
         "supervisor": conclusion.supervisor,
         "reason": conclusion.reason,
         "inputs": {"tip": file_entry(tip.tip_file)},

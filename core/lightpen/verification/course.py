@@ -21,12 +21,13 @@ from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.outcome import Outcome
 from lightpen.record.supervision import Signature, require_supervisor
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import Report, Start, Task
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
-from lightpen.verification.conclusion import Conclusion, Outcome, conclusion_record
+from lightpen.verification.conclusion import Conclusion, conclusion_record
 from lightpen.verification.keeping import (
     TouchedImages,
     keep_verification,
@@ -69,6 +70,7 @@ BUG = sentence(
     "The program made a mistake of its own, and the verification is paused. What was "
     "found so far is kept; go on, or start it over.",
 )
+N_RECENT = 10  # images before a hold is noticed, of which the first belong to it
 ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
 
 T = TypeVar("T")

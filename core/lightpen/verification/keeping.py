@@ -15,6 +15,7 @@ from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.numbered_files import add_numbered
+from lightpen.record.verifications import VERIFICATIONS
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
@@ -34,7 +35,6 @@ from lightpen.verification.touch import RejectedFrame
 from lightpen.verification.touch_images import TouchRecord
 from lightpen.verification.witness import LampWitness, witness_entries
 
-VERIFICATIONS = "verifications"
 LIMITS = {
     TaskKind.FIXED_POINT: ("across", "along"),
     TaskKind.CIRCLE: ("radius", "form"),
@@ -52,7 +52,8 @@ class TouchedImages:
     origin : Origin or None
         What they are of; None where a record does not say.
     files : tuple of InputFile
-        None of them of a live camera.
+        Of a live camera those through which the pen was held still: each by its
+        number, with the hash of its pixels.
     rejected : tuple of RejectedFrame
         Those that belong to no touch, and why.
     witness : LampWitness or None

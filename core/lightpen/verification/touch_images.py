@@ -18,11 +18,11 @@ from lightpen.formats.hashes import InputFile, hashed
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, Header, image_name
+from lightpen.record.verifications import TOUCHES
 from lightpen.record.writing import OtherView, RecordWriter, make_folder
 from lightpen.verification.session import SessionState, SessionTransition
 from lightpen.verification.touching import TouchHappening, TouchPhase, TouchRules
 
-TOUCHES = "touches"
 CONCLUDED = "concluded"
 NOT_COUNTED = "not counted"
 

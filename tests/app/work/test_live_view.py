@@ -20,6 +20,7 @@ from lightpen.live.sources import Surroundings
 from lightpen.record.reading import open_record
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.hand import Operator
+from lightpen.streaming.server import PoseStream
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import read_resumable
 from lightpen_app.work.live_view import LiveView, Shown
@@ -50,7 +51,7 @@ class Diary:
 
 @pytest.fixture
 def view(run: SwingRun, verification: VerificationRun) -> Iterator[LiveView]:
-    view = LiveView(run, verification)
+    view = LiveView(run, verification, PoseStream())
     yield view
     view.close()
     view.await_closed()

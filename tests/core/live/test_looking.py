@@ -1,5 +1,6 @@
 """Images are looked at as they come; a swing is given every one of them, in order."""
 
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -28,6 +29,7 @@ from lightpen.formats.decoding import encode_png
 from lightpen.live.looking import UNHURRIED, Live, LiveImage
 from lightpen.record.reading import open_record
 from lightpen.simulator.sample_pens import SAMPLE_PENS
+from lightpen.streaming.server import LOOPBACK, PoseStream, StreamPlace
 from lightpen.swing.state import Happening, Phase
 
 if TYPE_CHECKING:
@@ -100,11 +102,17 @@ def make_live(station: "Station", screen: Screen) -> Iterator[MakeLive]:
     """Return a function that looks at a camera, by default at the simulated pen."""
     lives: list[Live] = []
 
-    def make(camera: ImageCamera | None = None, *, starts: bool = True) -> Live:
+    def make(
+        camera: ImageCamera | None = None,
+        *,
+        starts: bool = True,
+        stream: PoseStream | None = None,
+    ) -> Live:
         settings = CameraSettings(frame_rate=FRAME_RATE)
         live = Live(
             *([camera or station.new_camera()], settings, screen, station.runner),
             clock=station.clock,
+            stream=stream,
         )
         lives.append(live)
         if starts:
@@ -213,6 +221,22 @@ def test_nobody_looking_on_one_image_is_looked_at_and_no_more(
 
     live.set_watched(True)
     screen.wait_for_images(3)
+
+
+def test_while_others_listen_every_image_is_looked_at_though_nobody_looks_on(
+    make_live: MakeLive, screen: Screen
+) -> None:
+    stream = PoseStream()
+    stream.open(StreamPlace(port=0))
+    assert stream.status.place is not None
+    live = make_live(starts=False, stream=stream)
+    live.set_watched(False)
+    live.start()
+    screen.wait_for_images(1)
+
+    with socket.create_connection((LOOPBACK, stream.status.place.port)):
+        screen.wait_for_images(5)
+    stream.close()
 
 
 def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(

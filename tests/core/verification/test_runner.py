@@ -34,6 +34,7 @@ from lightpen.record.folder_archive import SIMULATED, FolderArchive
 from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.record.supervision import Signature, set_password
+from lightpen.record.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
 from lightpen.sentences import Sentence
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.image_plans import plan_scene, render_plan
@@ -42,11 +43,9 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
-from lightpen.verification.conclusion import CONCLUSION
-from lightpen.verification.keeping import VERIFICATIONS
 from lightpen.verification.runner import VerificationRunner
 from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
-from lightpen.verification.touch_images import CONCLUDED, TOUCHES
+from lightpen.verification.touch_images import CONCLUDED
 
 EVE = Signature("Eve", "correct horse")
 TIMEOUT = 60.0  # s until a test gives up

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from typing_extensions import override
 from lightpen.arrays import FloatArray, Image
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import write_camera
+from lightpen.formats.hashes import InputFile, all_hashed, hashed
 from lightpen.formats.images import find_images
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.calibration import (
@@ -35,6 +37,10 @@ from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.local_time import local_now
+from lightpen.model.camera import Camera
+from lightpen.model.origin import Origin
+from lightpen.record.camera_calibrations import CameraTrial
+from lightpen.record.outcome import Outcome
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -58,9 +64,12 @@ class BoardWindow(Translated, QWidget):
     -------
     saved(str)
         A camera file was written.
+    concluded(CameraTrial)
+        What became of an attempt.
     """
 
     saved = Signal(str)
+    concluded = Signal(object)
 
     def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
         super().__init__(parent, Qt.WindowType.Window)
@@ -71,6 +80,8 @@ class BoardWindow(Translated, QWidget):
         self._capture: Capture | None = None
         self._outline: FloatArray | None = None
         self._found: CameraCalibration | None = None
+        self._hashes: dict[str, str] = {}  # of the views that are kept or computed
+        self._is_saved = False
         self._searching: Job | None = None
         self._leading: Job | None = None
         self._computing: Job | None = None
@@ -145,6 +156,8 @@ class BoardWindow(Translated, QWidget):
     @override
     def closeEvent(self, event: QCloseEvent) -> None:
         self._stop()
+        self._conclude()
+        self._capture, self._hashes = None, {}
         for job in (self._searching, self._leading, self._computing):
             if job is not None:
                 job.cancel()
@@ -157,8 +170,10 @@ class BoardWindow(Translated, QWidget):
         if self._sought is not None:
             self._stop()
         else:
+            self._conclude()
             self._sought = self._named_board()
             self._capture = self._outline = None
+            self._hashes = {}
             self._forget()
         self._refresh()
 
@@ -191,19 +206,20 @@ class BoardWindow(Translated, QWidget):
         time_s = frame.host_ts_ns / NANOSECONDS
 
         # Connections
-        job.succeeded.connect(lambda seen: self._on_looked(seen.points, time_s))
+        job.succeeded.connect(lambda seen: self._on_looked(seen, time_s))
         job.ended.connect(self._on_search_ended)
         job.start()
 
     def _on_search_ended(self) -> None:
         self._searching = None
 
-    def _on_looked(self, points: FloatArray | None, time_s: float) -> None:
+    def _on_looked(self, seen: "_Looked", time_s: float) -> None:
         if self._capture is None or self._sought is None:
             return
         n_kept = len(self._capture.kept)
-        self._capture = self._capture.after(points, time_s)
+        self._capture = self._capture.after(seen.points, time_s)
         if len(self._capture.kept) > n_kept:
+            self._hashes[self._capture.views.names[-1]] = seen.sha256
             self._lead()
         self._refresh()
 
@@ -239,6 +255,7 @@ class BoardWindow(Translated, QWidget):
         if board is None:
             return
         self._stop()
+        self._conclude()
         self._capture = None
         self._image.set_image(None)
         self._run(partial(_calibrate_folder, folder, board))
@@ -248,7 +265,8 @@ class BoardWindow(Translated, QWidget):
     def _on_compute_clicked(self) -> None:
         if self._capture is not None:
             self._stop()
-            self._run(partial(_calibrate, self._capture.views))
+            self._conclude_found()
+            self._run(partial(_calibrate, self._capture.views, self._hashes))
 
     def _on_remove_clicked(self) -> None:
         found, item = self._found, self._worst.currentItem()
@@ -256,9 +274,10 @@ class BoardWindow(Translated, QWidget):
             return
         name = item.data(Qt.ItemDataRole.UserRole)
         kept = np.array([each != name for each in found.views.names])
-        self._run(partial(_calibrate, found.views.chosen(kept)))
+        self._conclude_found()
+        self._run(partial(_calibrate, found.views.chosen(kept), self._hashes))
 
-    def _run(self, calibrate: Callable[[Report], CameraCalibration]) -> None:
+    def _run(self, calibrate: Callable[[Report], "_Computed"]) -> None:
         if self._computing is not None:
             self._computing.cancel()
         self._forget()
@@ -280,8 +299,10 @@ class BoardWindow(Translated, QWidget):
         self._remark.set_value(_trouble(sentence))
         self._refresh()
 
-    def _on_found(self, found: CameraCalibration) -> None:
-        self._computing, self._found = None, found
+    def _on_found(self, computed: "_Computed") -> None:
+        found = computed.found
+        self._computing, self._found, self._is_saved = None, found, False
+        self._hashes = computed.hashes
         self._worst.clear()
         if self._image.image_size().isEmpty():  # the views are from a folder
             width, height = found.views.image_sizes[0]
@@ -315,19 +336,59 @@ class BoardWindow(Translated, QWidget):
         """Write the camera file and offer it for use."""
         if self._found is None:
             return
-        serial = "" if self._capture is None else self._live.serial
-        camera = replace(self._found.camera, serial=serial)
-        job = Job(lambda _: write_camera(camera, Path(path)), self)
+        camera = replace(self._found.camera, serial=self._serial())
+        job = Job(partial(_save, camera, Path(path)), self)
 
         # Connections
-        job.succeeded.connect(lambda _: self._on_saved(path))
+        job.succeeded.connect(self._on_saved)
         job.failed.connect(self._on_refused)
         job.start()
 
-    def _on_saved(self, path: str) -> None:
-        words = self.tr("Saved and in use: {0}").format(path)
+    def _on_saved(self, file: InputFile) -> None:
+        words = self.tr("Saved and in use: {0}").format(file.path)
         self._remark.set_value(Remark(words, Sign.CHECK, Tone.GOOD))
-        self.saved.emit(path)
+        self._is_saved = True
+        self.concluded.emit(self._trial(Outcome.ACCEPTED, self._found, file))
+        self.saved.emit(str(file.path))
+
+    # What became of it
+
+    def _serial(self) -> str:
+        return "" if self._capture is None else self._live.serial
+
+    def _conclude(self) -> None:
+        """Tell what becomes of an attempt that ends now, without a camera file."""
+        if self._found is not None:
+            self._conclude_found()
+        elif self._capture is not None and self._capture.kept:
+            self.concluded.emit(self._trial(Outcome.ABANDONED))
+
+    def _conclude_found(self) -> None:
+        """Tell that what was found is not used, unless it is."""
+        if self._found is not None and not self._is_saved:
+            self.concluded.emit(self._trial(Outcome.REFUSED, self._found))
+        self._found = None
+
+    def _trial(
+        self,
+        outcome: Outcome,
+        found: CameraCalibration | None = None,
+        file: InputFile | None = None,
+    ) -> CameraTrial:
+        is_live, board = self._capture is not None, self._board.text()
+        names = set(self._hashes) if found is None else set(found.views.names)
+        return CameraTrial(
+            outcome=outcome,
+            board=board if found is None else found.views.board.name,
+            serial=self._serial(),
+            origin=self._origin() if is_live else Origin.RECORDED,
+            images={name: h for name, h in self._hashes.items() if name in names},
+            found=found,
+            camera_file=file,
+        )
+
+    def _origin(self) -> Origin:
+        return Origin.LIVE if self._live.operator is None else Origin.SIMULATED
 
     # What is shown
 
@@ -425,9 +486,18 @@ class BoardWindow(Translated, QWidget):
 
 @dataclass(frozen=True, eq=False)
 class _Looked:
-    """What one image shows; None cannot be told by a signal of a job."""
+    """What one image shows, and the hash of its pixels where that is the board."""
 
     points: FloatArray | None
+    sha256: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class _Computed:
+    """A calibration, and the hash of each image by its name."""
+
+    found: CameraCalibration
+    hashes: dict[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -436,27 +506,37 @@ class _Wanted:
 
 
 def _look(image: Image, board: Board, report: Report) -> _Looked:
-    return _Looked(find_points(image, board, quick=True))
+    points = find_points(image, board, quick=True)
+    if points is None:
+        return _Looked(None)
+    return _Looked(points, sha256(image.tobytes()).hexdigest())
 
 
 def _wanted(capture: Capture, report: Report) -> _Wanted:
     return _Wanted(wanted_outline(capture))
 
 
-def _calibrate(views: Views, report: Report) -> CameraCalibration:
-    return calibrate_camera(views, BoardTolerances(), local_now().date(), report)
+def _calibrate(views: Views, hashes: dict[str, str], report: Report) -> _Computed:
+    found = calibrate_camera(views, BoardTolerances(), local_now().date(), report)
+    return _Computed(found, hashes)
 
 
-def _calibrate_folder(folder: str, board: Board, report: Report) -> CameraCalibration:
-    observed = observe_board(
-        find_images(folder), board, lambda fraction: report(0.7 * fraction)
-    )
-    return calibrate_camera(
+def _calibrate_folder(folder: str, board: Board, report: Report) -> _Computed:
+    images = find_images(folder)
+    observed = observe_board(images, board, lambda fraction: report(0.7 * fraction))
+    found = calibrate_camera(
         observed.views,
         BoardTolerances(),
         local_now().date(),
         lambda fraction: report(0.7 + 0.3 * fraction),
     )
+    files = all_hashed(images.files)
+    return _Computed(found, {file.path.name: file.sha256 for file in files})
+
+
+def _save(camera: Camera, path: Path, report: Report) -> InputFile:
+    write_camera(camera, path)
+    return hashed(path)
 
 
 def _residuals(found: CameraCalibration) -> BoardOverlay:

@@ -383,6 +383,7 @@ class CameraPage(Rearranged, Page):
 
             # Connections
             self._board.saved.connect(self._on_path_chosen)
+            self._board.concluded.connect(self._workbench.keep_camera_trial)
         self._board.show()
         self._board.raise_()
 

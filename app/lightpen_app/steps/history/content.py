@@ -146,6 +146,7 @@ class HistoryContent(Translated, QWidget):
         self._entry.set_value(None)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
+        self._reader.read_due(self._due.rule())  # later than what is seen at once
 
     def _on_selection_changed(self) -> None:
         line = self._table.current()
@@ -203,6 +204,7 @@ class HistoryContent(Translated, QWidget):
     def _on_restored(self, result: Result) -> None:
         self.read_anew()
         self._workbench.library.refresh()
+        self._workbench.streaming.read_tip()
         told = self.tr("Tip {0} of pen {1} is in force as it was calibrated then.")
         names = result.names
         words = (shortened(names.tip), shortened(names.pen))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from lightpen.archive.entries import IN_FORCE_BY, Event, Kind, Written
+from lightpen.archive.entries import BESIDE_SWINGS, IN_FORCE_BY, Event, Kind, Written
 from lightpen.archive.history import Line, TipState
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -201,10 +201,13 @@ class EntryPanel(Translated, QWidget):
 
 
 def _why_of(event: Event) -> str:
-    """Return verdict and reason; of a note its text."""
+    """Return verdict and reason, a note's text, or the settings of what is no swing."""
     if event.kind is Kind.NOTE:
         return event.reason
     if event.kind is Kind.LIBRARY:
         return PARTED.join(filter(None, (item_text(event), event.reason)))
     why = "" if event.why is None else event.why.text
-    return PARTED.join(filter(None, (verdict_text(event.grade), why, event.reason)))
+    settings = event.settings.items() if event.kind in BESIDE_SWINGS else ()
+    said = (f"{name} {value}" for name, value in settings)
+    words = (verdict_text(event.grade), why, event.reason, *said)
+    return PARTED.join(filter(None, words))

@@ -6,11 +6,13 @@ from datetime import date, datetime, time, timedelta
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 
+from lightpen.archive.entries import Kind
 from lightpen.archive.history import KnownNames
 from lightpen.archive.queries import Wanted
 from lightpen.local_time import local_time
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
+from lightpen_app.steps.history.texts import kind_text
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import field_label, stacked
 from lightpen_app.widgets.translated import Translated
@@ -20,7 +22,7 @@ LEAST_CHOICE = 12 * GRID
 
 
 class FilterBar(Translated, QWidget):
-    """Three lists and two days.
+    """Four lists and two days.
 
     Signals
     -------
@@ -36,7 +38,10 @@ class FilterBar(Translated, QWidget):
 
         # Widgets: the order of making them is the order of the Tab key
         self._pen, self._tip, self._station = _choice(), _choice(), _choice()
-        self._choices = (self._pen, self._tip, self._station)
+        self._kind = _choice()
+        for kind in Kind:
+            self._kind.addItem("", kind)
+        self._choices = (self._pen, self._tip, self._station, self._kind)
         self._begin, self._end = DateField(), DateField()
         self._fields = (*self._choices, self._begin, self._end)
         self._labels = tuple(map(field_label, self._fields))
@@ -52,7 +57,7 @@ class FilterBar(Translated, QWidget):
 
         # Connections
         self._pen.currentIndexChanged.connect(self._on_pen_changed)
-        for choice in (self._tip, self._station):
+        for choice in (self._tip, self._station, self._kind):
             choice.currentIndexChanged.connect(self.value_changed)
         for day in (self._begin, self._end):
             day.value_changed.connect(self.value_changed)
@@ -62,9 +67,12 @@ class FilterBar(Translated, QWidget):
     def value(self) -> Wanted:
         """Return what is looked for; the last day is one of its own."""
         end = self._end.value()
-        pen, tip, station = (choice.currentData() or "" for choice in self._choices)
+        named = (self._pen, self._tip, self._station)
+        pen, tip, station = (choice.currentData() or "" for choice in named)
+        kind = self._kind.currentData()
         return Wanted(
             *(pen, tip, station),
+            kinds=(Kind(kind),) if kind else (),
             begin=_midnight(self._begin.value()),
             end=_midnight(None if end is None else end + timedelta(days=1)),
         )
@@ -88,13 +96,15 @@ class FilterBar(Translated, QWidget):
     def _retranslate(self) -> None:
         words = (
             *(self.tr("Pen"), self.tr("Tip"), self.tr("Station")),
-            *(self.tr("From"), self.tr("To")),
+            *(self.tr("What"), self.tr("From"), self.tr("To")),
         )
         for label, field, text in zip(self._labels, self._fields, words, strict=True):
             label.setText(text)
             field.setAccessibleName(text)
         for choice in self._choices:
             choice.setItemText(0, self.tr("All"))
+        for i, kind in enumerate(Kind, start=1):
+            self._kind.setItemText(i, kind_text(kind))
 
 
 def _choice() -> QComboBox:

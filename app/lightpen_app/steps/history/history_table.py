@@ -206,7 +206,8 @@ class HistoryTable(Translated, RowTable):
     def put_block(self, first: int, found: Sequence[Line]) -> None:
         """Show the lines of a block that was wanted."""
         self._model.put_block(first, found)
-        self.selection_changed.emit()
+        if self._is_chosen(first, first + BLOCK - 1):
+            self.selection_changed.emit()
 
     def forget_block(self, first: int) -> None:
         """Ask for a block again when it is to be shown the next time."""
@@ -228,6 +229,15 @@ class HistoryTable(Translated, RowTable):
         rows = chain.from_iterable(range(r.top(), r.bottom() + 1) for r in parts)
         found = map(self._model.known_line, islice(sorted(rows), MOST_SELECTED))
         return tuple(line for line in found if line is not None)
+
+    def _is_chosen(self, first: int, last: int) -> bool:
+        """Return whether one of these rows is current or selected."""
+        chosen = self.selectionModel().selection()
+        ranges = map(chosen.at, range(chosen.count()))
+        is_current = first <= self.currentIndex().row() <= last
+        return is_current or any(
+            r.top() <= last and first <= r.bottom() for r in ranges
+        )
 
     @override
     def _retranslate(self) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.history import Line, TipState
 from lightpen.estimation.verdict import Grade
+from lightpen.record.outcome import Outcome
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.theme import Tone
@@ -30,6 +31,14 @@ _KINDS: dict[Kind, str] = {
     Kind.TAKEN_BACK: QT_TRANSLATE_NOOP("history", "Taking back"),
     Kind.NOTE: QT_TRANSLATE_NOOP("history", "Note"),
     Kind.LIBRARY: QT_TRANSLATE_NOOP("history", "Tip library"),
+    Kind.VERIFICATION: QT_TRANSLATE_NOOP("history", "Verification"),
+    Kind.CAMERA: QT_TRANSLATE_NOOP("history", "Camera calibration"),
+    Kind.LIMITS: QT_TRANSLATE_NOOP("history", "Limits"),
+}
+_OUTCOMES: dict[Outcome, str] = {
+    Outcome.ACCEPTED: QT_TRANSLATE_NOOP("history", "accepted"),
+    Outcome.REFUSED: QT_TRANSLATE_NOOP("history", "refused"),
+    Outcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
 }
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),
@@ -66,6 +75,8 @@ def what_text(line: Line) -> str:
     words = [kind_text(event.kind)]
     if line.state is not TipState.NONE:
         words.append(_translated(_STATES[line.state]))
+    if event.outcome is not None:
+        words.append(_translated(_OUTCOMES[event.outcome]))
     if event.is_simulated:
         words.append(_translated(_SIMULATED))
     return ", ".join(words)
@@ -101,7 +112,8 @@ def line_tone(line: Line, is_verdict: bool) -> Tone:
         return known.get(event.grade, Tone.PLAIN)
     if line.state is TipState.IN_FORCE:
         return Tone.GOOD
-    return Tone.WARN if event.kind is Kind.REFUSED else Tone.PLAIN
+    is_refused = event.kind is Kind.REFUSED or event.outcome is Outcome.REFUSED
+    return Tone.WARN if is_refused else Tone.PLAIN
 
 
 def _translated(text: str) -> str:

@@ -335,6 +335,7 @@ class StartPage(Rearranged, Page):
     def _on_laid_down(self, supervision: Supervision) -> None:
         self._all_limits.close()
         self._workbench.set_supervision(supervision)
+        self._workbench.enter_owed()
 
     def _on_assumed_changed(self) -> None:
         assumed = self._assumed.value()

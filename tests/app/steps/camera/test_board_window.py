@@ -1,6 +1,8 @@
 """Calibrating the camera by a board, as an engineer sees it."""
 
+import json
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 
 import cv2
@@ -17,6 +19,8 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.intrinsics.boards import parse_board
 from lightpen.live.looking import LiveImage
 from lightpen.model.camera import Camera
+from lightpen.record.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
+from lightpen.record.outcome import Outcome
 from lightpen.simulator.board_views import simulate_board_poses
 from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
@@ -160,6 +164,51 @@ def test_a_board_held_still_is_kept_by_itself(
     assert overlay.outline is not None
     assert "Kept." in remark(window)
     press(window, "Stop")
+
+
+def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
+    window: BoardWindow,
+    images: list[Image],
+    workbench: Workbench,
+    tmp_path: Path,
+    qtbot: QtBot,
+) -> None:
+    told: list[CameraTrial] = []
+    window.concluded.connect(told.append)
+    window.concluded.connect(workbench.keep_camera_trial)
+    folder = written(tmp_path, images)
+    for _ in range(2):  # the first is not used
+        window.read_folder(folder)
+        qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+    with qtbot.waitSignal(window.saved):
+        window.save(str(tmp_path / "camera.yaml"))
+    window.close()
+
+    assert [each.outcome for each in told] == [Outcome.REFUSED, Outcome.ACCEPTED]
+    first = sha256((tmp_path / "0.png").read_bytes()).hexdigest()
+    assert told[1].images["0.png"] == first
+    kept = workbench.folder / CAMERA_CALIBRATIONS
+    qtbot.waitUntil(lambda: kept.is_dir() and len(list(kept.glob("*.json"))) == 2)
+    record = json.loads((kept / "000002.json").read_bytes())
+    assert record["camera_file"]["file"] == "camera.yaml"
+    assert record["calibration"]["board"] == BOARD
+    assert len(record["inputs"]["images"]) == 7
+
+
+def test_views_that_were_kept_and_never_computed_are_abandoned(
+    window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
+) -> None:
+    told: list[CameraTrial] = []
+    window.concluded.connect(told.append)
+    press(window, "Start")
+    for count in range(1, 4):
+        workbench.live.image_shown.emit(_shown(images[0], count))
+        qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+    window.close()
+
+    (trial,) = told
+    pixels = sha256(images[0].tobytes()).hexdigest()
+    assert (trial.outcome, trial.images) == (Outcome.ABANDONED, {"1": pixels})
 
 
 def _shown(image: Image, seconds: int) -> Shown:

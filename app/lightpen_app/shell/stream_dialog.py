@@ -1,0 +1,180 @@
+"""Whether others may follow the pen live, from where, and who does."""
+
+from dataclasses import dataclass, field
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QDialogButtonBox,
+    QFormLayout,
+    QVBoxLayout,
+    QWidget,
+)
+from typing_extensions import override
+
+from lightpen.streaming.server import (
+    LAST_PORT,
+    LOOPBACK,
+    StreamPlace,
+    StreamStatus,
+)
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+EVERYWHERE = "0.0.0.0"  # every network of the computer
+FIRST_PORT = 1024  # of those that take no administrator
+
+
+@dataclass(frozen=True)
+class StreamState:
+    """How the stream is, for those who show it.
+
+    Attributes
+    ----------
+    has_tip : bool
+        Whether the place of a tip is streamed, and not the pose alone.
+    trouble : str
+        Why nobody can listen, though somebody should.
+    """
+
+    status: StreamStatus = field(default_factory=StreamStatus)
+    has_tip: bool = False
+    trouble: str = ""
+
+
+class StreamDialog(Translated, QDialog):
+    """Shows and changes where the stream can be listened to.
+
+    Signals
+    -------
+    value_changed(bool, StreamPlace)
+        The user chose otherwise: whether it is on, and where.
+    """
+
+    value_changed = Signal(bool, object)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._state = StreamState()
+
+        # Widgets
+        self._lead = text_label(TextSize.BODY)
+        self._on = QCheckBox()
+        self._address = QComboBox()
+        self._address.setEditable(True)
+        self._address.addItems([LOOPBACK, EVERYWHERE])
+        self._port = NumberField("", (FIRST_PORT, LAST_PORT), 0)
+        self._address_label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._address_label.setBuddy(self._address)
+        self._port_label = text_label(TextSize.SMALL, Tone.QUIET)
+        self._port_label.setBuddy(self._port)
+        self._reach = SignLabel()
+        self._told = SignLabel()
+        self._buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+
+        # Layout
+        form = QFormLayout()
+        form.setHorizontalSpacing(2 * GRID)
+        form.addRow(self._address_label, self._address)
+        form.addRow(self._port_label, self._port)
+        layout = QVBoxLayout(self)
+        margin = 3 * GRID
+        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._lead)
+        layout.addLayout(form)
+        layout.addWidget(self._reach)
+        layout.addWidget(self._on)
+        layout.addWidget(self._told)
+        layout.addWidget(self._buttons)
+        self.setMinimumWidth(72 * GRID)
+
+        # Connections
+        self._on.clicked.connect(self._on_toggled)
+        self._address.currentTextChanged.connect(self._refresh)
+        self._buttons.rejected.connect(self.reject)
+
+        self._retranslate()
+
+    def place(self) -> StreamPlace:
+        """Return where the stream is to be listened to."""
+        return StreamPlace(
+            self._address.currentText().strip(), round(self._port.value())
+        )
+
+    def set_value(self, *, is_on: bool, place: StreamPlace) -> None:
+        """Show what is chosen."""
+        self._on.setChecked(is_on)
+        self._address.setCurrentText(place.address)
+        self._port.setValue(place.port)
+        self._refresh()
+
+    def set_state(self, state: StreamState) -> None:
+        """Show how the stream is."""
+        self._state = state
+        self._refresh()
+
+    def words(self) -> str:
+        """Return what is said of the stream."""
+        return self._told.value().text
+
+    def _refresh(self) -> None:
+        is_on = self._on.isChecked()
+        for each in (self._address, self._port):
+            each.setEnabled(not is_on)
+        self._on.setEnabled(bool(self._address.currentText().strip()))
+        reach = Remark()
+        if not self.place().is_local:
+            text = self.tr(
+                "Every computer in that network can follow the pen. Nobody has to sign "
+                "in, and a firewall may ask for permission."
+            )
+            reach = Remark(text, Sign.WARNING, Tone.WARN)
+        self._reach.set_value(reach)
+        self._told.set_value(self._state_remark() if is_on else Remark())
+
+    def _state_remark(self) -> Remark:
+        state = self._state
+        if state.trouble:
+            return Remark(state.trouble, Sign.CROSS, Tone.BAD)
+        if state.status.place is None:
+            return Remark()
+        text = self.tr("On at {0}. Programs that listen: {1}.").format(
+            state.status.place, state.status.n_clients
+        )
+        if not state.has_tip:
+            text += " " + self.tr("The pose alone is sent: no tip is in force.")
+        return Remark(text, Sign.CHECK, Tone.GOOD)
+
+    def _on_toggled(self, is_on: bool) -> None:
+        self._refresh()
+        self.value_changed.emit(is_on, self.place())
+
+    @override
+    def _retranslate(self) -> None:
+        self.setWindowTitle(self.tr("Live stream"))
+        self._lead.setText(
+            self.tr(
+                "Other programs, such as 3D Slicer, can follow the pen and its tip "
+                "live, by OpenIGTLink."
+            )
+        )
+        self._address_label.setText(self.tr("Address"))
+        self._address.setAccessibleName(self.tr("Address"))
+        self._address.setToolTip(
+            self.tr(
+                "{0} for programs of this computer alone, {1} for every network of it, "
+                "or one of its own addresses."
+            ).format(LOOPBACK, EVERYWHERE)
+        )
+        self._port_label.setText(self.tr("Port"))
+        self._port.setAccessibleName(self.tr("Port"))
+        self._on.setText(self.tr("Stream pose and tip"))
+        close = QDialogButtonBox.StandardButton.Close
+        self._buttons.button(close).setText(self.tr("Close"))
+        self._refresh()

@@ -1,0 +1,160 @@
+"""The live stream of pose and tip as an object of Qt: what is wanted, and how it is."""
+
+from functools import partial
+
+from PySide6.QtCore import QObject, Qt, Signal
+
+from lightpen.cameras.clock import Clock
+from lightpen.errors import LightpenError
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.streaming.messages import StreamedTip
+from lightpen.streaming.server import PoseStream, StreamPlace, StreamStatus
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.tip_in_force import read_tip_in_force
+from lightpen_app.work.job import Job, Report
+
+
+class Streaming(QObject):
+    """Opens and closes the stream, and has it tell of the tip in force.
+
+    Parameters
+    ----------
+    archive : FolderArchive
+        Of the accepted results.
+    clock : Clock
+        The one that the cameras go by.
+
+    Attributes
+    ----------
+    stream : PoseStream
+        Takes every image, on the thread that looks at them.
+
+    Signals
+    -------
+    changed()
+        `status`, `has_tip` or `trouble` is different.
+    """
+
+    changed = Signal()
+    _told = Signal()
+
+    def __init__(
+        self, archive: FolderArchive, clock: Clock, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._archive = archive
+        self._preparation = Preparation()
+        self._wanted: StreamPlace | None = None
+        self._opened: StreamPlace | None = None  # that is open, or was tried
+        self._opening: Job | None = None
+        self._reading: Job | None = None
+        self._has_tip = False
+        self._trouble = ""
+        self.stream = PoseStream(clock, lambda status: self._told.emit())
+
+        # Connections
+        self._told.connect(self.changed, Qt.ConnectionType.QueuedConnection)
+
+    @property
+    def status(self) -> StreamStatus:
+        """Where it can be listened to, and by how many it is."""
+        return self.stream.status
+
+    @property
+    def has_tip(self) -> bool:
+        """Whether the place of a tip is streamed, and not the pose alone."""
+        return self._has_tip
+
+    @property
+    def trouble(self) -> str:
+        """Why nobody can listen, in words; empty where one can or is not to."""
+        return self._trouble
+
+    def want(self, place: StreamPlace | None) -> None:
+        """Let others listen at a place; nowhere if it is None."""
+        self._wanted = place
+        self._follow()
+
+    def choose(self, preparation: Preparation) -> None:
+        """Know which pen and tip are chosen, and with which files."""
+        is_same = _what_counts(preparation) == _what_counts(self._preparation)
+        self._preparation = preparation
+        if not is_same:
+            self.read_tip()
+
+    def read_tip(self) -> None:
+        """Read which tip is in force, as it may be another one."""
+        if self._reading is not None:
+            self._reading.cancel()
+            self._reading = None
+        if self._wanted is None:
+            return
+        archive, preparation = self._archive, self._preparation
+        self._reading = job = Job(lambda _: _tip(archive, preparation), self)
+
+        # Connections
+        job.succeeded.connect(self._on_tip_read)
+        job.ended.connect(partial(self._on_reading_ended, job))
+        job.start()
+
+    def shut_down(self) -> None:
+        """Let nobody listen any more, once all jobs have ended."""
+        self.stream.close()
+
+    def _follow(self) -> None:
+        """Open or close the stream as wanted, off this thread: names are looked up."""
+        if self._opening is not None or self._wanted == self._opened:
+            return
+        self._opened = place = self._wanted
+        stream = self.stream
+
+        def follow(_: Report) -> None:
+            stream.close()
+            if place is not None:
+                stream.open(place)
+
+        self._tell("")
+        self._opening = job = Job(follow, self)
+
+        # Connections
+        job.failed.connect(self._tell)
+        job.ended.connect(self._on_opening_ended)
+        job.start()
+
+    def _tell(self, trouble: str) -> None:
+        self._trouble = trouble
+        self.changed.emit()
+
+    def _on_opening_ended(self) -> None:
+        self._opening = None
+        self._follow()
+        self.read_tip()
+        self.changed.emit()
+
+    def _on_tip_read(self, tip: StreamedTip | None) -> None:
+        self.stream.set_tip(tip)
+        self._has_tip = tip is not None
+        self.changed.emit()
+
+    def _on_reading_ended(self, job: Job) -> None:
+        if job is self._reading:
+            self._reading = None
+
+
+def _what_counts(preparation: Preparation) -> tuple[object, ...]:
+    """Return what the tip in force depends on."""
+    return (
+        *(preparation.names, preparation.origin, preparation.second is None),
+        *(preparation.camera_file, preparation.pen_file),
+    )
+
+
+def _tip(archive: FolderArchive, preparation: Preparation) -> StreamedTip | None:
+    """Return the tip in force; None where there is none to be measured with."""
+    if preparation.camera_file is None or preparation.pen_file is None:
+        return None
+    try:
+        tip = read_tip_in_force(archive, preparation)
+    except LightpenError:  # the step Verify says why
+        return None
+    return StreamedTip(tip.names, tip.instrument)

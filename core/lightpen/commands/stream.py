@@ -1,0 +1,211 @@
+"""``lightpen stream``: pose and tip for programs that listen by OpenIGTLink."""
+
+import argparse
+import sys
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+
+from lightpen.cameras.clock import MachineClock
+from lightpen.cameras.protocol import (
+    CameraSettings,
+    EndOfImages,
+    Frame,
+    FrameTimeout,
+    ImageCamera,
+)
+from lightpen.cameras.replay import RECORDED, USUAL_FRAME_RATE, ReplayCamera
+from lightpen.cameras.source import SourcePlace
+from lightpen.cameras.sources import SOURCES, source_named
+from lightpen.cameras.worker import CameraWorker, Failed, Troubled, WorkerEvent
+from lightpen.commands.arguments import above_zero, add_pen_options, whole_number
+from lightpen.commands.console import lacking, printing, shown
+from lightpen.detection.aim import Aim
+from lightpen.detection.sighting import Sighting, look
+from lightpen.errors import LightpenError, UsageError
+from lightpen.formats.camera_files import read_camera
+from lightpen.formats.pen_files import read_pen
+from lightpen.model.camera import Camera
+from lightpen.record.calibrations import read_calibration
+from lightpen.record.names import Names
+from lightpen.record.recordings import FilesBeside, files_beside
+from lightpen.sentences import sentence
+from lightpen.streaming.messages import StreamedTip
+from lightpen.streaming.server import (
+    LOOPBACK,
+    PORT,
+    PoseStream,
+    StreamPlace,
+    StreamStatus,
+)
+from lightpen.verification.places import touch_place
+from lightpen.verification.sources import instrument_of
+
+LONGEST_WAIT = 0.5  # s for an image, before the keyboard is heard
+
+
+def add_stream(parser: argparse.ArgumentParser) -> None:
+    """Add ``lightpen stream``."""
+    parser.set_defaults(run=_stream)
+    parser.add_argument(
+        "place",
+        metavar="PLACE",
+        help="a folder, a pattern, a video or the record of a swing; of a camera its "
+        "serial number",
+    )
+    parser.add_argument(
+        "--source",
+        choices=[source.key for source in SOURCES if source.camera is not None],
+        default=RECORDED.key,
+        help=f"what takes the images ({RECORDED.key})",
+    )
+    parser.add_argument(
+        "--producer", default="", metavar="FILE", help="of a GenTL camera"
+    )
+    parser.add_argument("--camera", type=Path, metavar="FILE")
+    parser.add_argument("--pen", type=Path, metavar="FILE")
+    add_pen_options(parser)
+    parser.add_argument(
+        "--tip",
+        type=Path,
+        metavar="RESULT.json",
+        help="the calibration of the tip; without it the pose is streamed alone",
+    )
+    parser.add_argument(
+        "--address",
+        default=LOOPBACK,
+        help="of this computer in the network that may listen; programs of this "
+        f"computer alone unless said ({LOOPBACK})",
+    )
+    parser.add_argument(
+        "--port",
+        type=whole_number,
+        default=PORT,
+        metavar="N",
+        help=f"0 for any that is free ({PORT})",
+    )
+    parser.add_argument(
+        "--rate",
+        type=above_zero,
+        default=USUAL_FRAME_RATE,
+        metavar="HZ",
+        help=f"of recorded images ({USUAL_FRAME_RATE:g})",
+    )
+    parser.add_argument(
+        "--once",
+        action="store_true",
+        help="end after the last recorded image, rather than begin again",
+    )
+
+
+@printing
+def _stream(options: argparse.Namespace) -> None:
+    listened = _listened(options)
+    is_heard = Event()
+
+    def note(status: StreamStatus) -> None:
+        if status.n_clients:
+            is_heard.set()
+
+    stream = PoseStream(on_change=note)
+    stream.set_tip(listened.tip)
+    stream.open(StreamPlace(options.address, options.port))
+    with closing(stream), suppress(KeyboardInterrupt):
+        print(
+            shown(f"The pen can be followed at {stream.status.place}."),
+            "Ctrl+C ends it.",
+            flush=True,
+        )
+        while not is_heard.wait(LONGEST_WAIT):  # recorded images wait for who listens
+            pass
+        _play(listened, stream)
+
+
+@dataclass(frozen=True, eq=False)
+class _Listened:
+    """What is streamed: the images, and what is looked for in them."""
+
+    images: ImageCamera
+    aim: Aim
+    tip: StreamedTip | None
+
+
+def _listened(options: argparse.Namespace) -> _Listened:
+    """Return what is streamed: files as given, or as they stand beside the images."""
+    beside, mask = FilesBeside(), None
+    source = source_named(options.source)
+    if source is None or source.camera is None or source is RECORDED:
+        beside, where = files_beside(options.place), touch_place((options.place,))
+        mask = where.mask
+        images: ImageCamera = ReplayCamera(
+            options.place,
+            lambda: where.images,
+            frame_rate=options.rate,
+            loops=not options.once,
+        )
+    else:
+        place = SourcePlace(options.place, options.producer)
+        images = source.camera(place, MachineClock())
+    camera_file, pen_file = options.camera or beside.camera, options.pen or beside.pen
+    if camera_file is None:
+        raise lacking("--camera")
+    if pen_file is None:
+        raise lacking("--pen")
+    camera = read_camera(camera_file)
+    pen = read_pen(pen_file, options.units, options.led_diameter, None)
+    if options.tip is None:
+        return _Listened(images, Aim(camera, pen, mask), None)
+    calibration = read_calibration(options.tip)
+    instrument = instrument_of(calibration, camera, camera_file, pen, pen_file)
+    tip = StreamedTip(Names(pen=calibration.pen, tip=calibration.tip), instrument)
+    return _Listened(images, Aim(instrument.camera, instrument.pen, mask), tip)
+
+
+def _play(listened: _Listened, stream: PoseStream) -> None:
+    """Look for the pen in all images, as long as some come, and tell who listens."""
+    failures: list[LightpenError] = []
+
+    def note(event: WorkerEvent) -> None:
+        if isinstance(event, Failed):
+            failures.append(event.error)
+        elif isinstance(event, Troubled):
+            print(shown(f"lightpen: {event.error}"), file=sys.stderr)
+
+    camera, pen, mask = listened.aim.camera, listened.aim.pen, listened.aim.mask
+    if camera is None or pen is None:
+        raise ValueError("It must be known what is looked for.")
+    worker = CameraWorker(listened.images, CameraSettings(), note)
+    worker.measure(True)
+    worker.start()
+    before: Sighting | None = None
+    try:
+        while True:
+            with suppress(FrameTimeout):
+                frame = worker.next_frame(LONGEST_WAIT)
+                if not camera.fits(frame.image):
+                    raise _another_size(frame, camera)
+                before = look(
+                    *(frame.image, camera, pen, mask, before, frame.full_scale)
+                )
+                stream.take(frame, before)
+    except EndOfImages:
+        if failures:
+            raise failures[-1] from None
+    finally:
+        worker.stop()
+
+
+def _another_size(frame: Frame, camera: Camera) -> UsageError:
+    height, width = frame.image.shape
+    return UsageError(
+        sentence(
+            "stream.another-size",
+            "The images have {width} x {height} px, and the intrinsics are for "
+            "{its_width} x {its_height}. Give the camera file of these images.",
+            width=width,
+            height=height,
+            its_width=camera.width,
+            its_height=camera.height,
+        )
+    )

@@ -1,0 +1,141 @@
+"""Calibrations of cameras in a data folder: a file for each, which is never changed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from msgspec import Struct
+
+from lightpen.errors import FileError
+from lightpen.estimation.report import plain, record_bytes
+from lightpen.formats.files import MEGABYTE, printable
+from lightpen.formats.hashes import InputFile
+from lightpen.formats.own_json import (
+    DamagedError,
+    Moment,
+    has_checksum,
+    parse_json,
+    require_usual,
+)
+from lightpen.intrinsics.calibration import CameraCalibration
+from lightpen.intrinsics.report import intrinsics_record
+from lightpen.intrinsics.views import BoardTolerances
+from lightpen.model.origin import Origin
+from lightpen.record.names import Names
+from lightpen.record.numbered_files import add_numbered
+from lightpen.record.outcome import Outcome
+from lightpen.sentences import sentence
+
+CAMERA_CALIBRATIONS = "camera-calibrations"
+WHAT = sentence("file.camera-calibration", "calibration of a camera")
+LIMIT = 64 * MEGABYTE
+
+
+@dataclass(frozen=True, eq=False)
+class CameraTrial:
+    """An attempt to calibrate a camera by a board.
+
+    Attributes
+    ----------
+    serial : str
+        Of the camera; empty where the images are from a folder.
+    images : mapping of str to str
+        SHA-256 of each view by its name: of its file, or of the pixels of a live image.
+    found : CameraCalibration or None
+        None of one that was abandoned.
+    camera_file : InputFile or None
+        That was written; None of one that was not accepted.
+    """
+
+    outcome: Outcome
+    board: str
+    serial: str
+    origin: Origin | None
+    images: Mapping[str, str]
+    found: CameraCalibration | None = None
+    camera_file: InputFile | None = None
+
+
+class ProgramName(Struct, frozen=True):
+    """The program that wrote a file."""
+
+    name: str
+    version: str
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.version}"
+
+
+class KeptTrial(Struct, frozen=True):
+    """What the file of an attempt says, but for what was found."""
+
+    program: ProgramName
+    created: Moment
+    outcome: Outcome
+    station: str
+    operator: str
+    board: str
+    serial: str
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        require_usual(self.created)
+
+
+def keep_camera_trial(
+    data: Path, trial: CameraTrial, names: Names, now: datetime
+) -> Path:
+    """Keep what became of the calibration of a camera, and return its file.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    found, file = trial.found, trial.camera_file
+    intrinsics = None
+    if found is not None:
+        intrinsics = plain(intrinsics_record(found, (), BoardTolerances()))
+    record = {
+        "program": {"name": "lightpen", "version": version("lightpen")},
+        "created": now.isoformat(timespec="seconds"),
+        "outcome": trial.outcome.value,
+        "station": names.station,
+        "operator": names.operator,
+        "board": trial.board,
+        "serial": trial.serial,
+        "origin": trial.origin,
+        "camera_file": None if file is None else _entry(file.path.name, file.sha256),
+        "calibration": intrinsics,
+        "inputs": {"images": [_entry(*image) for image in trial.images.items()]},
+    }
+    return add_numbered(data / CAMERA_CALIBRATIONS, record_bytes(record))
+
+
+def read_camera_trial(content: bytes, file: Path) -> KeptTrial:
+    """Return what the file of an attempt says.
+
+    Raises
+    ------
+    FileError
+        It is damaged.
+    """
+    try:
+        if not has_checksum(content):
+            raise DamagedError("There is no checksum.")
+        return parse_json(content, KeptTrial)
+    except DamagedError as error:
+        raise FileError(
+            sentence(
+                "camera-calibration.damaged",
+                "The calibration of a camera in {file} is not as it was written: it "
+                "was changed or damaged since. Restore the file from a copy.",
+                file=printable(str(file)),
+            )
+        ) from error
+
+
+def _entry(name: str, sha256: str) -> dict[str, str]:
+    return {"file": name, "sha256": sha256}

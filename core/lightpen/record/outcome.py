@@ -1,0 +1,11 @@
+"""What became of something that was tried."""
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """How a verification or the calibration of a camera ended."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"  # it came to something, which was not used
+    ABANDONED = "abandoned"  # before it came to anything

@@ -1,0 +1,1 @@
+"""Pose and tip of the pen, streamed live to programs that listen."""

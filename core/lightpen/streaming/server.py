@@ -1,0 +1,316 @@
+"""A server of OpenIGTLink that holds up nobody.
+
+pyigtl's own server takes one client at a time, and over the signals of the process; so
+of pyigtl only the messages are used. One thread serves all clients here. A client that
+reads slowly, or not at all, misses poses: each is sent the newest one whenever it has
+taken the last, and nothing is kept for it besides.
+"""
+
+import errno
+import selectors
+import socket
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from ipaddress import ip_address
+from threading import Lock, Thread
+
+from lightpen.cameras.clock import Clock, MachineClock
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.sighting import Sighting
+from lightpen.errors import StreamError
+from lightpen.formats.files import printable, strerror
+from lightpen.sentences import Sentence, sentence
+from lightpen.streaming.messages import StreamedTip, pose_messages
+
+LOOPBACK = "127.0.0.1"  # reached by programs of this computer only
+PORT = 18944  # that clients of OpenIGTLink look for
+LAST_PORT = 65535
+MOST_CLIENTS = 16
+ON_THE_WAY = 16_384  # bytes to a slow client, lest what it reads at last is old
+ROOM = 4096  # bytes that are read of what a client says, which is passed over
+
+
+@dataclass(frozen=True)
+class StreamPlace:
+    """Where a stream can be listened to.
+
+    Attributes
+    ----------
+    address : str
+        Of this computer in the network that may listen; the loopback for none.
+    port : int
+        0 for any that is free.
+    """
+
+    address: str = LOOPBACK
+    port: int = PORT
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only programs of this computer can listen."""
+        try:
+            return ip_address(self.address).is_loopback
+        except ValueError:  # a name
+            return self.address == "localhost"
+
+    def __str__(self) -> str:
+        host = f"[{self.address}]" if ":" in self.address else self.address
+        return f"{host}:{self.port}"
+
+
+@dataclass(frozen=True)
+class StreamStatus:
+    """How a stream is.
+
+    Attributes
+    ----------
+    place : StreamPlace or None
+        None while nothing is streamed.
+    """
+
+    place: StreamPlace | None = None
+    n_clients: int = 0
+
+
+@dataclass(eq=False)
+class _Client:
+    """Somebody who listens: what is being sent, and what comes after it."""
+
+    connection: socket.socket
+    rest: bytes = b""
+    newest: bytes = b""
+
+    @property
+    def awaited(self) -> int:
+        """What the selector is to tell of: also room, while something is to be sent."""
+        has_more = self.rest or self.newest
+        return selectors.EVENT_READ | (selectors.EVENT_WRITE if has_more else 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A pose that waits to be sent."""
+
+    sighting: Sighting
+    number: int
+    at: float  # s since 1970
+
+
+class PoseStream:
+    """Streams the poses that it is handed, as long as it is open.
+
+    Parameters
+    ----------
+    clock : Clock, optional
+        The one that the camera goes by.
+    on_change : callable
+        Called with the new status by whatever thread changes it; must return at once.
+    """
+
+    def __init__(
+        self,
+        clock: Clock | None = None,
+        on_change: Callable[[StreamStatus], None] = lambda status: None,
+    ) -> None:
+        self._clock = clock or MachineClock()
+        self._on_change = on_change
+        self._status = StreamStatus()
+        self._tip: StreamedTip | None = None
+        self._newest: _Seen | None = None
+        self._lock = Lock()
+        self._waker: socket.socket | None = None
+        self._thread: Thread | None = None
+
+    @property
+    def status(self) -> StreamStatus:
+        """Where it can be listened to, and by how many it is."""
+        return self._status
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody listens."""
+        return self._status.n_clients > 0
+
+    def open(self, place: StreamPlace) -> None:
+        """Let others listen, at this place only.
+
+        Raises
+        ------
+        StreamError
+            Nobody can listen there.
+        """
+        self.close()
+        if find_spec("pyigtl") is None:
+            raise StreamError(
+                sentence(
+                    "stream.no-package",
+                    "Streaming needs the package pyigtl, which is not installed. "
+                    'Install it with: pip install "lightpen[stream]".',
+                )
+            )
+        if not 0 <= place.port <= LAST_PORT:
+            raise StreamError(_not_open(place, "there is no such port"))
+        try:
+            listener = _listener(place)
+        except OSError as error:
+            raise StreamError(_why_not(place, error)) from error
+        waker, woken = socket.socketpair()
+        for each in (listener, waker, woken):
+            each.setblocking(False)
+        self._waker = waker
+        bound = StreamPlace(place.address, listener.getsockname()[1])
+        self._tell(StreamStatus(bound))
+        self._thread = Thread(
+            target=self._serve, args=(listener, woken), name="stream", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Let nobody listen any more; nothing if nobody could."""
+        waker, self._waker = self._waker, None
+        thread, self._thread = self._thread, None
+        if waker is not None and thread is not None:
+            waker.close()  # which ends the thread
+            thread.join()
+
+    def set_tip(self, tip: StreamedTip | None) -> None:
+        """Stream the place of another tip from the next image on."""
+        self._tip = tip
+
+    def take(self, frame: Frame, sighting: Sighting | None) -> None:
+        """Stream what an image shows, if it shows the pen; returns at once."""
+        waker = self._waker
+        if waker is None or not self.is_heard:
+            return
+        if sighting is None or not sighting.has_pose:
+            return
+        age_s = (self._clock.now_ns() - frame.host_ts_ns) * 1e-9
+        with self._lock:
+            self._newest = _Seen(sighting, frame.seq, time.time() - age_s)
+        with suppress(OSError):  # it is awake, or being closed
+            waker.send(b"\0")
+
+    def _serve(self, listener: socket.socket, woken: socket.socket) -> None:
+        with ExitStack() as stack:
+            stack.callback(self._tell, StreamStatus())
+            selector = stack.enter_context(selectors.DefaultSelector())
+            stack.callback(_dismiss_all, selector)
+            selector.register(listener, selectors.EVENT_READ)
+            selector.register(woken, selectors.EVENT_READ)
+            while True:
+                for key, ready in selector.select():
+                    if key.fileobj is woken:
+                        if not woken.recv(ROOM):
+                            return
+                        self._hand_out(selector)
+                    elif key.fileobj is listener:
+                        _admit(listener, selector)
+                    elif not _served(key.data, ready):
+                        _dismiss(key.data, selector)
+                clients = _clients(selector)
+                if len(clients) != self._status.n_clients:
+                    self._tell(replace(self._status, n_clients=len(clients)))
+                for client in clients:
+                    selector.modify(client.connection, client.awaited, client)
+
+    def _hand_out(self, selector: selectors.BaseSelector) -> None:
+        """Give every client the newest pose to be sent."""
+        with self._lock:
+            seen, self._newest = self._newest, None
+        clients = _clients(selector)
+        if seen is None or not clients:
+            return
+        sent = pose_messages(seen.sighting, self._tip, seen.number, seen.at)
+        for client in clients:
+            client.newest = sent
+
+    def _tell(self, status: StreamStatus) -> None:
+        self._status = status
+        self._on_change(status)
+
+
+def _listener(place: StreamPlace) -> socket.socket:
+    """Return a socket that is bound to this address and no other."""
+    (family, _, _, _, address), *_ = socket.getaddrinfo(
+        place.address, place.port, type=socket.SOCK_STREAM
+    )
+    return socket.create_server(address, family=family)
+
+
+def _clients(selector: selectors.BaseSelector) -> list[_Client]:
+    return [key.data for key in selector.get_map().values() if key.data is not None]
+
+
+def _admit(listener: socket.socket, selector: selectors.BaseSelector) -> None:
+    try:
+        connection, _ = listener.accept()
+    except OSError:  # it has gone already
+        return
+    if len(_clients(selector)) >= MOST_CLIENTS:
+        connection.close()
+        return
+    connection.setblocking(False)
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ON_THE_WAY)
+    selector.register(connection, selectors.EVENT_READ, _Client(connection))
+
+
+def _dismiss(client: _Client, selector: selectors.BaseSelector) -> None:
+    selector.unregister(client.connection)
+    client.connection.close()
+
+
+def _dismiss_all(selector: selectors.BaseSelector) -> None:
+    """Close whatever is still open."""
+    for key in list(selector.get_map().values()):
+        selector.unregister(key.fileobj)
+        if isinstance(key.fileobj, socket.socket):
+            key.fileobj.close()
+
+
+def _served(client: _Client, ready: int) -> bool:
+    """Send a client what it has room for, and return whether it is still there."""
+    try:
+        if ready & selectors.EVENT_READ and not client.connection.recv(ROOM):
+            return False
+        if ready & selectors.EVENT_WRITE:
+            if not client.rest:
+                client.rest, client.newest = client.newest, b""
+            client.rest = client.rest[client.connection.send(client.rest) :]
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return True
+
+
+def _why_not(place: StreamPlace, error: OSError) -> Sentence:
+    if error.errno == errno.EADDRINUSE:
+        return sentence(
+            "stream.port-taken",
+            "Port {port} is in use already, by another window or another program. "
+            "Choose another port, or close that one.",
+            port=place.port,
+        )
+    if error.errno == errno.EADDRNOTAVAIL or isinstance(error, socket.gaierror):
+        return sentence(
+            "stream.no-address",
+            "{address} is no address of this computer. Give one that it has in the "
+            "network that may listen, or {loopback} for this computer alone.",
+            address=printable(place.address),
+            loopback=LOOPBACK,
+        )
+    return _not_open(place, strerror(error))
+
+
+def _not_open(place: StreamPlace, reason: str) -> Sentence:
+    return sentence(
+        "stream.not-open",
+        "Nobody can listen at {place}: {reason}. Choose a port from 1024 to 65535 "
+        "that is free.",
+        place=printable(str(place)),
+        reason=reason,
+    )

@@ -1,0 +1,119 @@
+"""Other programs follow the pen where the user lets them, and the window says so."""
+
+import re
+import socket
+from typing import TYPE_CHECKING
+
+import pytest
+from pyigtl import OpenIGTLinkClient
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+from tests.accepted_tip import accept_tip
+
+from lightpen.streaming.server import LOOPBACK, StreamPlace
+from lightpen_app.shell.stream_dialog import StreamDialog
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.work.settings import Preferences, Settings
+from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.conftest import Walker
+
+ANY = StreamPlace(port=0)
+
+
+def test_nothing_is_streamed_unless_chosen() -> None:
+    assert not Preferences().streams
+    assert Preferences().stream_address == LOOPBACK
+
+
+@pytest.mark.qt_log_ignore(
+    "^This plugin does not support (raise|grabbing)", extend=True
+)
+def test_who_listens_follows_the_pen_and_every_page_says_so(
+    walker: "Walker", settings: Settings, free_port: int
+) -> None:
+    assert not walker.tells("Live stream at")
+    walker.press(Qt.Key.Key_F10)
+    walker.choose("Live stream...")
+    (dialog,) = walker.window.findChildren(StreamDialog)
+    walker.until(dialog.isVisible)
+    (port,) = dialog.findChildren(NumberField)
+    port.setValue(free_port)
+    walker.click_on(walker.control("Stream pose and tip", dialog))
+
+    walker.until_tells(f"Live stream at {LOOPBACK}:{free_port}, listening: 0")
+    assert settings.preferences().streams
+    assert "On at" in dialog.words()
+    dialog.close()
+    walker.operator.seat()
+    client = OpenIGTLinkClient(port=free_port)
+    walker.until_tells("listening: 1")
+    walker.until(lambda: client.wait_for_message("PenToCamera", timeout=0) is not None)
+    client.stop()
+    walker.until_tells("listening: 0")
+
+
+@pytest.fixture
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(
+    workbench: Workbench, qtbot: QtBot
+) -> None:
+    streaming = workbench.streaming
+    streaming.want(ANY)
+    qtbot.waitUntil(lambda: streaming.status.place is not None)
+    assert not streaming.has_tip
+
+    accept_tip(workbench.folder, workbench.preparation)
+    streaming.read_tip()
+
+    qtbot.waitUntil(lambda: streaming.has_tip)
+
+
+def test_a_taken_port_is_told_until_another_place_is_chosen(
+    workbench: Workbench, qtbot: QtBot
+) -> None:
+    streaming = workbench.streaming
+    with socket.create_server((LOOPBACK, 0)) as other:
+        port = other.getsockname()[1]
+        streaming.want(StreamPlace(port=port))
+        qtbot.waitUntil(lambda: bool(streaming.trouble))
+    assert re.match(f"Port {port} is in use already", streaming.trouble)
+
+    streaming.want(ANY)
+
+    qtbot.waitUntil(lambda: streaming.status.place is not None)
+    assert streaming.trouble == ""
+
+
+def test_a_stream_that_is_wanted_no_more_ends(
+    workbench: Workbench, qtbot: QtBot
+) -> None:
+    streaming = workbench.streaming
+    streaming.want(ANY)
+    qtbot.waitUntil(lambda: streaming.status.place is not None)
+
+    streaming.want(None)
+
+    qtbot.waitUntil(lambda: streaming.status.place is None)
+
+
+def test_an_address_beyond_this_computer_is_warned_of(qtbot: QtBot) -> None:
+    dialog = StreamDialog()
+    qtbot.addWidget(dialog)
+
+    def warns() -> bool:
+        remarks = (each.value().text for each in dialog.findChildren(SignLabel))
+        return any("Every computer in that network" in text for text in remarks)
+
+    dialog.set_value(is_on=False, place=StreamPlace())
+    assert not warns()
+    dialog.set_value(is_on=False, place=StreamPlace("0.0.0.0"))
+    assert warns()
