@@ -39,7 +39,7 @@ from lightpen.streaming.server import (
     StreamPlace,
     StreamStatus,
 )
-from lightpen.verification.places import touch_place
+from lightpen.verification.places import touch_place, viewers_of_camera
 from lightpen.verification.sources import instrument_of
 
 LONGEST_WAIT = 0.5  # s for an image, before the keyboard is heard
@@ -137,10 +137,10 @@ def _listened(options: argparse.Namespace) -> _Listened:
     source = source_named(options.source)
     if source is None or source.camera is None or source is RECORDED:
         beside, where = files_beside(options.place), touch_place((options.place,))
-        mask = where.mask
+        mask = where.masks[0]
         images: ImageCamera = ReplayCamera(
             options.place,
-            lambda: where.images,
+            lambda: where.images[0],
             frame_rate=options.rate,
             loops=not options.once,
         )
@@ -157,7 +157,8 @@ def _listened(options: argparse.Namespace) -> _Listened:
     if options.tip is None:
         return _Listened(images, Aim(camera, pen, mask), None)
     calibration = read_calibration(options.tip)
-    instrument = instrument_of(calibration, camera, camera_file, pen, pen_file)
+    viewers = viewers_of_camera(camera, camera_file)
+    instrument = instrument_of(calibration, viewers, pen, pen_file)
     tip = StreamedTip(Names(pen=calibration.pen, tip=calibration.tip), instrument)
     return _Listened(images, Aim(instrument.camera, instrument.pen, mask), tip)
 

@@ -17,6 +17,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import StreamError
 from lightpen.estimation.instrument import Instrument, instrument_of_files
+from lightpen.model.rig import rig_of
 from lightpen.record.names import Names
 from lightpen.simulator.swings import (
     PAPER_CONE,
@@ -65,7 +66,7 @@ class Statuses:
 def instrument() -> Instrument:
     pen = replace(paper_pen(), led_sigma=0.002)
     return instrument_of_files(
-        paper_camera(), pen, PAPER_TIP, 0.01**2 * np.eye(3), SIGMA
+        rig_of(paper_camera()), pen, PAPER_TIP, 0.01**2 * np.eye(3), SIGMA
     )
 
 

@@ -117,7 +117,6 @@ class HistoryContent(Translated, QWidget):
     def read_anew(self) -> None:
         """Read what is looked for, as it is now."""
         self._reader.open(self._filter.value())
-        self._reader.read_due(self._due.rule(), self._workbench.library.library)
 
     def shut_down(self) -> None:
         """Cancel what is under way."""
@@ -146,7 +145,8 @@ class HistoryContent(Translated, QWidget):
         self._entry.set_value(None)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
-        self._reader.read_due(self._due.rule())  # later than what is seen at once
+        # Later than what is seen at once.
+        self._reader.read_due(self._due.rule(), self._workbench.library.library)
 
     def _on_selection_changed(self) -> None:
         line = self._table.current()
