@@ -78,7 +78,9 @@ def _place_of_tip(
     sighting: Sighting, instrument: Instrument
 ) -> tuple[FloatArray, FloatArray]:
     """Return the tip in the camera, mm, and its covariance, not of noise alone."""
-    frame = TouchFrame("", sighting.pixels, sighting.rotation, sighting.translation)
+    pixels = np.full((instrument.rig.n_cameras, *sighting.pixels.shape), np.nan)
+    pixels[0] = sighting.pixels  # of the first camera, whose images are streamed
+    frame = TouchFrame("", pixels, sighting.rotation, sighting.translation)
     (touch,) = measure_touches(instrument, [StillFrames((frame,))])
     return touch.point_cam, touch.covariance(instrument)
 

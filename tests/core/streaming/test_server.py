@@ -159,7 +159,8 @@ def test_it_receives_the_tip_as_a_touch_would_measure_it(
     sighting: Sighting,
     instrument: Instrument,
 ) -> None:
-    seen = TouchFrame("", sighting.pixels, sighting.rotation, sighting.translation)
+    pixels = sighting.pixels[None]
+    seen = TouchFrame("", pixels, sighting.rotation, sighting.translation)
     (touch,) = measure_touches(instrument, [StillFrames((seen,))])
 
     stream.take(frame(), sighting)

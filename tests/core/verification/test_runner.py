@@ -3,6 +3,7 @@
 import json
 import threading
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,8 @@ from tests.accepted_tip import (
     round_a_ring,
 )
 
+from lightpen.archive.check import check_archive
+from lightpen.archive.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, Frame, sealed
 from lightpen.commands.verifications import read_fixed_point, read_scale
@@ -539,7 +542,7 @@ def test_a_tip_that_keeps_the_limits_is_accepted_with_all_its_records(
     (conclusion,) = at_it.conclusions
 
     assert conclusion["outcome"] == "accepted"
-    assert conclusion["grade"] == "pass"
+    assert conclusion["verdict"]["grade"] == "pass"
     assert conclusion["session"] == NOON.isoformat()
     files = sorted(at_it.kept.glob("*.json"))[:3]
     assert conclusion["records"] == [
@@ -599,7 +602,7 @@ def test_a_supervisor_accepts_it_with_a_reason_which_is_kept(
     (point,) = doubted.records
     refusal, acceptance = doubted.conclusions
 
-    assert point["verdict"]["grade"] == refusal["grade"] == "repeat"
+    assert point["verdict"]["grade"] == refusal["verdict"]["grade"] == "repeat"
     assert (refusal["outcome"], acceptance["outcome"]) == ("refused", "accepted")
     assert acceptance["supervisor"] == "Eve"
     assert acceptance["reason"] == "Only roughing today."
@@ -618,3 +621,16 @@ def test_a_wrong_password_accepts_nothing(doubted: Verifier) -> None:
         lambda: doubted.ear.troubles == ["supervisor.wrong-password"]
     )
     assert len(doubted.records) == 1
+
+
+def test_the_archive_vouches_for_each_image_of_live_touches(at_it: Verifier) -> None:
+    at_it.touch(*leant(4))
+    logbook = Logbook(at_it.folder)
+    with closing(logbook.database):
+        assert logbook.enter_owed() == ()
+        image = min((at_it.kept / TOUCHES).rglob("*.png"))
+        image.write_bytes(image.read_bytes()[:-1] + b"?")
+        findings = check_archive(logbook.database, at_it.folder).findings
+
+    assert [each.code for each in findings] == ["archive.vouched-changed"]
+    assert image.name in str(findings[0])
