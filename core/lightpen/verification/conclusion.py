@@ -22,7 +22,7 @@ from lightpen.verification.tip_in_force import TipInForce
 CONCLUSION = "conclusion"
 
 
-class Outcome(StrEnum):
+class Ending(StrEnum):
     """What became of a verification."""
 
     ACCEPTED = "accepted"
@@ -46,7 +46,7 @@ class Conclusion:
         Who allowed it; empty where it took none.
     """
 
-    outcome: Outcome
+    outcome: Ending
     session: datetime
     at: datetime
     found: Conformity | None = None

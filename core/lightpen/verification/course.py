@@ -26,7 +26,7 @@ from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import Report, Start, Task
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
-from lightpen.verification.conclusion import Conclusion, Outcome, conclusion_record
+from lightpen.verification.conclusion import Conclusion, Ending, conclusion_record
 from lightpen.verification.keeping import (
     TouchedImages,
     keep_verification,
@@ -207,7 +207,7 @@ class VerificationCourse:
             require_supervisor(supervision, signature)
             supervisor = signature.name.strip()
         conclusion = Conclusion(
-            *(Outcome.ACCEPTED, began, self._now(), found, reason, supervisor)
+            *(Ending.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
         file = self._write_next(_conclusion(tip, conclusion))
         self._relieve()
@@ -494,15 +494,15 @@ class VerificationCourse:
         found = self._status.assessment
         if self._status.is_done and found is not None:
             is_kept = found.is_accepted
-            self._conclude(Outcome.ACCEPTED if is_kept else Outcome.REFUSED)
+            self._conclude(Ending.ACCEPTED if is_kept else Ending.REFUSED)
 
     def _give_up(self) -> None:
         """Conclude what was begun and is not done."""
         self._images.forget()
         if self._status.began is not None and not self._status.is_done:
-            self._conclude(Outcome.ABANDONED)
+            self._conclude(Ending.ABANDONED)
 
-    def _conclude(self, outcome: Outcome) -> None:
+    def _conclude(self, outcome: Ending) -> None:
         """Say what became of the verification, with all records of it."""
         status = self._status
         if status.tip is None or status.began is None:
