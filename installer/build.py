@@ -50,6 +50,7 @@ from installer.sbom import Component, bill_of_materials
 
 KILOBYTE = 1024
 CAMERAS = {"genicam", "harvesters"}
+STREAM = {"pyigtl", "crcmod"}
 
 
 class BuildError(Exception):
@@ -130,16 +131,17 @@ def build(out: Path, version: str = "", sign: str = "", fast: bool = False) -> P
 
 
 def shipped_pins() -> tuple[Pin, ...]:
-    """Return what is bundled: all that the program needs, and the extra "genicam".
+    """Return what is bundled: all that the program needs, and two of its extras.
 
-    An installed program cannot be added to, and without the extra it would have no
-    industrial camera. It is tested with the versions of requirements-dev.lock.
+    An installed program cannot be added to, and without "genicam" it would have no
+    industrial camera, without "stream" none could follow the pen. They are tested with
+    the versions of requirements-dev.lock.
     """
     program, development = (
         windows_pins((ROOT / name).read_text("utf-8"), runtime.VERSION)
         for name in ("requirements.lock", "requirements-dev.lock")
     )
-    extra = (pin for pin in development if pin.name in CAMERAS)
+    extra = (pin for pin in development if pin.name in CAMERAS | STREAM)
     return (*program, *extra)
 
 
