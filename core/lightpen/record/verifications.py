@@ -15,7 +15,7 @@ from lightpen.formats.own_json import (
 )
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import ProgramName
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.results import Why
 from lightpen.sentences import sentence
 
@@ -58,12 +58,12 @@ class KeptVerification(Struct, frozen=True):
         require_usual(self.created)
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> TrialOutcome:
         """What became of it: one that did not pass is refused, unless accepted so."""
-        if self.verification == Outcome.ABANDONED:
-            return Outcome.ABANDONED
+        if self.verification == TrialOutcome.ABANDONED:
+            return TrialOutcome.ABANDONED
         has_passed = self.verdict is None or self.verdict.grade == "pass"
-        return Outcome.ACCEPTED if has_passed else Outcome.REFUSED
+        return TrialOutcome.ACCEPTED if has_passed else TrialOutcome.REFUSED
 
     @property
     def why(self) -> Why | None:

@@ -17,7 +17,7 @@ from lightpen.formats.hashes import InputFile
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.numbered_files import add_numbered
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.verifications import VERIFICATIONS
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
@@ -178,7 +178,7 @@ def abandoned_record(
     return {
         "program": {"name": "lightpen", "version": version("lightpen")},
         "created": now.isoformat(timespec="seconds"),
-        "verification": Outcome.ABANDONED.value,
+        "verification": TrialOutcome.ABANDONED.value,
         "session": session.isoformat(timespec="seconds"),
         "station": names.station,
         "operator": names.operator,
