@@ -1,5 +1,6 @@
 """What a build downloads, each file checked by its hash, kept in the user's cache."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -17,14 +18,41 @@ WINDOWS = (
 )
 
 
+SOURCE = ("--no-binary", ":all:")
+WITHOUT_WHEELS = {"crcmod"}
+
+
 def download_runtime() -> Path:
     """Return the distribution that holds the Windows runtime."""
-    return _downloaded([runtime.REQUIREMENT], "runtime", ["--no-binary", ":all:"])[0]
+    return _downloaded([runtime.REQUIREMENT], "runtime", SOURCE)[0]
 
 
 def download_wheels(pins: Iterable[Pin]) -> list[Path]:
-    """Return the wheels for 64-bit Windows, in the order of their names."""
-    return _downloaded([pin.line() for pin in pins], "wheels", WINDOWS)
+    """Return the wheels for 64-bit Windows, in the order of their names.
+
+    Those that have none are built: they are of Python alone where no compiler is found.
+    """
+    wanted = list(pins)
+    lines = [pin.line() for pin in wanted if pin.name not in WITHOUT_WHEELS]
+    sources = [pin.line() for pin in wanted if pin.name in WITHOUT_WHEELS]
+    wheels = _downloaded(lines, "wheels", WINDOWS)
+    if sources:
+        wheels += [_built(source) for source in _downloaded(sources, "sources", SOURCE)]
+    return sorted(wheels, key=lambda path: path.name)
+
+
+def _built(source: Path) -> Path:
+    """Return the wheel of a source distribution, beside it, without compiled parts."""
+    folder = source.with_suffix(".wheel")
+    if not any(folder.glob("*.whl")):
+        words = ["wheel", "--quiet", "--no-deps", "--no-cache-dir"]
+        subprocess.run(
+            [*PIP, *words, "--wheel-dir", folder, source],
+            env=os.environ | {"CC": "false"},
+            check=True,
+        )
+    (wheel,) = folder.glob("*.whl")
+    return wheel
 
 
 def _downloaded(lines: list[str], what: str, options: Iterable[str]) -> list[Path]:
@@ -39,4 +67,5 @@ def _downloaded(lines: list[str], what: str, options: Iterable[str]) -> list[Pat
         pip = [*PIP, "download", "--quiet", "--no-deps", "--require-hashes", *options]
         subprocess.run([*pip, "--requirement", part, "--dest", folder], check=True)
         part.replace(done)  # last: an interrupted download is done again
-    return sorted(path for path in folder.iterdir() if path.suffix != ".txt")
+    found = (path for path in folder.iterdir() if path.is_file())
+    return sorted(path for path in found if path.suffix != ".txt")

@@ -69,6 +69,16 @@ def test_the_newest_entries_are_listed_first(lightpen: Run, data: Path) -> None:
     assert " 1.0000 0.0000 -1.5000" in second
 
 
+def test_entries_of_one_kind_are_listed(lightpen: Run, data: Path) -> None:
+    listed = ("archive", "list", "--data", data, "--kind")
+
+    assert len(lightpen(*listed, "accepted").stdout.splitlines()) == 3
+    assert lightpen(*listed, "verification").stdout.strip() == ""
+    unknown = lightpen(*listed, "moon")
+    assert unknown.returncode == 2
+    assert "moon is no kind of entry. There are: accepted, restored" in unknown.stderr
+
+
 def test_entries_are_listed_as_a_table(lightpen: Run, data: Path) -> None:
     words = ("--csv", "--since", "2026-01-01", "--until", "2026-01-31", "--data", data)
     result = lightpen("archive", "list", "--pen", "LP-04", *words)

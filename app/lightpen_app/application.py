@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -210,7 +211,7 @@ def run_demo(make_pages: MakePages) -> int:
     ):
         settings = Settings(Path(folder) / "lightpen.json")
         users = Settings(settings_file()).preferences()
-        settings.set_preferences(users)
+        settings.set_preferences(replace(users, streams=False))
         wizard = Wizard(application, make_pages, settings, Path(folder), around)
         demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:

@@ -21,7 +21,7 @@ from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, requir
 from lightpen.model.origin import Origin
 from lightpen.record.assumed import Plain
 from lightpen.record.names import Names
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.results import Since, Why
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
@@ -82,7 +82,7 @@ class Event(Struct, frozen=True):
         In the words of the operator; of a note its text.
     change : Since or None
         Since the tip as found, which was in force before.
-    outcome : Outcome or None
+    outcome : TrialOutcome or None
         What became of a verification or the calibration of a camera.
     swing : str
         Folder of the swing that it is of, as `FileHash.place`; may be empty.
@@ -109,7 +109,7 @@ class Event(Struct, frozen=True):
     grade: str = ""
     why: Why | None = None
     reason: str = ""
-    outcome: Outcome | None = None
+    outcome: TrialOutcome | None = None
     tip_pen_mm: Vector | None = None
     expanded_uncertainty_mm: Vector | None = None
     change: Since | None = None

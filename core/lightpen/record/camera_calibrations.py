@@ -25,7 +25,7 @@ from lightpen.intrinsics.views import BoardTolerances
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen.record.numbered_files import add_numbered
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.sentences import sentence
 
 CAMERA_CALIBRATIONS = "camera-calibrations"
@@ -49,7 +49,7 @@ class CameraTrial:
         That was written; None of one that was not accepted.
     """
 
-    outcome: Outcome
+    outcome: TrialOutcome
     board: str
     serial: str
     origin: Origin | None
@@ -73,7 +73,7 @@ class KeptTrial(Struct, frozen=True):
 
     program: ProgramName
     created: Moment
-    outcome: Outcome
+    outcome: TrialOutcome
     station: str
     operator: str
     board: str

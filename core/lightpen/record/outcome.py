@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 
-class Outcome(StrEnum):
+class TrialOutcome(StrEnum):
     """How a verification or the calibration of a camera ended."""
 
     ACCEPTED = "accepted"

@@ -15,7 +15,7 @@ from lightpen.formats.own_json import (
 )
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import ProgramName
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.results import Why
 from lightpen.sentences import sentence
 
@@ -49,7 +49,7 @@ class KeptVerification(Struct, frozen=True):
     ----------
     verification : str
         What was verified; "conclusion" of what says how all of it ended.
-    ended : Outcome or None
+    ended : TrialOutcome or None
         Of a conclusion.
     reason, supervisor : str
         Of a conclusion, where a tip is used though it did not pass.
@@ -64,7 +64,7 @@ class KeptVerification(Struct, frozen=True):
     tip: str = ""
     origin: Origin | None = None
     verdict: _Verdict | None = None
-    ended: Outcome | None = field(name="outcome", default=None)
+    ended: TrialOutcome | None = field(name="outcome", default=None)
     reason: str = ""
     supervisor: str = ""
     inputs: _Inputs = _Inputs()
@@ -73,12 +73,12 @@ class KeptVerification(Struct, frozen=True):
         require_usual(self.created)
 
     @property
-    def outcome(self) -> Outcome:
+    def outcome(self) -> TrialOutcome:
         """What became of it."""
         if self.ended is not None:
             return self.ended
         has_passed = self.verdict is None or self.verdict.grade == "pass"
-        return Outcome.ACCEPTED if has_passed else Outcome.REFUSED
+        return TrialOutcome.ACCEPTED if has_passed else TrialOutcome.REFUSED
 
     @property
     def why(self) -> Why | None:

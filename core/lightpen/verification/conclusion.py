@@ -14,7 +14,7 @@ from typing import Any
 
 from lightpen.estimation.report import plain
 from lightpen.formats.hashes import InputFile
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.verifications import CONCLUSION
 from lightpen.verification.assessment import Conformity
 from lightpen.verification.keeping import file_entry
@@ -37,7 +37,7 @@ class Conclusion:
         Who allowed it; empty where it took none.
     """
 
-    outcome: Outcome
+    outcome: TrialOutcome
     session: datetime
     at: datetime
     found: Conformity | None = None

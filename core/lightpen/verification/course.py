@@ -21,7 +21,7 @@ from lightpen.estimation.verdict import Grade
 from lightpen.formats.hashes import all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.supervision import Signature, require_supervisor
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
@@ -209,7 +209,7 @@ class VerificationCourse:
             require_supervisor(supervision, signature)
             supervisor = signature.name.strip()
         conclusion = Conclusion(
-            *(Outcome.ACCEPTED, began, self._now(), found, reason, supervisor)
+            *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
         file = self._write_next(_conclusion(tip, conclusion))
         self._relieve()
@@ -496,15 +496,15 @@ class VerificationCourse:
         found = self._status.assessment
         if self._status.is_done and found is not None:
             is_kept = found.is_accepted
-            self._conclude(Outcome.ACCEPTED if is_kept else Outcome.REFUSED)
+            self._conclude(TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED)
 
     def _give_up(self) -> None:
         """Conclude what was begun and is not done."""
         self._images.forget()
         if self._status.began is not None and not self._status.is_done:
-            self._conclude(Outcome.ABANDONED)
+            self._conclude(TrialOutcome.ABANDONED)
 
-    def _conclude(self, outcome: Outcome) -> None:
+    def _conclude(self, outcome: TrialOutcome) -> None:
         """Say what became of the verification, with all records of it."""
         status = self._status
         if status.tip is None or status.began is None:

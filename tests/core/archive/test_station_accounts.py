@@ -23,7 +23,7 @@ from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.names import Names
 from lightpen.record.numbered_files import add_numbered
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.verifications import CONCLUSION, VERIFICATIONS
 from lightpen.sentences import sentence
@@ -73,7 +73,7 @@ def test_a_verification_is_entered_with_who_what_and_the_hash_of_each_image(
     keep(tmp_path, Grade.PASS)
     (event,) = events(logbook)
 
-    assert (event.kind, event.outcome) == (Kind.VERIFICATION, Outcome.ACCEPTED)
+    assert (event.kind, event.outcome) == (Kind.VERIFICATION, TrialOutcome.ACCEPTED)
     assert (event.grade, event.origin) == ("pass", Origin.LIVE)
     assert event.names == Names("Hall 2", "Ann", "LP-04", "T-10")
     assert event.settings == {"verified": "circle", "max_radius_mm": 0.01}
@@ -101,7 +101,10 @@ def test_a_verification_that_did_not_pass_is_refused_until_somebody_accepts_it(
     add_numbered(tmp_path / VERIFICATIONS, record_bytes(conclusion))
 
     refused, accepted = events(logbook)
-    assert (refused.outcome, accepted.outcome) == (Outcome.REFUSED, Outcome.ACCEPTED)
+    assert (refused.outcome, accepted.outcome) == (
+        TrialOutcome.REFUSED,
+        TrialOutcome.ACCEPTED,
+    )
     assert (accepted.grade, accepted.reason) == ("repeat", "for a trial")
     assert accepted.settings["supervisor"] == "Eve"
 
@@ -115,15 +118,15 @@ def test_a_verification_of_a_simulated_pen_is_entered_as_practice(
     assert event.is_simulated
 
 
-@pytest.mark.parametrize("outcome", Outcome)
+@pytest.mark.parametrize("outcome", TrialOutcome)
 def test_the_calibration_of_a_camera_is_entered_whatever_became_of_it(
-    tmp_path: Path, logbook: Logbook, outcome: Outcome
+    tmp_path: Path, logbook: Logbook, outcome: TrialOutcome
 ) -> None:
     file = InputFile(Path("camera.yaml"), HASH)
     trial = CameraTrial(
         *(outcome, "chessboard:7x5:20", "21538392", Origin.LIVE),
         images={"1": HASH},
-        camera_file=file if outcome is Outcome.ACCEPTED else None,
+        camera_file=file if outcome is TrialOutcome.ACCEPTED else None,
     )
     keep_camera_trial(tmp_path, trial, NAMES, NOON)
 

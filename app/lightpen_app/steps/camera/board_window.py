@@ -40,7 +40,7 @@ from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -348,7 +348,7 @@ class BoardWindow(Translated, QWidget):
         words = self.tr("Saved and in use: {0}").format(file.path)
         self._remark.set_value(Remark(words, Sign.CHECK, Tone.GOOD))
         self._is_saved = True
-        self.concluded.emit(self._trial(Outcome.ACCEPTED, self._found, file))
+        self.concluded.emit(self._trial(TrialOutcome.ACCEPTED, self._found, file))
         self.saved.emit(str(file.path))
 
     # What became of it
@@ -361,17 +361,17 @@ class BoardWindow(Translated, QWidget):
         if self._found is not None:
             self._conclude_found()
         elif self._capture is not None and self._capture.kept:
-            self.concluded.emit(self._trial(Outcome.ABANDONED))
+            self.concluded.emit(self._trial(TrialOutcome.ABANDONED))
 
     def _conclude_found(self) -> None:
         """Tell that what was found is not used, unless it is."""
         if self._found is not None and not self._is_saved:
-            self.concluded.emit(self._trial(Outcome.REFUSED, self._found))
+            self.concluded.emit(self._trial(TrialOutcome.REFUSED, self._found))
         self._found = None
 
     def _trial(
         self,
-        outcome: Outcome,
+        outcome: TrialOutcome,
         found: CameraCalibration | None = None,
         file: InputFile | None = None,
     ) -> CameraTrial:

@@ -7,7 +7,7 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.history import Line, TipState
 from lightpen.estimation.verdict import Grade
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.theme import Tone
@@ -35,10 +35,10 @@ _KINDS: dict[Kind, str] = {
     Kind.CAMERA: QT_TRANSLATE_NOOP("history", "Camera calibration"),
     Kind.LIMITS: QT_TRANSLATE_NOOP("history", "Limits"),
 }
-_OUTCOMES: dict[Outcome, str] = {
-    Outcome.ACCEPTED: QT_TRANSLATE_NOOP("history", "accepted"),
-    Outcome.REFUSED: QT_TRANSLATE_NOOP("history", "refused"),
-    Outcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
+_OUTCOMES: dict[TrialOutcome, str] = {
+    TrialOutcome.ACCEPTED: QT_TRANSLATE_NOOP("history", "accepted"),
+    TrialOutcome.REFUSED: QT_TRANSLATE_NOOP("history", "refused"),
+    TrialOutcome.ABANDONED: QT_TRANSLATE_NOOP("history", "abandoned"),
 }
 _STATES: dict[TipState, str] = {
     TipState.IN_FORCE: QT_TRANSLATE_NOOP("history", "in force"),
@@ -112,7 +112,7 @@ def line_tone(line: Line, is_verdict: bool) -> Tone:
         return known.get(event.grade, Tone.PLAIN)
     if line.state is TipState.IN_FORCE:
         return Tone.GOOD
-    is_refused = event.kind is Kind.REFUSED or event.outcome is Outcome.REFUSED
+    is_refused = event.kind is Kind.REFUSED or event.outcome is TrialOutcome.REFUSED
     return Tone.WARN if is_refused else Tone.PLAIN
 
 

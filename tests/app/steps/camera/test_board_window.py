@@ -20,7 +20,7 @@ from lightpen.intrinsics.boards import parse_board
 from lightpen.live.looking import LiveImage
 from lightpen.model.camera import Camera
 from lightpen.record.camera_calibrations import CAMERA_CALIBRATIONS, CameraTrial
-from lightpen.record.outcome import Outcome
+from lightpen.record.outcome import TrialOutcome
 from lightpen.simulator.board_views import simulate_board_poses
 from lightpen.simulator.boards import expose_board, render_board
 from lightpen.simulator.sensor import Sensor
@@ -184,7 +184,10 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
         window.save(str(tmp_path / "camera.yaml"))
     window.close()
 
-    assert [each.outcome for each in told] == [Outcome.REFUSED, Outcome.ACCEPTED]
+    assert [each.outcome for each in told] == [
+        TrialOutcome.REFUSED,
+        TrialOutcome.ACCEPTED,
+    ]
     first = sha256((tmp_path / "0.png").read_bytes()).hexdigest()
     assert told[1].images["0.png"] == first
     kept = workbench.folder / CAMERA_CALIBRATIONS
@@ -208,7 +211,7 @@ def test_views_that_were_kept_and_never_computed_are_abandoned(
 
     (trial,) = told
     pixels = sha256(images[0].tobytes()).hexdigest()
-    assert (trial.outcome, trial.images) == (Outcome.ABANDONED, {"1": pixels})
+    assert (trial.outcome, trial.images) == (TrialOutcome.ABANDONED, {"1": pixels})
 
 
 def _shown(image: Image, seconds: int) -> Shown:

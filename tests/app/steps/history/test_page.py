@@ -25,11 +25,13 @@ from pytestqt.qtbot import QtBot
 from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.logbook import ARCHIVE
+from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.results import Result
+from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import Tip
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.due_panel import DuePanel
@@ -185,6 +187,44 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     QTest.keyClicks(desk.child(DateField), "2026-01-03")
     desk.until(lambda: desk.column(X) == ["2.0000", "1.0000"])
     assert desk.statuses[-1] == "2 entries"
+
+
+def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
+    desk: Desk,
+) -> None:
+    desk.enter(2)
+    folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
+    lay_down(folder, "Hall 2", StationLimits(), eve, "", NOON)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    assert sorted(desk.column(WHAT))[-2:] == ["Limits", "Limits"]
+
+    kinds = desk.child(QComboBox, 3)
+    kinds.setCurrentIndex(kinds.findText("Limits"))
+    desk.until(lambda: desk.column(WHAT) == ["Limits", "Limits"])
+    desk.select(0)
+    limit = f"max_radius_mm {StationLimits().verification.radius}"
+    desk.until(lambda: limit in _words(desk))
+
+
+def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
+    desk: Desk,
+) -> None:
+    desk.enter(MANY)
+    desk.open()
+    desk.select(0)
+    told: list[None] = []
+    desk.table.selection_changed.connect(lambda: told.append(None))
+    last = desk.table.model().index(MANY - 1, X, QModelIndex())
+
+    desk.table.scrollToBottom()
+    desk.until(lambda: last.data() == "0.0000")
+
+    assert told == []
+
+
+def _words(desk: Desk) -> str:
+    return " ".join(desk.child(EntryPanel).words()).replace("\u200b", "")
 
 
 def test_what_is_no_day_is_marked_and_chooses_nothing(desk: Desk) -> None:
