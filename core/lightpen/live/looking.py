@@ -270,9 +270,7 @@ class Live:
                 self._hand_over(frame, image.sighting, None)
             self._listener.on_image(image)
 
-    def _take_next(
-        self, captured: SwingSetup | Aim | None, rest: float | None
-    ) -> None:
+    def _take_next(self, captured: SwingSetup | Aim | None, rest: float | None) -> None:
         """Look at the next image, of two cameras at those of the next moment.
 
         Parameters
