@@ -4,7 +4,6 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from subprocess import CompletedProcess
 from typing import TYPE_CHECKING, Any
@@ -23,7 +22,6 @@ from PySide6.QtWidgets import (
 
 from lightpen.arrays import FloatArray
 from lightpen.live.sources import Surroundings
-from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.reading import open_record
 from lightpen.record.results import Result
@@ -244,11 +242,8 @@ def test_a_recorded_swing_gives_its_tip(
 
 
 def test_in_chinese_no_english_word_is_left(
-    settings: Settings, open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
+    settings: Settings, open_wizard: "OpenWizard"
 ) -> None:
-    # By its uncertainty alone, as in the other walks all fields of the dial are filled.
-    short = partial(SwingLimits, min_per_field=0)
-    monkeypatch.setattr("lightpen_app.work.workbench.SwingLimits", short)
     settings.set_preferences(Preferences(language=Language.CHINESE))
     station = Station("\u738b", "4", "10", "1", max_uncertainty=0.02, min_images=20)
     settings.set_station("2\u53f7", station)

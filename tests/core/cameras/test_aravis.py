@@ -111,10 +111,9 @@ def test_images_after_a_rest_are_new_and_none_is_missed(gige: GigeSimulator) -> 
         image = worker.next_frame(TIMEOUT).image
         behind.append((sent - int(image[0, 0])) % 256)
     worker.set_rest(None)
-    asleep.wait(0.5)  # an image may be under way
     n_delivered = worker.stats.delivered
-    asleep.wait(0.5)
-    assert worker.stats.delivered == n_delivered
+    asleep.wait(1.0)  # in which three come where it rests as before
+    assert worker.stats.delivered <= n_delivered + 1  # that was under way
     worker.set_rest(0.0)
     worker.measure(False)
     worker.measure(True)

@@ -405,11 +405,9 @@ def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
     workbench.wait_for_frames(3)
 
     workbench.worker.set_rest(None)
-    asleep = threading.Event()
-    asleep.wait(0.2)  # an image may be under way
     n_delivered = workbench.worker.stats.delivered
-    asleep.wait(0.3)
-    assert workbench.worker.stats.delivered == n_delivered
+    threading.Event().wait(0.3)
+    assert workbench.worker.stats.delivered <= n_delivered + 1  # that was under way
 
     workbench.camera.faults.unplug()
     lost = workbench.wait_until(Connection.LOST)
