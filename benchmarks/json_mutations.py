@@ -1,6 +1,7 @@
 """Seeded damage to files: flipped bits, and what a spiteful hand would write."""
 
 import json
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,8 @@ def _mutate(entries: dict[str, Any], rng: np.random.Generator) -> None:
         case 1 if isinstance(below, float):
             place[key] = below * float(rng.choice([-1.0, 10.0, 1e9, 1e-9]))
         case _:
-            place[key] = VALUES[int(rng.integers(len(VALUES)))]
+            # A copy, as the next change may be within it.
+            place[key] = deepcopy(VALUES[int(rng.integers(len(VALUES)))])
 
 
 def _mutated_bytes(content: bytes, rng: np.random.Generator) -> bytes:

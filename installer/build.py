@@ -68,7 +68,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         setup = build(
             options.out.absolute(), options.version, options.sign, options.fast
         )
-    except (BuildError, RuntimeFileError, ToolMissingError) as error:
+    except (
+        BuildError,
+        RuntimeFileError,
+        ToolMissingError,
+        subprocess.CalledProcessError,  # as of a command that cannot sign
+    ) as error:
         print(f"build.py: {error}", file=sys.stderr)
         return 1
     megabytes = setup.stat().st_size / 1e6

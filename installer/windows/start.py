@@ -3,6 +3,7 @@
 import ctypes
 import multiprocessing
 import os
+import platform
 import sys
 import traceback
 from contextlib import suppress
@@ -27,6 +28,9 @@ def start() -> int:
         os.add_dll_directory(sys.prefix)
     sys.dont_write_bytecode = True  # no file comes to those that were installed
     compiled_modules.install()
+    # Without _wmi it would ask a console for the version of Windows, at every start;
+    # without an answer it takes that which Windows told Python.
+    platform._syscmd_ver = lambda *unknown: ("", "", "")  # type: ignore[attr-defined]
     # Processes that it begins are the program itself, which is no python.exe.
     sys.frozen = True  # type: ignore[attr-defined]
     if sys.argv[1:2] == ["--multiprocessing-fork"]:
