@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from lightpen.model.origin import Origin
 from lightpen.record.names import Names
-from lightpen.record.standing import Standing, Standings
+from lightpen.record.standing import Standings, TipStanding
 from lightpen.record.tip_library import ItemKind
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import Tone, colors_of
@@ -24,32 +24,32 @@ if TYPE_CHECKING:
 else:
     from PySide6.QtCore import QT_TRANSLATE_NOOP
 
-_WORDS: dict[Standing, str] = {
-    Standing.VALID: QT_TRANSLATE_NOOP("standing", "valid"),
-    Standing.OVERDUE: QT_TRANSLATE_NOOP("standing", "OVERDUE"),
-    Standing.UNCALIBRATED: QT_TRANSLATE_NOOP("standing", "NOT CALIBRATED"),
-    Standing.RETIRED: QT_TRANSLATE_NOOP("standing", "RETIRED"),
+_WORDS: dict[TipStanding, str] = {
+    TipStanding.VALID: QT_TRANSLATE_NOOP("standing", "valid"),
+    TipStanding.OVERDUE: QT_TRANSLATE_NOOP("standing", "OVERDUE"),
+    TipStanding.UNCALIBRATED: QT_TRANSLATE_NOOP("standing", "NOT CALIBRATED"),
+    TipStanding.RETIRED: QT_TRANSLATE_NOOP("standing", "RETIRED"),
 }
-_MARKS: dict[Standing, tuple[Sign, Tone]] = {
-    Standing.VALID: (Sign.CHECK, Tone.GOOD),
-    Standing.OVERDUE: (Sign.WARNING, Tone.WARN),
-    Standing.UNCALIBRATED: (Sign.WARNING, Tone.WARN),
-    Standing.RETIRED: (Sign.CROSS, Tone.BAD),
+_MARKS: dict[TipStanding, tuple[Sign, Tone]] = {
+    TipStanding.VALID: (Sign.CHECK, Tone.GOOD),
+    TipStanding.OVERDUE: (Sign.WARNING, Tone.WARN),
+    TipStanding.UNCALIBRATED: (Sign.WARNING, Tone.WARN),
+    TipStanding.RETIRED: (Sign.CROSS, Tone.BAD),
 }
 _OF_KIND: dict[ItemKind, str] = {
     ItemKind.PEN: QT_TRANSLATE_NOOP("standing", "Pen {0}"),
     ItemKind.TIP: QT_TRANSLATE_NOOP("standing", "Tip {0}"),
     ItemKind.CONE: QT_TRANSLATE_NOOP("standing", "Cone {0}"),
 }
-WORST_FIRST = (Standing.RETIRED, Standing.OVERDUE, Standing.UNCALIBRATED)
+WORST_FIRST = (TipStanding.RETIRED, TipStanding.OVERDUE, TipStanding.UNCALIBRATED)
 
 
-def standing_text(standing: Standing) -> str:
+def standing_text(standing: TipStanding) -> str:
     """Return the word for how something stands."""
     return QCoreApplication.translate(CONTEXT, _WORDS[standing])
 
 
-def standing_remark(standing: Standing | None) -> Remark:
+def standing_remark(standing: TipStanding | None) -> Remark:
     """Return how something stands as a remark; none where that is not known."""
     if standing is None:
         return Remark()

@@ -30,7 +30,7 @@ from lightpen.record.reading import (
 )
 from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, record_inputs
-from lightpen.record.tip_library import ItemKind, Tip, item_entries, read_change
+from lightpen.record.tip_library import ItemKind, ListedTip, item_entries, read_change
 from lightpen.sentences import Sentence
 
 
@@ -86,7 +86,7 @@ def account_of_change(results: FolderArchive, file: Path) -> Account:
     """
     digest, change = file_sha256(file), read_change(file)
     item, picture = change.item, None
-    if isinstance(item, Tip):
+    if isinstance(item, ListedTip):
         picture = item.picture
     event = Event(
         kind=Kind.LIBRARY,

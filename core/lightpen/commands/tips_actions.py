@@ -39,11 +39,11 @@ from lightpen.record.supervision import Signature
 from lightpen.record.tip_library import (
     AnyItem,
     AxisOrigin,
-    Cone,
     ItemKind,
     Library,
-    Pen,
-    Tip,
+    ListedCone,
+    ListedPen,
+    ListedTip,
     read_library,
 )
 from lightpen.sentences import sentence
@@ -81,8 +81,11 @@ def _list(options: argparse.Namespace) -> None:
 
 @printing
 def _add(options: argparse.Namespace) -> None:
-    kinds: dict[ItemKind, type[AnyItem]] = {Pen.kind: Pen, Tip.kind: Tip}
-    made = kinds.get(ItemKind(options.kind), Cone)(id=options.id)
+    kinds: dict[ItemKind, type[AnyItem]] = {
+        ListedPen.kind: ListedPen,
+        ListedTip.kind: ListedTip,
+    }
+    made = kinds.get(ItemKind(options.kind), ListedCone)(id=options.id)
     item = _with_entries(made, options)
     _tell(options, item, add_item(_data(options), item, _author(options), local_now()))
 
@@ -109,7 +112,7 @@ def _return(options: argparse.Namespace) -> None:
 def _spin(options: argparse.Namespace) -> None:
     data = _data(options)
     tip = known_item(read_library(data), ItemKind.TIP, options.id)
-    assert isinstance(tip, Tip)
+    assert isinstance(tip, ListedTip)
     found = _spun(options)
     x, y, z = found.axis_pen.tolist()
     tip = structs.replace(tip, stylus_axis=(x, y, z), axis_origin=AxisOrigin.SPIN)
@@ -158,7 +161,7 @@ def _with_entries(item: AnyItem, options: argparse.Namespace) -> AnyItem:
     if options.due is not None:
         item = structs.replace(item, due=_said(options.due))
     said = dict(_entries_of_tip(options))
-    if said and not isinstance(item, Tip):
+    if said and not isinstance(item, ListedTip):
         raise UsageError(
             sentence(
                 "library.only-tips",
@@ -242,7 +245,7 @@ def _record(item: AnyItem, found: Standings) -> dict[str, Any]:
     entries |= {n: e for n, e in to_builtins(item).items() if n != "type"}
     standing = found.of_item(item.kind, item.id)
     entries["standing"] = "" if standing is None else standing.value
-    if isinstance(item, Tip):
+    if isinstance(item, ListedTip):
         entries["in_force"] = [
             {
                 "pen": pen,

@@ -38,8 +38,8 @@ from lightpen.record.tip_library import (
     ItemKind,
     Library,
     LibraryChange,
+    ListedTip,
     Picture,
-    Tip,
     read_library,
 )
 from lightpen.sentences import Sentence, sentence
@@ -229,10 +229,10 @@ def _sensible(item: AnyItem) -> AnyItem:
             )
         )
     item = structs.replace(item, id=name, note=item.note.strip())
-    return _sensible_tip(item) if isinstance(item, Tip) else item
+    return _sensible_tip(item) if isinstance(item, ListedTip) else item
 
 
-def _sensible_tip(tip: Tip) -> Tip:
+def _sensible_tip(tip: ListedTip) -> ListedTip:
     ball, change = tip.ball_diameter_mm, tip.max_change_mm
     if ball is not None and not 0 < ball <= LARGEST_BALL:
         raise UsageError(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from lightpen.errors import FileError
 from lightpen.record.archive import Archive
 from lightpen.record.results import Result
-from lightpen.record.tip_library import Library, Tip
+from lightpen.record.tip_library import Library, ListedTip
 
 MOST = 4  # tips that a pen has in use, as a rule
 
@@ -19,14 +19,14 @@ class NextTip:
     ----------
     last : Result or None
         In force for it; None where it was never calibrated with the pen.
-    listed : Tip or None
+    listed : ListedTip or None
         What the tip library says of it, if anything.
     """
 
     pen: str
     tip: str
     last: Result | None
-    listed: Tip | None
+    listed: ListedTip | None
 
 
 def next_tips(archive: Archive, present: Result) -> tuple[NextTip, ...]:

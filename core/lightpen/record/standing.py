@@ -9,7 +9,7 @@ from lightpen.local_time import local_time
 from lightpen.record.tip_library import Item, ItemKind, Library
 
 
-class Standing(StrEnum):
+class TipStanding(StrEnum):
     """Whether something may be measured with."""
 
     VALID = "valid"
@@ -45,20 +45,20 @@ class Standings:
     in_force: Mapping[tuple[str, str], InForce] = field(default_factory=dict)
     now: datetime | None = None
 
-    def of_tip(self, pen: str, tip: str) -> Standing | None:
+    def of_tip(self, pen: str, tip: str) -> TipStanding | None:
         """Return how a tip of a pen stands; None as long as that is not known."""
         if self.now is None or not (pen and tip):
             return None
         listed = self.library.tips.get(tip)
         if listed is not None and listed.is_retired:
-            return Standing.RETIRED
+            return TipStanding.RETIRED
         found = self.in_force.get((pen, tip))
         if found is None:
-            return Standing.UNCALIBRATED
+            return TipStanding.UNCALIBRATED
         is_over = listed is not None and listed.is_overdue(self._today(self.now))
-        return Standing.OVERDUE if is_over or found.is_due else Standing.VALID
+        return TipStanding.OVERDUE if is_over or found.is_due else TipStanding.VALID
 
-    def of_item(self, kind: ItemKind, name: str) -> Standing | None:
+    def of_item(self, kind: ItemKind, name: str) -> TipStanding | None:
         """Return how a pen or cone, or the ball of a tip, stands by itself.
 
         None of one that is not in the library.
@@ -67,9 +67,9 @@ class Standings:
         if item is None or self.now is None:
             return None
         if item.is_retired:
-            return Standing.RETIRED
+            return TipStanding.RETIRED
         is_over = item.is_overdue(self._today(self.now))
-        return Standing.OVERDUE if is_over else Standing.VALID
+        return TipStanding.OVERDUE if is_over else TipStanding.VALID
 
     def pens_of(self, tip: str) -> tuple[str, ...]:
         """Return the pens for which a tip is in force."""

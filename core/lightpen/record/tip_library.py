@@ -100,19 +100,19 @@ class Item(Struct, frozen=True, kw_only=True):
         return self.due is not None and today > self.due
 
 
-class Pen(Item, frozen=True, kw_only=True, tag="pen"):
+class ListedPen(Item, frozen=True, kw_only=True, tag="pen"):
     """A pen, by its serial number."""
 
     kind: ClassVar[ItemKind] = ItemKind.PEN
 
 
-class Cone(Item, frozen=True, kw_only=True, tag="cone"):
+class ListedCone(Item, frozen=True, kw_only=True, tag="cone"):
     """A cone."""
 
     kind: ClassVar[ItemKind] = ItemKind.CONE
 
 
-class Tip(Item, frozen=True, kw_only=True, tag="tip"):
+class ListedTip(Item, frozen=True, kw_only=True, tag="tip"):
     """A tip, on whatever pen.
 
     Attributes
@@ -157,7 +157,7 @@ class Tip(Item, frozen=True, kw_only=True, tag="tip"):
         )
 
 
-AnyItem: TypeAlias = Pen | Tip | Cone
+AnyItem: TypeAlias = ListedPen | ListedTip | ListedCone
 
 
 class LibraryChange(Struct, frozen=True, kw_only=True):
@@ -169,7 +169,7 @@ class LibraryChange(Struct, frozen=True, kw_only=True):
         Who made it.
     supervisor : str
         Who signed it, where a supervisor had to.
-    item : Pen, Tip or Cone
+    item : ListedPen, ListedTip or ListedCone
         As it is from then on.
     reason : str
         In the words of who made it; may be empty.
@@ -197,9 +197,9 @@ class Library:
         By their ids, in the order in which they came.
     """
 
-    pens: Mapping[str, Pen] = field(default_factory=dict)
-    tips: Mapping[str, Tip] = field(default_factory=dict)
-    cones: Mapping[str, Cone] = field(default_factory=dict)
+    pens: Mapping[str, ListedPen] = field(default_factory=dict)
+    tips: Mapping[str, ListedTip] = field(default_factory=dict)
+    cones: Mapping[str, ListedCone] = field(default_factory=dict)
 
     def items(self, kind: ItemKind) -> Mapping[str, AnyItem]:
         """Return the items of a kind by their ids."""
@@ -211,7 +211,7 @@ class Library:
         """Return an item by its id, if it is in the library."""
         return self.items(kind).get(name)
 
-    def tip_of_code(self, code: str) -> Tip | None:
+    def tip_of_code(self, code: str) -> ListedTip | None:
         """Return the tip of a barcode; a scanner may have turned its case round."""
         exact = self.tips.get(code)
         return exact or _alike(self.tips, code)
@@ -239,9 +239,9 @@ def read_library(data: Path) -> Library:
     for _, change in library_changes(data):
         found[change.item.kind][change.item.id] = change.item
     return Library(
-        pens=dict(_of(found, Pen)),
-        tips=dict(_of(found, Tip)),
-        cones=dict(_of(found, Cone)),
+        pens=dict(_of(found, ListedPen)),
+        tips=dict(_of(found, ListedTip)),
+        cones=dict(_of(found, ListedCone)),
     )
 
 

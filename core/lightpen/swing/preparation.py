@@ -29,7 +29,7 @@ from lightpen.record.names import Names
 from lightpen.record.reading import FileCopy, Header, RigCopies
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.record.results import Result
-from lightpen.record.tip_library import Tip
+from lightpen.record.tip_library import ListedTip
 from lightpen.swing.state import SwingSetup
 
 N_CAMERAS = 2  # that are live at once
@@ -292,7 +292,7 @@ class Preparation:
             nominal_tip = None
         return replace(self, names=names, nominal_tip=nominal_tip)
 
-    def with_listed(self, tip: Tip) -> Self:
+    def with_listed(self, tip: ListedTip) -> Self:
         """Return it for a tip of the library, whose ball and nominal centre it has."""
         names = replace(self.names, tip=tip.id, ball_diameter=tip.ball_diameter_mm)
         return replace(self, names=names, nominal_tip=tip.nominal_tip)

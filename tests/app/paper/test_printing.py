@@ -96,7 +96,7 @@ def test_what_an_auditor_asks_for_is_there(
         "Budget of uncertainty",
         "Change since 2025-12-01 / mm",
         "Tip as found / mm 1.0000 2.0000 3.0000",
-        "lay 0.0301 mm from the tip as left, BEYOND its limit of 0.02 mm",
+        "lay 0.030 mm from the tip as left, BEYOND its limit of 0.02 mm",
         "2026-01-02 12:00:00+00:00",
         "3.0005 mm",
         stated["inputs"]["camera"]["sha256"],

@@ -26,12 +26,12 @@ from lightpen.record.library_changes import (
     keep_picture,
     retire_item,
 )
-from lightpen.record.standing import Standing, Standings
+from lightpen.record.standing import Standings, TipStanding
 from lightpen.record.tip_library import (
-    Cone,
     ItemKind,
     Library,
-    Tip,
+    ListedCone,
+    ListedTip,
     library_files,
 )
 from lightpen.sentences import Sentence
@@ -59,7 +59,7 @@ def findings(data: Path) -> tuple[Sentence, ...]:
 def test_each_change_is_entered_once_with_who_when_and_what(
     tmp_path: Path, logbook: Logbook
 ) -> None:
-    tip = Tip(id="T-10", ball_diameter_mm=10.0, nominal_tip_mm=(0.0, 1.5, -150.0))
+    tip = ListedTip(id="T-10", ball_diameter_mm=10.0, nominal_tip_mm=(0.0, 1.5, -150.0))
     add_item(tmp_path, tip, ANN, NOON)
     assert logbook.enter_owed() == ()
     retire_item(tmp_path, ItemKind.TIP, "T-10", ANN, NOON + timedelta(days=1))
@@ -90,7 +90,7 @@ def test_a_changed_file_of_the_library_is_found(
     photo = tmp_path / "tip.png"
     cv2.imwrite(str(photo), np.zeros((4, 4), np.uint8))
     picture = keep_picture(tmp_path, photo)
-    add_item(tmp_path, Tip(id="T-10", picture=picture), ANN, NOON)
+    add_item(tmp_path, ListedTip(id="T-10", picture=picture), ANN, NOON)
     logbook.enter_owed()
     (file,) = library_files(tmp_path)
     for changed in (file, tmp_path / picture.place):
@@ -102,7 +102,7 @@ def test_a_changed_file_of_the_library_is_found(
 def test_a_damaged_file_of_the_library_stays_owed_and_is_told(
     tmp_path: Path, logbook: Logbook
 ) -> None:
-    add_item(tmp_path, Cone(id="C-1"), ANN, NOON)
+    add_item(tmp_path, ListedCone(id="C-1"), ANN, NOON)
     (file,) = library_files(tmp_path)
     sound = file.read_bytes()
     file.write_bytes(sound.replace(b"C-1", b"C-2"))
@@ -124,31 +124,35 @@ def test_tips_are_valid_overdue_not_calibrated_or_retired(station: Station) -> N
     append(station.database, station.chain, *accepted(0))
     library = Library()
 
-    assert stand(station, library, 29).of_tip("LP-04", "T-10") is Standing.VALID
-    assert stand(station, library, 31).of_tip("LP-04", "T-10") is Standing.OVERDUE
-    assert stand(station, library, 1).of_tip("LP-05", "T-10") is Standing.UNCALIBRATED
-    retired = Library(tips={"T-10": Tip(id="T-10", is_retired=True)})
-    assert stand(station, retired, 1).of_tip("LP-04", "T-10") is Standing.RETIRED
+    assert stand(station, library, 29).of_tip("LP-04", "T-10") is TipStanding.VALID
+    assert stand(station, library, 31).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
+    assert (
+        stand(station, library, 1).of_tip("LP-05", "T-10") is TipStanding.UNCALIBRATED
+    )
+    retired = Library(tips={"T-10": ListedTip(id="T-10", is_retired=True)})
+    assert stand(station, retired, 1).of_tip("LP-04", "T-10") is TipStanding.RETIRED
     assert Standings().of_tip("LP-04", "T-10") is None  # nothing was read yet
 
 
 def test_a_tip_is_due_by_its_own_rule_or_its_own_date(station: Station) -> None:
     append(station.database, station.chain, *accepted(0))
-    weekly = Library(tips={"T-10": Tip(id="T-10", max_days=7)})
-    dated = Library(tips={"T-10": Tip(id="T-10", due=date(2026, 1, 3))})
+    weekly = Library(tips={"T-10": ListedTip(id="T-10", max_days=7)})
+    dated = Library(tips={"T-10": ListedTip(id="T-10", due=date(2026, 1, 3))})
 
-    assert stand(station, weekly, 8).of_tip("LP-04", "T-10") is Standing.OVERDUE
-    assert stand(station, dated, 8).of_tip("LP-04", "T-10") is Standing.OVERDUE
+    assert stand(station, weekly, 8).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
+    assert stand(station, dated, 8).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
     assert stand(station, dated, 8).due("LP-04", "T-10") == date(2026, 1, 3)
     (tip,) = due_tips(station.database, station.chain, RULE, weekly)
     assert tip.due == NOON + timedelta(days=7)
 
 
 def test_a_cone_is_overdue_after_its_date(tmp_path: Path, station: Station) -> None:
-    cone = Cone(id="C-1", due=date(2026, 1, 3))
+    cone = ListedCone(id="C-1", due=date(2026, 1, 3))
     add_item(tmp_path, cone, ANN, NOON)
     library = change_item(tmp_path, cone, ANN, NOON)
 
-    assert stand(station, library, 0).of_item(ItemKind.CONE, "C-1") is Standing.VALID
-    assert stand(station, library, 3).of_item(ItemKind.CONE, "C-1") is Standing.OVERDUE
+    assert stand(station, library, 0).of_item(ItemKind.CONE, "C-1") is TipStanding.VALID
+    assert (
+        stand(station, library, 3).of_item(ItemKind.CONE, "C-1") is TipStanding.OVERDUE
+    )
     assert stand(station, library, 3).of_item(ItemKind.CONE, "C-2") is None

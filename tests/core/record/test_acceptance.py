@@ -26,7 +26,7 @@ from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.reading import open_record, recorded_names
 from lightpen.record.results import Result, Why
 from lightpen.record.solving import Solution, load_image, solve_again, solve_record
-from lightpen.record.tip_library import Cone, ItemKind, Tip, library_files
+from lightpen.record.tip_library import ItemKind, ListedCone, ListedTip, library_files
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter, note_taken_out
 from lightpen.simulator.swings import swing_poses
@@ -307,7 +307,7 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
     limit = 0.5 * float(np.linalg.norm(u))
     name = recorded_names(open_record(passing.source.folder)).tip
     data = case.archive.folder.parent
-    add_item(data, Tip(id=name, max_change_mm=limit), Author(), NOON)
+    add_item(data, ListedTip(id=name, max_change_mm=limit), Author(), NOON)
 
     with pytest.raises(AcceptanceError, match="its limit is"):
         accept(case.archive, passing, LATER)
@@ -328,7 +328,7 @@ def test_a_change_beyond_the_limit_of_the_tip_is_accepted_only_with_a_reason(
 def test_an_overdue_cone_is_told_with_the_result(case: Case) -> None:
     cone = recorded_names(open_record(case.folder)).cone
     data = case.archive.folder.parent
-    add_item(data, Cone(id=cone, due=date(2020, 1, 1)), Author(), NOON)
+    add_item(data, ListedCone(id=cone, due=date(2020, 1, 1)), Author(), NOON)
 
     case.accept()
     told = {doubt.code: doubt.text for doubt in case.in_force().doubts}
@@ -339,7 +339,7 @@ def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:
     passing = _passing(case)
     name = recorded_names(open_record(passing.source.folder)).tip
     data = case.archive.folder.parent
-    add_item(data, Tip(id=name), Author(), NOON)
+    add_item(data, ListedTip(id=name), Author(), NOON)
     retire_item(data, ItemKind.TIP, name, Author(), NOON)
 
     with pytest.raises(AcceptanceError, match="is retired and cannot be put in force"):
@@ -349,7 +349,7 @@ def test_a_retired_tip_is_not_put_in_force(case: Case) -> None:
 def test_a_tip_of_a_damaged_library_is_to_be_checked(case: Case) -> None:
     passing = _passing(case)
     data = case.archive.folder.parent
-    add_item(data, Tip(id="T-99"), Author(), NOON)
+    add_item(data, ListedTip(id="T-99"), Author(), NOON)
     (file,) = library_files(data)
     file.write_bytes(file.read_bytes().replace(b"T-99", b"T-98"))
 

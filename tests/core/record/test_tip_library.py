@@ -21,11 +21,11 @@ from lightpen.record.supervision import Signature, set_password
 from lightpen.record.tip_library import (
     LIBRARY,
     AxisOrigin,
-    Cone,
     ItemKind,
     Library,
-    Pen,
-    Tip,
+    ListedCone,
+    ListedPen,
+    ListedTip,
     library_changes,
     library_files,
     read_library,
@@ -33,7 +33,7 @@ from lightpen.record.tip_library import (
 
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 ANN = Author("Hall 2", "Ann", "worn")
-TIP = Tip(id="T-10", ball_diameter_mm=10.0, nominal_tip_mm=(0.0, 0.0, -150.0))
+TIP = ListedTip(id="T-10", ball_diameter_mm=10.0, nominal_tip_mm=(0.0, 0.0, -150.0))
 
 
 def test_a_folder_without_a_library_has_an_empty_one(tmp_path: Path) -> None:
@@ -42,8 +42,8 @@ def test_a_folder_without_a_library_has_an_empty_one(tmp_path: Path) -> None:
 
 def test_pens_tips_and_cones_are_known_by_their_ids(tmp_path: Path) -> None:
     add_item(tmp_path, TIP, ANN, NOON)
-    add_item(tmp_path, Pen(id="LP-04", due=date(2032, 1, 1)), ANN, NOON)
-    library = add_item(tmp_path, Cone(id="C-1"), ANN, NOON)
+    add_item(tmp_path, ListedPen(id="LP-04", due=date(2032, 1, 1)), ANN, NOON)
+    library = add_item(tmp_path, ListedCone(id="C-1"), ANN, NOON)
 
     assert library == read_library(tmp_path)
     assert library.item(ItemKind.TIP, "T-10") == TIP
@@ -82,8 +82,8 @@ def test_an_id_that_is_in_use_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(
         UsageError, match=r"tip T-10 is in the library already\. Change"
     ):
-        add_item(tmp_path, Tip(id=name), ANN, NOON)
-    assert add_item(tmp_path, Pen(id="T-10"), ANN, NOON).pens  # a pen is no tip
+        add_item(tmp_path, ListedTip(id=name), ANN, NOON)
+    assert add_item(tmp_path, ListedPen(id="T-10"), ANN, NOON).pens  # a pen is no tip
 
 
 def test_the_id_of_a_retired_tip_is_refused_with_what_to_do(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_an_axis_is_kept_as_a_direction_with_where_it_is_from(tmp_path: Path) ->
 
 
 def test_a_tip_has_a_rule_of_its_own_or_that_of_the_station() -> None:
-    usual, own = DueRule(30, 0), Tip(id="T", max_days=7)
+    usual, own = DueRule(30, 0), ListedTip(id="T", max_days=7)
 
     library = Library(tips={"T": own})
     assert library.rule_of("T", usual) == DueRule(7, 0)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from lightpen.record.next_tips import NextTip
-from lightpen.record.standing import Standing, Standings
+from lightpen.record.standing import Standings, TipStanding
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED, shortened
 from lightpen_app.widgets.push_button import PushButton
@@ -88,4 +88,4 @@ class NextTipsRow(Translated, QWidget):
         if each.last is not None and each.last.is_simulated:
             return Remark()
         standing = self._standings.of_tip(each.pen, each.tip)
-        return Remark() if standing is Standing.VALID else standing_remark(standing)
+        return Remark() if standing is TipStanding.VALID else standing_remark(standing)

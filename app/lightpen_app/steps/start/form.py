@@ -23,7 +23,7 @@ from lightpen.record.names import Names
 from lightpen.record.tip_library import ItemKind
 from lightpen.swing.preparation import Lack
 from lightpen_app.look.theme import GRID
-from lightpen_app.steps.start.item_button import Choice, ItemButton
+from lightpen_app.steps.start.item_button import ItemButton, ItemChoice
 from lightpen_app.steps.start.point_field import PointField
 from lightpen_app.steps.start.station_field import LONGEST_NAME, StationField
 from lightpen_app.widgets.labelled import field_label, stacked
@@ -142,7 +142,7 @@ class NamesForm(Translated, QWidget):
         """List the stations that are known."""
         self._station.set_known(names)
 
-    def set_choices(self, kind: ItemKind, choices: Sequence[Choice]) -> None:
+    def set_choices(self, kind: ItemKind, choices: Sequence[ItemChoice]) -> None:
         """List the items of the library that can be chosen."""
         self._lists[kind].set_choices(choices)
 

@@ -14,7 +14,7 @@ from lightpen_app.widgets.translated import Translated
 
 
 @dataclass(frozen=True)
-class Choice:
+class ItemChoice:
     """An item to choose, and how it stands."""
 
     name: str
@@ -36,17 +36,17 @@ class ItemButton(Translated, PushButton):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(0, parent)
-        self._choices: tuple[Choice, ...] = ()
+        self._choices: tuple[ItemChoice, ...] = ()
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a name's arrow key opens it
         self._menu = QMenu(self)
         self.setMenu(self._menu)
         self._retranslate()
 
-    def choices(self) -> tuple[Choice, ...]:
+    def choices(self) -> tuple[ItemChoice, ...]:
         """Return what can be chosen."""
         return self._choices
 
-    def set_choices(self, choices: Sequence[Choice]) -> None:
+    def set_choices(self, choices: Sequence[ItemChoice]) -> None:
         """Let other items be chosen."""
         self._choices = tuple(choices)
         self._fill()

@@ -24,10 +24,10 @@ from lightpen.record.tip_library import (
     MOST_SWINGS,
     AnyItem,
     AxisOrigin,
-    Cone,
     ItemKind,
-    Pen,
-    Tip,
+    ListedCone,
+    ListedPen,
+    ListedTip,
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.start.point_field import AXES, PointField
@@ -40,9 +40,9 @@ from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
 MADE: dict[ItemKind, Callable[..., AnyItem]] = {
-    ItemKind.PEN: Pen,
-    ItemKind.TIP: Tip,
-    ItemKind.CONE: Cone,
+    ItemKind.PEN: ListedPen,
+    ItemKind.TIP: ListedTip,
+    ItemKind.CONE: ListedCone,
 }
 
 
@@ -62,7 +62,7 @@ class ItemForm(Translated, QWidget):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._item: AnyItem = Tip(id="?")
+        self._item: AnyItem = ListedTip(id="?")
 
         # Widgets
         self._id = QLineEdit()
@@ -144,7 +144,7 @@ class ItemForm(Translated, QWidget):
             due=self._due.value(),
             note=self._note.text().strip(),
         )
-        if not isinstance(item, Tip):
+        if not isinstance(item, ListedTip):
             return item
         nominal, axis = self._nominal.value(), self._typed_axis()
         if self._spun is not None and _alike(axis, self._spun):
@@ -192,9 +192,9 @@ class ItemForm(Translated, QWidget):
         self._due.set_value(item.due)
         self._note.setText(item.note)
         self._picture.set_value("")
-        is_tip = isinstance(item, Tip)
+        is_tip = isinstance(item, ListedTip)
         self._tip_only.setVisible(is_tip)
-        if isinstance(item, Tip):
+        if isinstance(item, ListedTip):
             self._ball.setValue(item.ball_diameter_mm or 0.0)
             self._change.setValue(item.max_change_mm or 0.0)
             self._days.setValue(item.max_days or 0)
@@ -291,7 +291,7 @@ class ItemForm(Translated, QWidget):
             )
         )
         self._browse.setText(self.tr("Browse..."))
-        kept = self._item.picture if isinstance(self._item, Tip) else None
+        kept = self._item.picture if isinstance(self._item, ListedTip) else None
         self._picture.edit().setPlaceholderText("" if kept is None else kept.place)
 
 

@@ -16,12 +16,12 @@ from lightpen.record.library_changes import (
     change_item,
     keep_picture,
 )
-from lightpen.record.tip_library import AnyItem, ItemKind, Library, Tip
+from lightpen.record.tip_library import AnyItem, ItemKind, Library, ListedTip
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.start.barcode import BarcodeListener
 from lightpen_app.steps.start.form import NamesForm
-from lightpen_app.steps.start.item_button import Choice
+from lightpen_app.steps.start.item_button import ItemChoice
 from lightpen_app.steps.start.library_dialog import Asked, LibraryDialog
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -95,7 +95,7 @@ class LibraryControl(QObject):
         dialog.open()
         return dialog
 
-    def tip(self, name: str) -> Tip | None:
+    def tip(self, name: str) -> ListedTip | None:
         """Return a tip of the library."""
         return self._watch.library.tips.get(name)
 
@@ -127,7 +127,7 @@ class LibraryControl(QObject):
             if form is not None:
                 form.set_spun_axis((x, y, z))
 
-    def _choices(self, kind: ItemKind, pen: str) -> tuple[Choice, ...]:
+    def _choices(self, kind: ItemKind, pen: str) -> tuple[ItemChoice, ...]:
         """Return the items that can be chosen; a simulated tip is never due."""
         found, standings = [], self._watch.standings
         is_simulated = self._workbench.preparation.origin is Origin.SIMULATED
@@ -136,7 +136,7 @@ class LibraryControl(QObject):
             if kind is ItemKind.TIP and not is_simulated:
                 standing = standings.of_tip(pen, item.id) or standing
             if not item.is_retired:
-                found.append(Choice(item.id, standing_remark(standing)))
+                found.append(ItemChoice(item.id, standing_remark(standing)))
         return tuple(found)
 
     def _on_scanned(self, code: str) -> None:
@@ -174,7 +174,7 @@ class LibraryControl(QObject):
 def _changed(folder: Path, asked: Asked, by: Author, now: datetime) -> Library:
     """Make a change; its picture first."""
     item: AnyItem = asked.item
-    if asked.picture and isinstance(item, Tip):
+    if asked.picture and isinstance(item, ListedTip):
         item = structs.replace(item, picture=keep_picture(folder, Path(asked.picture)))
     make = partial(add_item if asked.is_new else change_item, folder)
     return make(item, by, now)

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.record.standing import Standing, Standings
+from lightpen.record.standing import Standings, TipStanding
 from lightpen.record.supervision import Signature
-from lightpen.record.tip_library import AnyItem, ItemKind, Tip
+from lightpen.record.tip_library import AnyItem, ItemKind, ListedTip
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
@@ -240,11 +240,11 @@ class LibraryDialog(Translated, QDialog):
     def _row(self, item: AnyItem) -> list[QStandardItem]:
         standing, due = self._standings.of_item(item.kind, item.id), item.due
         ball, change, pens = "", "", ""
-        if isinstance(item, Tip):
+        if isinstance(item, ListedTip):
             ball = "" if item.ball_diameter_mm is None else f"{item.ball_diameter_mm:g}"
             change = "" if item.max_change_mm is None else f"{item.max_change_mm:g}"
             pens = PARTED.join(self._standings.pens_of(item.id))
-            if self._pen and standing is not Standing.RETIRED:
+            if self._pen and standing is not TipStanding.RETIRED:
                 standing = self._standings.of_tip(self._pen, item.id)
                 due = self._standings.due(self._pen, item.id) or due
         remark = standing_remark(standing)

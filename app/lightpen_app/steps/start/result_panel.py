@@ -18,7 +18,7 @@ from lightpen.estimation.verdict import Grade
 from lightpen.local_time import local_time
 from lightpen.record.due_rule import DueRule
 from lightpen.record.results import Result
-from lightpen.record.standing import Standing
+from lightpen.record.standing import TipStanding
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
@@ -85,7 +85,7 @@ class LastResultPanel(Translated, QGroupBox):
         super().__init__(parent)
         self._now = now
         self._value = LastResult()
-        self._marked: Standing | None = None
+        self._marked: TipStanding | None = None
 
         # Widgets
         self._age = text_label(TextSize.TITLE)
@@ -168,9 +168,9 @@ class LastResultPanel(Translated, QGroupBox):
         self._question.hide()
         self._retranslate()
 
-    def set_standing(self, standing: Standing | None) -> None:
+    def set_standing(self, standing: TipStanding | None) -> None:
         """Mark a tip that must not be measured with; None where that is not known."""
-        self._marked = None if standing is Standing.VALID else standing
+        self._marked = None if standing is TipStanding.VALID else standing
         self._standing.set_value(standing_remark(self._marked))
 
     def set_why_unverified(self, why_not: str) -> None:

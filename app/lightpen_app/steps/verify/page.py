@@ -12,7 +12,7 @@ from typing_extensions import override
 
 from lightpen.estimation.verdict import Grade
 from lightpen.model.origin import Origin
-from lightpen.record.standing import Standing
+from lightpen.record.standing import TipStanding
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.status import Reading, SessionHappening
 from lightpen_app.look.grades import GRADE_MARKS
@@ -170,7 +170,7 @@ class VerifyPage(Rearranged, Page):
         if tip is None or self._workbench.preparation.origin is Origin.SIMULATED:
             return ""
         standing = standings.of_tip(tip.names.pen, tip.names.tip)
-        return "" if standing in (None, Standing.VALID) else standing_text(standing)
+        return "" if standing in (None, TipStanding.VALID) else standing_text(standing)
 
     @override
     def is_complete(self) -> bool:

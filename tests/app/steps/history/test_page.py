@@ -32,7 +32,7 @@ from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
-from lightpen.record.tip_library import Tip
+from lightpen.record.tip_library import ListedTip
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
@@ -301,7 +301,9 @@ def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
 
 
 def test_a_change_of_the_tip_library_is_shown_with_what_it_says(desk: Desk) -> None:
-    tip = Tip(id="T-10", ball_diameter_mm=6.0, max_change_mm=0.02, is_retired=True)
+    tip = ListedTip(
+        id="T-10", ball_diameter_mm=6.0, max_change_mm=0.02, is_retired=True
+    )
     add_item(desk.workbench.folder, tip, Author("Hall 2", "Ann", "chipped"), NOON)
     desk.workbench.run.logbook.opened().enter_owed()
     desk.open()

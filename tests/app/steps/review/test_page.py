@@ -40,7 +40,7 @@ from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.results import Result
-from lightpen.record.tip_library import Tip
+from lightpen.record.tip_library import ListedTip
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.image_plans import ImagePlan, render_plan
 from lightpen.simulator.postures import Postures
@@ -578,8 +578,8 @@ def test_the_next_tip_is_one_click_away_with_its_ball_and_nominal_centre(
 
 def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) -> None:
     workbench = bed.solve()
-    listed = Tip(id="T-12", ball_diameter_mm=3.0)
-    for each in (listed, Tip(id="T-13", is_retired=True)):
+    listed = ListedTip(id="T-12", ball_diameter_mm=3.0)
+    for each in (listed, ListedTip(id="T-13", is_retired=True)):
         add_item(workbench.folder, each, Author(), THEN)
     page = bed.show()
     page.run_main_action()
@@ -595,7 +595,7 @@ def test_a_tip_of_the_library_that_was_never_calibrated_can_be_next(bed: Bed) ->
 
 
 def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
-    listed = Tip(id="T-10", max_change_mm=0.05)
+    listed = ListedTip(id="T-10", max_change_mm=0.05)
     add_item(bed.workbench.folder, listed, Author(), THEN)
     bed.solve_after([0.0, 0.06, 0.08])
 

@@ -19,11 +19,11 @@ from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.supervision import Signature, set_password
 from lightpen.record.tip_library import (
     AxisOrigin,
-    Cone,
     ItemKind,
     Library,
-    Pen,
-    Tip,
+    ListedCone,
+    ListedPen,
+    ListedTip,
     library_changes,
     library_files,
     read_library,
@@ -41,7 +41,7 @@ from lightpen_app.work.workbench import Workbench
 
 LEFT = Qt.MouseButton.LeftButton
 ANN = Author("Hall 2", "Ann")
-TIP = Tip(id="T-7", ball_diameter_mm=6.0, nominal_tip_mm=(0.0, -80.0, -20.0))
+TIP = ListedTip(id="T-7", ball_diameter_mm=6.0, nominal_tip_mm=(0.0, -80.0, -20.0))
 
 
 class Desk:
@@ -84,7 +84,7 @@ class Desk:
             QThreadPool.globalInstance().waitForDone()
             QCoreApplication.processEvents()
 
-    def add(self, *items: Pen | Tip | Cone) -> None:
+    def add(self, *items: ListedPen | ListedTip | ListedCone) -> None:
         for item in items:
             add_item(self.data, item, ANN, local_now())
         self.workbench.library.refresh()
@@ -142,7 +142,7 @@ def of_real_pen(workbench: Workbench, tmp_path: Path) -> None:
 
 
 def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -> None:
-    desk.add(TIP, Tip(id="T-8"))
+    desk.add(TIP, ListedTip(id="T-8"))
 
     assert desk.control("List of tips") is desk.names.list_of(ItemKind.TIP)
     desk.names.list_of(ItemKind.TIP).menu().actions()[0].trigger()
@@ -155,7 +155,7 @@ def test_a_tip_is_exchanged_by_two_clicks_with_its_ball_and_centre(desk: Desk) -
 
 
 def test_pens_and_cones_are_chosen_from_their_lists(desk: Desk) -> None:
-    desk.add(Pen(id="LP-9"), Cone(id="C-9"))
+    desk.add(ListedPen(id="LP-9"), ListedCone(id="C-9"))
 
     for kind in (ItemKind.PEN, ItemKind.CONE):
         button = desk.names.list_of(kind)
@@ -179,7 +179,7 @@ def test_a_tip_that_is_typed_brings_its_ball_from_the_library(desk: Desk) -> Non
 def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
     desk: Desk,
 ) -> None:
-    desk.add(TIP, Cone(id="C-1", due=date(2020, 1, 1)))
+    desk.add(TIP, ListedCone(id="C-1", due=date(2020, 1, 1)))
     desk.names.list_of(ItemKind.TIP).chosen.emit("T-7")
     cone = desk.workbench.preparation.names.cone
     desk.settle()
@@ -336,7 +336,7 @@ def test_where_a_password_guards_a_supervisor_signs(desk: Desk) -> None:
 
 def test_the_axis_of_a_spin_stays_one_until_it_is_typed_anew(desk: Desk) -> None:
     axis = (0.123456789, 0.98, 0.15)
-    desk.add(Tip(id="T-7", stylus_axis=axis, axis_origin=AxisOrigin.SPIN))
+    desk.add(ListedTip(id="T-7", stylus_axis=axis, axis_origin=AxisOrigin.SPIN))
     before = desk.library.tips["T-7"]
     desk.names.library_requested.emit(ItemKind.TIP)
     desk.click("Change...")
