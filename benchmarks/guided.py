@@ -53,7 +53,7 @@ FEED_SHARE = 0.5  # of the period between images, that an image may take
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class GuidedSwing:
     """What one swing took."""
 
     n_images: int
@@ -105,7 +105,7 @@ def guided_rows(workers: Workers) -> list[Row]:
     ]
 
 
-def _swing(seed: int, kind: str) -> Outcome:
+def _swing(seed: int, kind: str) -> GuidedSwing:
     limits = SwingLimits(
         max_uncertainty=U_LIMIT, min_images=0, min_per_field=0, max_images=MAX_IMAGES
     )
@@ -134,7 +134,7 @@ def _swing(seed: int, kind: str) -> Outcome:
         if wish is not None and wish is not aim:
             operator.lean_towards(wish.tilt, wish.direction, wish.turn)
             aim = wish
-    return Outcome(
+    return GuidedSwing(
         state.n_kept, clock.now_ns() * 1e-9 - began, _errors(state), 1000 * slowest
     )
 
@@ -188,10 +188,10 @@ def _errors(state: SwingState) -> FloatArray:
     return np.asarray((state.kept.seat.tip_pen - PAPER_TIP) / deviations)
 
 
-def _mean_images(outcomes: Sequence[Outcome]) -> float:
+def _mean_images(outcomes: Sequence[GuidedSwing]) -> float:
     return float(np.mean([outcome.n_images for outcome in outcomes]))
 
 
-def _range(outcomes: Sequence[Outcome]) -> str:
+def _range(outcomes: Sequence[GuidedSwing]) -> str:
     counts = [outcome.n_images for outcome in outcomes]
     return f"{_mean_images(outcomes):.0f} ({min(counts)} to {max(counts)})"

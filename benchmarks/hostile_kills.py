@@ -44,7 +44,7 @@ Check = Callable[[Path, list[str]], bool]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class KillCount:
     """What became of the writes of a kind.
 
     Attributes
@@ -79,7 +79,7 @@ def hostile_kill_rows() -> list[Row]:
     ]
 
 
-def killed(kind: str, n_kills: int) -> Outcome:
+def killed(kind: str, n_kills: int) -> KillCount:
     """Kill a process again and again while it writes; return what was left."""
     rng = np.random.default_rng(SEED)
     n_sound = n_told = n_left = 0
@@ -95,7 +95,7 @@ def killed(kind: str, n_kills: int) -> Outcome:
                 n_told += len(told)
                 n_sound += CHECKS[kind](data, told)
                 n_left += _n_left_after_start(data)
-    return Outcome(n_told, n_sound, n_left)
+    return KillCount(n_told, n_sound, n_left)
 
 
 def _told_until_killed(victim: "subprocess.Popen[str]", seconds: float) -> list[str]:

@@ -41,7 +41,7 @@ Acknowledged = set[tuple[str, int]]
 
 
 @dataclass
-class Tally:
+class Losses:
     """What became of the acknowledged images.
 
     Attributes
@@ -98,9 +98,9 @@ def killed_rows() -> list[Row]:
     ]
 
 
-def _killed_again_and_again(folder: Path) -> Tally:
+def _killed_again_and_again(folder: Path) -> Losses:
     rng = np.random.default_rng(SEED)
-    tally = Tally()
+    tally = Losses()
     for n_images in rng.integers(1, MOST_IMAGES + 1, N_KILLS).tolist():
         before = find_unfinished(folder / "records").interrupted
         kept, resumed = _killed_once(folder, n_images, rng.uniform(0, SOON))

@@ -36,7 +36,7 @@ KINDS = {  # LEDs missing, lamps
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RandomView:
     """The spots of one image and the truth about them.
 
     Attributes
@@ -71,7 +71,7 @@ def labelling_rows(workers: Workers) -> list[Row]:
     return rows
 
 
-def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> View:
+def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> RandomView:
     """Return a view with LEDs missing and, among them, lamps of their size."""
     R, t = _random_pose(rng)
     leds = PEN.leds + rng.normal(0, LED_SIGMA, PEN.leds.shape)
@@ -90,10 +90,12 @@ def random_view(rng: np.random.Generator, n_missing: int, n_lamps: int) -> View:
     order = rng.permutation(len(centers))
     spot = np.full(PEN.n_leds, -1)
     spot[seen] = np.argsort(order)[: len(seen)]
-    return View(_spots(np.array(centers)[order], np.array(shapes)[order]), spot, R, t)
+    return RandomView(
+        _spots(np.array(centers)[order], np.array(shapes)[order]), spot, R, t
+    )
 
 
-def outcome(labels: Labels, view: View) -> str:
+def outcome(labels: Labels, view: RandomView) -> str:
     """Return whether an image was labelled right, wrong, or refused."""
     if labels.reason is not LabelStatus.LABELLED:
         return "refused"

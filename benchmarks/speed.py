@@ -8,7 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from benchmarks.labelling import CAMERA, PEN, View, random_view
+from benchmarks.labelling import CAMERA, PEN, RandomView, random_view
 from benchmarks.peers import (
     DEFAULT_BLOB_STEP,
     blob_centers,
@@ -183,10 +183,10 @@ def _label_times() -> _LabelTimes:
     turns = rotation_from_vector(rng.normal(0, TURN_ERROR, (N_VIEWS, 3)))
     middle = PEN.leds.mean(axis=0)
 
-    def start(view: View) -> Labels:
+    def start(view: RandomView) -> Labels:
         return label_spots(view.spots, CAMERA, PEN)
 
-    def track(view: View, turn: FloatArray) -> Labels:
+    def track(view: RandomView, turn: FloatArray) -> Labels:
         R = turn @ view.R
         t = view.t + (view.R - R) @ middle
         return track_spots(view.spots, CAMERA, PEN, R, t)

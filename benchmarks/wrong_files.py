@@ -49,7 +49,7 @@ FOCAL, ASPECT, CENTRE, K1, K2, TANGENTIAL = 0.003, 0.0003, 3.0, 0.02, 0.1, 3e-4
 
 
 @dataclass(frozen=True)
-class Trial:
+class Flaws:
     """What is not as it should be.
 
     Beside it all that U holds is drawn: what the files state of themselves, and what is
@@ -78,25 +78,25 @@ class Trial:
 
 
 TRIALS = {
-    "camera file drawn from its covariance, 60 images": Trial(camera_is_poor=True),
-    "camera file drawn from its covariance, 300 images": Trial(
+    "camera file drawn from its covariance, 60 images": Flaws(camera_is_poor=True),
+    "camera file drawn from its covariance, 300 images": Flaws(
         n_images=300, camera_is_poor=True
     ),
-    "LED file off by 10 \u00b5m, its scale by 1e-4": Trial(
+    "LED file off by 10 \u00b5m, its scale by 1e-4": Flaws(
         led_sigma=0.01, scale_sigma=1e-4
     ),
     **{
-        f"seat jitter of 10 \u00b5m, {n} images": Trial(n_images=n, jitter=0.01)
+        f"seat jitter of 10 \u00b5m, {n} images": Flaws(n_images=n, jitter=0.01)
         for n in (15, 60, 300)
     },
     **{
-        f"seat out of round by 10 \u00b5m, {n} images": Trial(
+        f"seat out of round by 10 \u00b5m, {n} images": Flaws(
             n_images=n, out_of_round=0.01
         )
         for n in (15, 60, 300)
     },
-    "noise with autoregression 0.9, 60 images": Trial(autoregression=0.9),
-    "noise with autoregression 0.9, 15 images": Trial(n_images=15, autoregression=0.9),
+    "noise with autoregression 0.9, 60 images": Flaws(autoregression=0.9),
+    "noise with autoregression 0.9, 15 images": Flaws(n_images=15, autoregression=0.9),
 }
 BASELINE = 1000.0  # mm, between two cameras
 FOCAL_OFF = 0.001  # of the focal length of one
@@ -116,7 +116,7 @@ def wrong_file_rows(workers: Workers) -> list[Row]:
     return [*rows, _unstated_row(workers)]
 
 
-def _row(name: str, trial: Trial, workers: Workers) -> Row:
+def _row(name: str, trial: Flaws, workers: Workers) -> Row:
     limit = MEDIAN_LIMITS[trial.n_images] if trial.camera_is_poor else None
     return _told(f"Tip with a {name}", partial(_errors, trial), limit, workers)
 
@@ -191,7 +191,7 @@ def _told(
     )
 
 
-def _errors(trial: Trial, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _errors(trial: Flaws, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return error, stated standard uncertainty, and error with the files held, mm."""
     rng = np.random.default_rng([STREAM, seed])
     camera, pen = paper_camera(), paper_pen()
@@ -263,7 +263,7 @@ def _drawn_rig(true: Rig, rng: np.random.Generator) -> Rig:
     )
 
 
-def _moves_of_seat(trial: Trial, swing: Swing, rng: np.random.Generator) -> FloatArray:
+def _moves_of_seat(trial: Flaws, swing: Swing, rng: np.random.Generator) -> FloatArray:
     jitter = trial.jitter * rng.standard_normal(swing.translations.shape)
     directions = directions_of(swing.rotations)
     out = trial.out_of_round * np.cos(2 * (directions - rng.uniform(0, 2 * np.pi)))
@@ -310,7 +310,7 @@ def _drawn_camera(camera: Camera, rng: np.random.Generator) -> Camera:
     )
 
 
-def _drawn_pen(trial: Trial, pen: Pen, rng: np.random.Generator) -> Pen:
+def _drawn_pen(trial: Flaws, pen: Pen, rng: np.random.Generator) -> Pen:
     """Return a file of the pen, off by what it states and by the pen's warmth."""
     stated = replace(
         pen,

@@ -46,7 +46,7 @@ from installer.payload import (
 )
 from installer.places import INSTALLER, IS_WINDOWS, ROOT
 from installer.runtime import RuntimeFileError
-from installer.sbom import Component, bill_of_materials
+from installer.sbom import BundledPart, bill_of_materials
 
 KILOBYTE = 1024
 EXTRAS = {
@@ -260,10 +260,10 @@ def _components(
     pins: Sequence[Pin],
     wheels: Sequence[Path],
     parts: Sequence[Part],
-) -> list[Component]:
+) -> list[BundledPart]:
     licences = {part.name.lower().replace("_", "-"): part.licence for part in parts}
     files = {path.name.split("-")[0].lower().replace("_", "-"): path for path in wheels}
-    python = Component(
+    python = BundledPart(
         "CPython",
         runtime.VERSION,
         distribution.name,
@@ -274,7 +274,7 @@ def _components(
     return [
         python,
         *(
-            Component(
+            BundledPart(
                 pin.name,
                 pin.version,
                 files[pin.name.lower()].name,

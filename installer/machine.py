@@ -15,7 +15,7 @@ from typing import Protocol, Self
 
 from installer.launchers import tool
 from installer.places import IS_WINDOWS
-from installer.wine.prefix import CHINESE, Outcome, Prefix
+from installer.wine.prefix import CHINESE, CommandResult, Prefix
 
 VOLATILE = ("/Temp/", "/Recent/", "/Microsoft/", "/windows/")
 WORD = "lightpen"
@@ -55,7 +55,7 @@ class Machine(Protocol):
         *,
         folder: Path | None = None,
         timeout_s: float = ...,
-    ) -> Outcome:
+    ) -> CommandResult:
         """Run a program to its end."""
 
     def start(
@@ -183,12 +183,12 @@ class OwnMachine:
         *,
         folder: Path | None = None,
         timeout_s: float = 1800.0,
-    ) -> Outcome:
+    ) -> CommandResult:
         """Run a program to its end."""
         began = time.monotonic()
         process = self.start(words, folder)
         output, _ = process.communicate(timeout=timeout_s)
-        return Outcome(
+        return CommandResult(
             tuple(words),
             process.returncode,
             output.decode("utf-8", errors="replace"),

@@ -11,7 +11,7 @@ SPECIFICATION = "1.6"
 
 
 @dataclass(frozen=True)
-class Component:
+class BundledPart:
     """One thing that was put into it.
 
     Attributes
@@ -35,7 +35,7 @@ class Component:
 
 
 def bill_of_materials(
-    version: str, components: Iterable[Component], moment: int
+    version: str, components: Iterable[BundledPart], moment: int
 ) -> bytes:
     """Return the list as JSON, always the same for the same components.
 
@@ -70,7 +70,7 @@ def bill_of_materials(
     return (json.dumps(bill, indent=2) + "\n").encode()
 
 
-def _entry(component: Component) -> dict[str, Any]:
+def _entry(component: BundledPart) -> dict[str, Any]:
     return {
         "type": "library",
         "bom-ref": component.purl,

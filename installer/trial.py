@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from installer.machine import Machine
-from installer.wine.prefix import Outcome
+from installer.wine.prefix import CommandResult
 
 UNINSTALL = r"HKCU\Software\Microsoft\Windows\CurrentVersion\Uninstall\Lightpen"
 CLASSES = r"HKCU\Software\Classes"
@@ -51,7 +51,7 @@ class Trial:
 
     def install(
         self, *options: str, setup: Path | None = None, place: str = ""
-    ) -> Outcome:
+    ) -> CommandResult:
         """Install in silence, and wait for the end.
 
         Parameters
@@ -65,7 +65,7 @@ class Trial:
         self.machine.await_end()
         return outcome
 
-    def uninstall(self, *options: str) -> Outcome:
+    def uninstall(self, *options: str) -> CommandResult:
         """Uninstall in silence, and wait for the end."""
         outcome = self.machine.run([self.program("uninstall.exe"), "/S", *options])
         self.machine.await_end()
@@ -75,7 +75,7 @@ class Trial:
         """Return the path of an installed program."""
         return self.machine.windows_path(self.folder / name)
 
-    def console(self, *words: str, folder: Path | None = None) -> Outcome:
+    def console(self, *words: str, folder: Path | None = None) -> CommandResult:
         """Run the command line."""
         return self.machine.run([self.program(CONSOLE), *words], folder=folder)
 

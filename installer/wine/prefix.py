@@ -53,7 +53,7 @@ class WineError(Exception):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class CommandResult:
     """How a Windows program ended."""
 
     words: tuple[str, ...]
@@ -172,7 +172,7 @@ class Prefix:
         *,
         folder: Path | None = None,
         timeout_s: float = LONGEST,
-    ) -> Outcome:
+    ) -> CommandResult:
         """Run a program to its end."""
         began = time.monotonic()
         process = self.start(words, folder)
@@ -181,7 +181,7 @@ class Prefix:
         except subprocess.TimeoutExpired:
             process.kill()
             raise
-        return Outcome(
+        return CommandResult(
             tuple(words),
             process.returncode,
             output.decode("utf-8", errors="replace"),

@@ -151,6 +151,8 @@ class _Times:
     def note(self, frame: Frame) -> None:
         """Take the times of a frame."""
         last, self._last = self._last, frame
+        if last is not None and _time_ns(frame) < _time_ns(last):
+            self._offsets_ns.clear()  # the clock began anew, as after a power failure
         if frame.device_ts_ns is not None:
             self._offsets_ns.append(frame.host_ts_ns - frame.device_ts_ns)
         if last is None or frame.seq <= last.seq:

@@ -294,8 +294,10 @@ def _settled(
     raise CalibrationError(
         sentence(
             "intrinsics.not-settled",
-            "The adjustment did not settle in {n_steps} steps. The views may be too "
-            "alike, or of another board than was said: check both.",
+            "The adjustment did not settle in {n_steps} steps: the views are too "
+            "alike, or of another board than was said. Add views with the board tilted "
+            "by 20 to 40 degrees to each side, and reaching into each corner of the "
+            "image; if there are some, count and measure its squares again.",
             n_steps=MAX_STEPS,
         )
     )

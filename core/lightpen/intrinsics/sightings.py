@@ -14,6 +14,7 @@ References
    distinct points, corners and centres of circular features", ISPRS 1987.
 """
 
+from itertools import product
 from typing import Any
 
 import cv2
@@ -41,6 +42,8 @@ QUICK = (
     | cv2.CALIB_CB_FAST_CHECK
 )
 THOROUGH = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
+WAYS = (THOROUGH, THOROUGH | cv2.CALIB_CB_ACCURACY, 0)  # each finds some of its own
+EVENED = 0.1  # of the longer side: what is darker over more than that is uneven light
 
 
 def find_points(
@@ -139,9 +142,10 @@ def _chessboard(
         return _whole(points, scale)
     if quick:
         return None
-    found, points = cv2.findChessboardCornersSB(small, corners, flags=THOROUGH)
-    if found:
-        return _whole(points, scale)
+    for flags in WAYS:
+        found, points = cv2.findChessboardCornersSB(small, corners, flags=flags)
+        if found:
+            return _whole(points, scale)
     if scale == 1.0 or grey.size > SEARCHED_WHOLE:
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
         found, points = cv2.findChessboardCorners(small, corners, flags=flags)
@@ -252,16 +256,27 @@ def _circles(
     asymmetric = board.kind is BoardKind.ASYMMETRIC_CIRCLES
     flags = cv2.CALIB_CB_ASYMMETRIC_GRID if asymmetric else cv2.CALIB_CB_SYMMETRIC_GRID
     ways = (flags,) if quick else (flags, flags | cv2.CALIB_CB_CLUSTERING)
-    for is_dark in (True, False):
-        seen = small if is_dark else cv2.bitwise_not(small)
-        for way in ways:
-            found, centers = cv2.findCirclesGrid(
-                seen, (board.columns, board.rows), None, way, _blobs(small.size)
-            )
-            if found:
-                rough = _from_front(_whole(centers, scale), board)
-                return _rim_centers(image, rough, board, is_dark=is_dark)
+    lit = (_stretched(small),) if quick else (_stretched(small), _evened(small))
+    for light, is_dark, way in product(lit, (True, False), ways):
+        seen = light if is_dark else cv2.bitwise_not(light)
+        found, centers = cv2.findCirclesGrid(
+            seen, (board.columns, board.rows), None, way, _blobs(small.size)
+        )
+        if found:
+            rough = _from_front(_whole(centers, scale), board)
+            return _rim_centers(image, rough, board, is_dark=is_dark)
     return None
+
+
+def _stretched(grey: Any) -> Any:
+    """Return a dim image as bright as any."""
+    return cv2.normalize(grey, np.empty_like(grey), 0, 255, cv2.NORM_MINMAX)
+
+
+def _evened(grey: Any) -> Any:
+    """Return an image as it would be in even light."""
+    around = cv2.GaussianBlur(grey, (0, 0), EVENED * max(grey.shape))
+    return _stretched(cv2.divide(grey, around, scale=128.0))
 
 
 def _blobs(n_pixels: int) -> cv2.SimpleBlobDetector:

@@ -66,6 +66,20 @@ def test_a_frame_that_got_lost_leaves_its_partner_unpaired_and_counted() -> None
     assert pairs.n_unpaired == 3
 
 
+def test_a_camera_whose_clock_began_anew_is_paired_by_the_new_one() -> None:
+    hour_ns = round(3.6e12)
+
+    def restarted() -> Iterator[Frame]:
+        for frame in frames(ahead_ms=3.6e6):
+            assert frame.device_ts_ns is not None
+            is_new = frame.seq >= N_FRAMES // 2
+            clock_ns = frame.device_ts_ns - (hour_ns if is_new else 0)
+            yield replace(frame, device_ts_ns=clock_ns)
+
+    _, found = paired(frames(), restarted())
+    assert found == [(i, i) for i in range(N_FRAMES)]
+
+
 def test_numbers_need_not_agree() -> None:
     second = (replace(frame, seq=frame.seq + 900) for frame in frames())
     _, found = paired(frames(), second)

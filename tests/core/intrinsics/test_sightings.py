@@ -105,6 +105,14 @@ def test_markers_of_a_few_pixels_are_read() -> None:
     assert np.abs(points[seen] - truth(board, 0.3)[seen]).max() < 0.3
 
 
+def test_circles_in_dim_and_uneven_light_are_found() -> None:
+    board = parse_board("circles:7x5:20:12")
+    light = np.linspace(0.08, 0.5, SMALL.width)
+    points = find_points((image_of(board) * light).astype(np.uint8), board)
+
+    assert error_of(points, board) < 0.1  # of the few levels that are left
+
+
 def test_rows_numbered_in_a_mirror_are_put_right() -> None:
     board = parse_board("chessboard:9x6:20")
     mirrored = image_of(board)[:, ::-1].copy()
