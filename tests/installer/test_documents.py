@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 from installer.licences import Part, licence_text, parts_of, unlicensed
-from installer.sbom import Component, bill_of_materials
+from installer.sbom import BundledPart, bill_of_materials
 
 PYTHON = Part("CPython", "3.13.2", "PSF-2.0", ())
-NUMPY = Component(
+NUMPY = BundledPart(
     name="numpy",
     version="2.5.5",
     file="numpy-2.5.5-cp313-cp313-win_amd64.whl",

@@ -20,7 +20,7 @@
     <name>ActionBar</name>
     <message>
         <source>Back</source>
-        <translation>返回</translation>
+        <translation>上一步</translation>
     </message>
 </context>
 <context>
@@ -35,7 +35,7 @@
     </message>
     <message>
         <source>Save...</source>
-        <translation>保存…</translation>
+        <translation>保存...</translation>
     </message>
     <message>
         <source>Cancel</source>
@@ -87,6 +87,32 @@
     </message>
 </context>
 <context>
+    <name>ArticulationFinding</name>
+    <message>
+        <source>Cone by each posture / mm</source>
+        <translation>各姿态测得的锥孔 / mm</translation>
+    </message>
+    <message>
+        <source>Spread / mm</source>
+        <translation>离散 / mm</translation>
+    </message>
+    <message>
+        <source>In the form of ISO 10360-12: five postures of five touches.</source>
+        <translation>按 ISO 10360-12 的形式：五个姿态，各五次接触。</translation>
+    </message>
+    <message>
+        <source>Location error {0} mm, {1} mm to be expected.</source>
+        <translation>位置误差 {0} mm，预期 {1} mm。</translation>
+    </message>
+</context>
+<context>
+    <name>ArticulationStrip</name>
+    <message>
+        <source>Touch the cone five times in each of five postures</source>
+        <translation>以五个姿态各接触锥孔五次</translation>
+    </message>
+</context>
+<context>
     <name>AssumptionsDialog</name>
     <message>
         <source>Assumptions of the station</source>
@@ -94,7 +120,7 @@
     </message>
     <message>
         <source>Standard uncertainties (k = 1) where the files of camera and LEDs state none. The next swing uses them, and its result marks what rests on them.</source>
-        <translation>相机文件和 LED 文件未给出不确定度时所采用的标准不确定度（k = 1）。下一次摆动将采用这些值，结果中会标明依据假定的部分。</translation>
+        <translation>内参文件和 LED 文件未给出不确定度时所采用的标准不确定度（k = 1）。下一次摆动将采用这些值，结果中会标明依据假定的部分。</translation>
     </message>
     <message>
         <source>not measured</source>
@@ -102,19 +128,19 @@
     </message>
     <message>
         <source>Focal length; the rest of the camera goes with it</source>
-        <translation>焦距；相机的其余参数随之变化</translation>
+        <translation>焦距；相机其余参数的不确定度按比例随之给定</translation>
     </message>
     <message>
         <source>Scale of the LEDs</source>
-        <translation>LED 的比例</translation>
+        <translation>LED 坐标的尺度</translation>
     </message>
     <message>
         <source>Ball and cone, as they are not quite round</source>
-        <translation>测球和锥座的圆度误差</translation>
+        <translation>测球和锥孔的圆度误差</translation>
     </message>
     <message>
         <source>LED centres, by what does not average out</source>
-        <translation>LED 中心的不可平均误差</translation>
+        <translation>LED 中心中不能被平均的误差</translation>
     </message>
     <message>
         <source>Temperature of the pen during the swing</source>
@@ -126,7 +152,7 @@
     </message>
     <message>
         <source>How much warmer than at its measurement, not measured</source>
-        <translation>相对标定时的温差（未测量时）</translation>
+        <translation>比测量 LED 时高出的温度（未测量时）</translation>
     </message>
     <message>
         <source>Thermal expansion of the pen</source>
@@ -161,7 +187,7 @@
     </message>
     <message>
         <source>Focal length, scale, warmth, ball and cone: how uncertain each is where no file says it.</source>
-        <translation>焦距、比例、温度、测球和锥座：文件未说明时各自的不确定度。</translation>
+        <translation>焦距、尺度、温度、测球和锥孔：文件未说明时各自的不确定度。</translation>
     </message>
 </context>
 <context>
@@ -184,7 +210,7 @@
     </message>
     <message>
         <source>Save the camera file</source>
-        <translation>保存相机文件</translation>
+        <translation>保存内参文件</translation>
     </message>
     <message>
         <source>Saved and in use: {0}</source>
@@ -344,8 +370,20 @@
         <translation>打开数据文件夹</translation>
     </message>
     <message>
-        <source>Swings and results are kept here. Options choose another folder.</source>
-        <translation>摆动记录和结果保存在这里。可在“选项”中另选文件夹。</translation>
+        <source>Swings and results are kept here.</source>
+        <translation>摆动记录和结果保存在这里。</translation>
+    </message>
+    <message>
+        <source>Change...</source>
+        <translation>更改...</translation>
+    </message>
+    <message>
+        <source>Choose another data folder</source>
+        <translation>选择其他数据文件夹</translation>
+    </message>
+    <message>
+        <source>Keep swings and results elsewhere from the next start on.</source>
+        <translation>从下次启动起，将摆动记录和结果保存到其他位置。</translation>
     </message>
     <message>
         <source>Other windows of the program that use this folder: {0}. All of them put their tips in force here.</source>
@@ -721,6 +759,10 @@
         <translation>至</translation>
     </message>
     <message>
+        <source>What</source>
+        <translation>类型</translation>
+    </message>
+    <message>
         <source>All</source>
         <translation>全部</translation>
     </message>
@@ -772,11 +814,11 @@
     <name>FixedPointStrip</name>
     <message>
         <source>Touch the cone again</source>
-        <translation>再次接触锥孔</translation>
+        <translation>再次触测锥孔</translation>
     </message>
     <message>
         <source>Touches</source>
-        <translation>接触次数</translation>
+        <translation>触测次数</translation>
     </message>
 </context>
 <context>
@@ -1206,7 +1248,7 @@
     </message>
     <message>
         <source>A touch is several images through which the pen is held still; else each image is a touch.</source>
-        <translation>一次接触是光笔握住不动的几幅图像；否则每幅图像就是一次接触。</translation>
+        <translation>一次触测是光笔握住不动的几幅图像；否则每幅图像就是一次触测。</translation>
     </message>
     <message>
         <source>Read</source>
@@ -1434,10 +1476,112 @@
     </message>
 </context>
 <context>
+    <name>ItemButton</name>
+    <message>
+        <source>Tip library...</source>
+        <translation>测头库...</translation>
+    </message>
+    <message>
+        <source>List</source>
+        <translation>列表</translation>
+    </message>
+</context>
+<context>
+    <name>ItemForm</name>
+    <message>
+        <source>End the spin</source>
+        <translation>结束旋转</translation>
+    </message>
+    <message>
+        <source>By a spin</source>
+        <translation>旋转求轴线</translation>
+    </message>
+    <message>
+        <source>Picture of the tip</source>
+        <translation>测头图片</translation>
+    </message>
+    <message>
+        <source>Pictures (*.png *.jpg *.jpeg *.bmp)</source>
+        <translation>图片 (*.png *.jpg *.jpeg *.bmp)</translation>
+    </message>
+    <message>
+        <source>not known</source>
+        <translation>未知</translation>
+    </message>
+    <message>
+        <source>as the station</source>
+        <translation>按工位规定</translation>
+    </message>
+    <message>
+        <source>Id, as on its label</source>
+        <translation>编号，与标签一致</translation>
+    </message>
+    <message>
+        <source>To be used until</source>
+        <translation>可用至</translation>
+    </message>
+    <message>
+        <source>Ball diameter</source>
+        <translation>测球直径</translation>
+    </message>
+    <message>
+        <source>Change at most</source>
+        <translation>最大变化</translation>
+    </message>
+    <message>
+        <source>Days in force at most</source>
+        <translation>最长有效天数</translation>
+    </message>
+    <message>
+        <source>Swings of its pen at most</source>
+        <translation>该光笔最多摆动次数</translation>
+    </message>
+    <message>
+        <source>Nominal centre of the tip</source>
+        <translation>测头标称中心</translation>
+    </message>
+    <message>
+        <source>Picture</source>
+        <translation>图片</translation>
+    </message>
+    <message>
+        <source>Note</source>
+        <translation>备注</translation>
+    </message>
+    <message>
+        <source>The last day, such as {0}; empty for no end.</source>
+        <translation>最后可用日，例如 {0}；留空表示无期限。</translation>
+    </message>
+    <message>
+        <source>no limit</source>
+        <translation>无限值</translation>
+    </message>
+    <message>
+        <source>How far a calibration may find the tip from where it was. Beyond it, the tip is to be checked.</source>
+        <translation>标定时测头与原位置的最大允许距离。超出时，测头需检查。</translation>
+    </message>
+    <message>
+        <source>Axis of the stylus, from the ball into the pen</source>
+        <translation>测杆轴线，由测球指向光笔</translation>
+    </message>
+    <message>
+        <source>Axis of the stylus, {0}</source>
+        <translation>测杆轴线，{0}</translation>
+    </message>
+    <message>
+        <source>Find the axis: the tip rests in the cone, and the pen is turned about its stylus before the camera.</source>
+        <translation>求轴线：测头放在锥孔中，在相机前绕测杆转动光笔。</translation>
+    </message>
+    <message>
+        <source>Browse...</source>
+        <translation>浏览...</translation>
+    </message>
+</context>
+<context>
     <name>LastResultPanel</name>
     <message>
         <source>Prove the tip in minutes by touching what is known.</source>
-        <translation>通过接触已知的东西，几分钟内证明测头。</translation>
+        <translation>触测已知的标准件，几分钟内即可验证测头。</translation>
     </message>
     <message>
         <source>Last practice with this pen and tip</source>
@@ -1453,7 +1597,7 @@
     </message>
     <message>
         <source>Take back...</source>
-        <translation>撤回…</translation>
+        <translation>撤回...</translation>
     </message>
     <message>
         <source>Put the result before in force again; both are kept.</source>
@@ -1783,7 +1927,15 @@
     </message>
     <message>
         <source>Scale of the pen by it: {0}, U (k = 2) {1} ppm; without it {2} ppm.</source>
-        <translation>由此得到的光笔比例：{0}，U (k = 2) {1} ppm；不用它时为 {2} ppm。</translation>
+        <translation>由此得到的光笔尺度：{0}，U (k = 2) {1} ppm；不用它时为 {2} ppm。</translation>
+    </message>
+    <message>
+        <source>One end</source>
+        <translation>一端</translation>
+    </message>
+    <message>
+        <source>The other end</source>
+        <translation>另一端</translation>
     </message>
 </context>
 <context>
@@ -1794,7 +1946,7 @@
     </message>
     <message>
         <source>Touch both ends of a length</source>
-        <translation>接触长度的两端</translation>
+        <translation>触测长度的两端</translation>
     </message>
     <message>
         <source>Certified length</source>
@@ -1807,6 +1959,172 @@
     <message>
         <source>Places</source>
         <translation>位置数</translation>
+    </message>
+</context>
+<context>
+    <name>LibraryControl</name>
+    <message>
+        <source>There is no tip {0} in the library. Add it?</source>
+        <translation>测头库中没有测头 {0}。是否添加？</translation>
+    </message>
+    <message>
+        <source>Add it</source>
+        <translation>添加</translation>
+    </message>
+    <message>
+        <source>Not now</source>
+        <translation>暂不</translation>
+    </message>
+    <message>
+        <source>Tip {0} is retired: {1}</source>
+        <translation>测头 {0} 已停用：{1}</translation>
+    </message>
+    <message>
+        <source>choose another one.</source>
+        <translation>请另选一个。</translation>
+    </message>
+    <message>
+        <source>Tip {0}, by its barcode.</source>
+        <translation>已按条码选择测头 {0}。</translation>
+    </message>
+</context>
+<context>
+    <name>LibraryDialog</name>
+    <message>
+        <source>A new one</source>
+        <translation>新增</translation>
+    </message>
+    <message>
+        <source>Bring {0} back</source>
+        <translation>恢复使用 {0}</translation>
+    </message>
+    <message>
+        <source>Retire {0}</source>
+        <translation>停用 {0}</translation>
+    </message>
+    <message>
+        <source>Choose one in the table.</source>
+        <translation>请在表中选择一项。</translation>
+    </message>
+    <message>
+        <source>It is retired.</source>
+        <translation>已停用。</translation>
+    </message>
+    <message>
+        <source>Calibrate with it</source>
+        <translation>用它标定</translation>
+    </message>
+    <message>
+        <source>Change what is said of it</source>
+        <translation>更改其内容</translation>
+    </message>
+    <message>
+        <source>It stays known either way</source>
+        <translation>无论如何都会保留其记录</translation>
+    </message>
+    <message>
+        <source>Bring back...</source>
+        <translation>恢复使用...</translation>
+    </message>
+    <message>
+        <source>Retire...</source>
+        <translation>停用...</translation>
+    </message>
+    <message>
+        <source>Enter an id.</source>
+        <translation>请输入编号。</translation>
+    </message>
+    <message>
+        <source>Enter a day such as 2026-08-14, or none.</source>
+        <translation>请输入日期，例如 2026-08-14，或留空。</translation>
+    </message>
+    <message>
+        <source>A supervisor signs each change.</source>
+        <translation>每次更改须由主管签署。</translation>
+    </message>
+    <message>
+        <source>With your name and the time</source>
+        <translation>连同您的姓名和时间一起保存</translation>
+    </message>
+    <message>
+        <source>Tip library</source>
+        <translation>测头库</translation>
+    </message>
+    <message>
+        <source>Pens, tips and cones with their limits. Each change is kept with name and time, and entered in the archive.</source>
+        <translation>光笔、测头和锥孔及其限值。每次更改都连同姓名和时间保存，并录入档案库。</translation>
+    </message>
+    <message>
+        <source>Tips</source>
+        <translation>测头</translation>
+    </message>
+    <message>
+        <source>Pens</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
+        <source>Cones</source>
+        <translation>锥孔</translation>
+    </message>
+    <message>
+        <source>Id</source>
+        <translation>编号</translation>
+    </message>
+    <message>
+        <source>State</source>
+        <translation>状态</translation>
+    </message>
+    <message>
+        <source>Until</source>
+        <translation>可用至</translation>
+    </message>
+    <message>
+        <source>Ball / mm</source>
+        <translation>测球 / mm</translation>
+    </message>
+    <message>
+        <source>Change / mm</source>
+        <translation>变化 / mm</translation>
+    </message>
+    <message>
+        <source>Calibrated on pens</source>
+        <translation>已在以下光笔上标定</translation>
+    </message>
+    <message>
+        <source>Note</source>
+        <translation>备注</translation>
+    </message>
+    <message>
+        <source>Show retired ones</source>
+        <translation>显示已停用的</translation>
+    </message>
+    <message>
+        <source>Choose</source>
+        <translation>选用</translation>
+    </message>
+    <message>
+        <source>Add...</source>
+        <translation>添加...</translation>
+    </message>
+    <message>
+        <source>Change...</source>
+        <translation>更改...</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>关闭</translation>
+    </message>
+    <message>
+        <source>Keep</source>
+        <translation>保存</translation>
+    </message>
+    <message>
+        <source>Leave it</source>
+        <translation>不保存</translation>
+    </message>
+    <message>
+        <source>Why, for the archive</source>
+        <translation>更改理由（录入档案库）</translation>
     </message>
 </context>
 <context>
@@ -1865,7 +2183,7 @@
     </message>
     <message>
         <source>Ring: roundness, and off its plane</source>
-        <translation>圆环：圆度及离开平面</translation>
+        <translation>圆环：圆度及偏离平面</translation>
     </message>
     <message>
         <source>Length: error</source>
@@ -1881,7 +2199,7 @@
     </message>
     <message>
         <source>Drift of a witness</source>
-        <translation>见证点的漂移</translation>
+        <translation>监视点的漂移</translation>
     </message>
     <message>
         <source>Usual: {0}.</source>
@@ -2172,6 +2490,22 @@
 <context>
     <name>NamesForm</name>
     <message>
+        <source>List of pens</source>
+        <translation>光笔列表</translation>
+    </message>
+    <message>
+        <source>List of tips</source>
+        <translation>测头列表</translation>
+    </message>
+    <message>
+        <source>List of cones</source>
+        <translation>锥孔列表</translation>
+    </message>
+    <message>
+        <source>Choose from the tip library, or open it. Key: arrow down</source>
+        <translation>从测头库中选择，或打开测头库。按键：向下箭头</translation>
+    </message>
+    <message>
         <source>Where and who</source>
         <translation>工位与人员</translation>
     </message>
@@ -2312,7 +2646,11 @@
     </message>
     <message>
         <source>Data folder...</source>
-        <translation>数据文件夹…</translation>
+        <translation>数据文件夹...</translation>
+    </message>
+    <message>
+        <source>Live stream...</source>
+        <translation>实时数据流...</translation>
     </message>
     <message>
         <source>About Lightpen</source>
@@ -2554,6 +2892,14 @@
         <translation>奇数 - 偶数</translation>
     </message>
     <message>
+        <source>As found: {0} mm off; the tip has no limit of change</source>
+        <translation>标定前状态：偏差 {0} mm；该测头没有变化限值</translation>
+    </message>
+    <message>
+        <source>As found: {0} mm off, limit {1} mm</source>
+        <translation>标定前状态：偏差 {0} mm，限值 {1} mm</translation>
+    </message>
+    <message>
         <source>Odd and even images agree</source>
         <translation>奇数与偶数图像一致</translation>
     </message>
@@ -2594,23 +2940,23 @@
     </message>
     <message>
         <source>Save...</source>
-        <translation>保存…</translation>
+        <translation>保存...</translation>
     </message>
     <message>
         <source>All at once...</source>
-        <translation>全部一次保存…</translation>
+        <translation>全部一次保存...</translation>
     </message>
     <message>
         <source>Record (JSON)...</source>
-        <translation>记录（JSON）…</translation>
+        <translation>记录（JSON）...</translation>
     </message>
     <message>
         <source>Tip and images (CSV)...</source>
-        <translation>测头和图像（CSV）…</translation>
+        <translation>测头和图像（CSV）...</translation>
     </message>
     <message>
         <source>All plots (PNG)...</source>
-        <translation>全部图（PNG）…</translation>
+        <translation>全部图（PNG）...</translation>
     </message>
 </context>
 <context>
@@ -2725,7 +3071,7 @@
     </message>
     <message>
         <source>Accept...</source>
-        <translation>接受…</translation>
+        <translation>接受...</translation>
     </message>
     <message>
         <source>Verify it</source>
@@ -2733,11 +3079,11 @@
     </message>
     <message>
         <source>Prove the tip in minutes by touching what is known.</source>
-        <translation>通过接触已知的东西，几分钟内证明测头。</translation>
+        <translation>触测已知的标准件，几分钟内即可验证测头。</translation>
     </message>
     <message>
         <source>Take back...</source>
-        <translation>撤回…</translation>
+        <translation>撤回...</translation>
     </message>
     <message>
         <source>Put the result before in force again; both are kept.</source>
@@ -2886,6 +3232,10 @@
         <translation>各轮的半径 / mm</translation>
     </message>
     <message>
+        <source>Off the ring / mm</source>
+        <translation>偏离圆环 / mm</translation>
+    </message>
+    <message>
         <source>Radius / mm</source>
         <translation>半径 / mm</translation>
     </message>
@@ -2907,7 +3257,7 @@
     </message>
     <message>
         <source>Off the plane / mm</source>
-        <translation>离开平面 / mm</translation>
+        <translation>偏离平面 / mm</translation>
     </message>
     <message>
         <source>Covered / °</source>
@@ -2915,7 +3265,7 @@
     </message>
     <message>
         <source>Touches</source>
-        <translation>接触次数</translation>
+        <translation>触测次数</translation>
     </message>
     <message>
         <source>Average</source>
@@ -2942,7 +3292,7 @@
     </message>
     <message>
         <source>Touch a ring</source>
-        <translation>接触圆环</translation>
+        <translation>触测圆环</translation>
     </message>
     <message>
         <source>Certified radius</source>
@@ -2954,7 +3304,7 @@
     </message>
     <message>
         <source>Touched</source>
-        <translation>接触处</translation>
+        <translation>触测处</translation>
     </message>
     <message>
         <source>Runs</source>
@@ -2969,7 +3319,7 @@
     </message>
     <message>
         <source>Ring: {0} of {1} degrees by {2} touches</source>
-        <translation>圆环：{2} 次接触覆盖 {0} 度，需 {1} 度</translation>
+        <translation>圆环：{2} 次触测覆盖 {0} 度，需 {1} 度</translation>
     </message>
 </context>
 <context>
@@ -3032,7 +3382,7 @@
     </message>
     <message>
         <source>Stated U / mm</source>
-        <translation>标称 U / mm</translation>
+        <translation>给出的 U / mm</translation>
     </message>
 </context>
 <context>
@@ -3128,6 +3478,10 @@
 </context>
 <context>
     <name>Sidebar</name>
+    <message>
+        <source>Live stream at {0}, listening: {1}</source>
+        <translation>实时数据流 {0}，接收程序：{1}</translation>
+    </message>
     <message>
         <source>Pen {0}</source>
         <translation>光笔 {0}</translation>
@@ -3316,6 +3670,17 @@
     </message>
 </context>
 <context>
+    <name>SpinRecorder</name>
+    <message>
+        <source>Press the tip into the cone, and turn the pen about its stylus.</source>
+        <translation>将测头压入锥孔，绕测杆转动光笔。</translation>
+    </message>
+    <message>
+        <source>Turned by {0} degrees; U (k = 2) of the axis {1} degrees.</source>
+        <translation>已转动 {0} 度；轴线的 U (k = 2) 为 {1} 度。</translation>
+    </message>
+</context>
+<context>
     <name>StartPage</name>
     <message>
         <source>Start</source>
@@ -3323,11 +3688,15 @@
     </message>
     <message>
         <source>Say what is calibrated. All of it is remembered for the station.</source>
-        <translation>填写要标定的内容，程序会为本工位记住。</translation>
+        <translation>填写标定对象，程序会为本工位记住。</translation>
     </message>
     <message>
         <source>Continue to the camera</source>
         <translation>下一步：相机</translation>
+    </message>
+    <message>
+        <source>Tip {0} is retired. Choose another one, or bring it back in the library.</source>
+        <translation>测头 {0} 已停用。请另选一个，或在测头库中恢复使用。</translation>
     </message>
     <message>
         <source>The last calibration cannot be shown.</source>
@@ -3484,6 +3853,49 @@
     </message>
 </context>
 <context>
+    <name>StreamDialog</name>
+    <message>
+        <source>Every computer in that network can follow the pen. Nobody has to sign in, and a firewall may ask for permission.</source>
+        <translation>该网络中的每台计算机都能跟踪光笔，无需登录；防火墙可能会要求许可。</translation>
+    </message>
+    <message>
+        <source>On at {0}. Programs that listen: {1}.</source>
+        <translation>已开启：{0}。接收程序：{1}。</translation>
+    </message>
+    <message>
+        <source>The pose alone is sent: no tip is in force.</source>
+        <translation>只发送位姿：没有生效的测头。</translation>
+    </message>
+    <message>
+        <source>Live stream</source>
+        <translation>实时数据流</translation>
+    </message>
+    <message>
+        <source>Other programs, such as 3D Slicer, can follow the pen and its tip live, by OpenIGTLink.</source>
+        <translation>其他程序（例如 3D Slicer）可以通过 OpenIGTLink 实时跟踪光笔和测头。</translation>
+    </message>
+    <message>
+        <source>Address</source>
+        <translation>地址</translation>
+    </message>
+    <message>
+        <source>{0} for programs of this computer alone, {1} for every network of it, or one of its own addresses.</source>
+        <translation>{0} 仅限本机程序，{1} 对本机的所有网络开放，或填写本机的某个地址。</translation>
+    </message>
+    <message>
+        <source>Port</source>
+        <translation>端口</translation>
+    </message>
+    <message>
+        <source>Stream pose and tip</source>
+        <translation>发送位姿和测头位置</translation>
+    </message>
+    <message>
+        <source>Close</source>
+        <translation>关闭</translation>
+    </message>
+</context>
+<context>
     <name>SupervisorFields</name>
     <message>
         <source>Supervisor</source>
@@ -3620,11 +4032,11 @@
     </message>
     <message>
         <source>Misfit of each image / px</source>
-        <translation>每幅图像的拟合误差 / px</translation>
+        <translation>各图像的拟合误差 / px</translation>
     </message>
     <message>
         <source>Tip of each image / µm</source>
-        <translation>每幅图像的测头 / µm</translation>
+        <translation>各图像的测头位置 / µm</translation>
     </message>
     <message>
         <source>Tip estimate / µm</source>
@@ -3825,7 +4237,7 @@
     </message>
     <message>
         <source>Touch again</source>
-        <translation>重新接触</translation>
+        <translation>重新触测</translation>
     </message>
     <message>
         <source>Do this task again; what it found before is kept.</source>
@@ -3840,11 +4252,11 @@
     </message>
     <message>
         <source>Let the simulated operator touch</source>
-        <translation>让模拟操作员接触</translation>
+        <translation>让模拟操作员触测</translation>
     </message>
     <message>
         <source>It touches whatever is asked for by itself.</source>
-        <translation>它自行接触所要求的各处。</translation>
+        <translation>它自行触测所要求的各处。</translation>
     </message>
     <message>
         <source>Its ring has a radius of {0} mm, its bar a length of {1} mm.</source>
@@ -3906,7 +4318,7 @@
     </message>
     <message>
         <source>all</source>
-        <translation>合计</translation>
+        <translation>合成</translation>
     </message>
     <message>
         <source>Weakest direction ({0}): U = {1} µm.</source>
@@ -3944,7 +4356,7 @@
     </message>
     <message>
         <source>Prove the tip in force by touching what is known.</source>
-        <translation>通过接触已知的东西来证明当前有效的测头。</translation>
+        <translation>触测已知的标准件，验证当前有效的测头。</translation>
     </message>
     <message>
         <source>d MMMM yyyy, hh:mm</source>
@@ -3968,7 +4380,7 @@
     </message>
     <message>
         <source>Nothing is touched yet.</source>
-        <translation>尚未接触任何点。</translation>
+        <translation>尚未触测任何点。</translation>
     </message>
     <message>
         <source>Finish early</source>
@@ -3976,7 +4388,7 @@
     </message>
     <message>
         <source>The verification is not finished. The touches of the task at hand are lost; what is found is kept.</source>
-        <translation>验证尚未完成。当前项的接触将丢失；已得到的结果保留。</translation>
+        <translation>验证尚未完成。当前项的触测将丢失；已得到的结果保留。</translation>
     </message>
     <message>
         <source>Begin the verification anew? What was found is kept.</source>
@@ -4008,7 +4420,7 @@
     </message>
     <message>
         <source>Accept...</source>
-        <translation>接受…</translation>
+        <translation>接受...</translation>
     </message>
     <message>
         <source>Use the tip with a reason</source>
@@ -4020,7 +4432,7 @@
     </message>
     <message>
         <source>Forget all touches, and verify the tip in force from the first.</source>
-        <translation>忘记所有接触，从头验证当前有效的测头。</translation>
+        <translation>忘记所有触测，从头验证当前有效的测头。</translation>
     </message>
     <message>
         <source>No image yet.</source>
@@ -4059,7 +4471,7 @@
     </message>
     <message>
         <source>{0} of {1} touches</source>
-        <translation>接触 {0} / {1} 次</translation>
+        <translation>触测 {0} / {1} 次</translation>
     </message>
     <message>
         <source>{0} of {1}°</source>
@@ -4086,6 +4498,10 @@
         <translation>长度</translation>
     </message>
     <message>
+        <source>Postures</source>
+        <translation>姿态</translation>
+    </message>
+    <message>
         <source>left out</source>
         <translation>不做</translation>
     </message>
@@ -4103,7 +4519,7 @@
     </message>
     <message>
         <source>The touches of recorded images are measured.</source>
-        <translation>正在测量录制图像中的接触。</translation>
+        <translation>正在测量录制图像中的触测。</translation>
     </message>
     <message>
         <source>Reading images</source>
@@ -4123,7 +4539,7 @@
     </message>
     <message>
         <source>Tip proven</source>
-        <translation>测头已证明</translation>
+        <translation>测头已通过验证</translation>
     </message>
     <message>
         <source>Look at it</source>
@@ -4131,7 +4547,7 @@
     </message>
     <message>
         <source>Not proven</source>
-        <translation>未证明</translation>
+        <translation>测头未通过验证</translation>
     </message>
     <message>
         <source>The camera sends none. It goes on by itself as soon as they come.</source>
@@ -4155,7 +4571,7 @@
     </message>
     <message>
         <source>Touched before</source>
-        <translation>已接触过</translation>
+        <translation>已触测过</translation>
     </message>
     <message>
         <source>Lean another way</source>
@@ -4163,7 +4579,7 @@
     </message>
     <message>
         <source>Touch the cone</source>
-        <translation>接触锥孔</translation>
+        <translation>触测锥孔</translation>
     </message>
     <message>
         <source>Next point</source>
@@ -4171,7 +4587,15 @@
     </message>
     <message>
         <source>Touch the ring</source>
-        <translation>接触圆环</translation>
+        <translation>触测圆环</translation>
+    </message>
+    <message>
+        <source>Lift, touch again</source>
+        <translation>抬起，再接触</translation>
+    </message>
+    <message>
+        <source>Another posture</source>
+        <translation>换一个姿态</translation>
     </message>
     <message>
         <source>The other end</source>
@@ -4179,7 +4603,7 @@
     </message>
     <message>
         <source>Touch one end</source>
-        <translation>接触一端</translation>
+        <translation>触测一端</translation>
     </message>
     <message>
         <source>Not taken</source>
@@ -4318,12 +4742,8 @@
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
     </message>
     <message>
-        <source>A touch {distance:.0f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
-        <translation>距其他接触 {distance:.0f} mm 的一次接触不计入：测头不在锥孔里。请放入锥孔并握住不动。</translation>
-    </message>
-    <message>
         <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
-        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个检定长度。</translation>
+        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个有证书的标准长度。</translation>
     </message>
     <message>
         <source>All of them were taken, so the tip lies between both.</source>
@@ -4403,7 +4823,7 @@
     </message>
     <message>
         <source>Cone and camera moved by {distance:.3f} mm against each other during the swing. It is taken out as far as the images tell, but touches would not be right either. Clamp both, and let the camera warm up.</source>
-        <translation>摆动过程中，锥座与相机之间相对移动了 {distance:.3f} mm。图像能够判明的部分已被扣除，但此时接触测量同样不准确。请固定锥座和相机，并让相机充分预热。</translation>
+        <translation>摆动过程中，锥孔与相机之间相对移动了 {distance:.3f} mm。图像能够判明的部分已被扣除，但此时接触测量同样不准确。请固定锥孔和相机，并让相机充分预热。</translation>
     </message>
     <message>
         <source>Dask is not installed here, which a cluster needs. Install the extra named cluster, or compute on this machine.</source>
@@ -4423,7 +4843,7 @@
     </message>
     <message>
         <source>Entries {first} to {last} of the chain {chain} are missing.</source>
-        <translation>链 {chain} 的第 {first} 至第 {last} 条记录缺失。</translation>
+        <translation>链 {chain} 的第 {first} 至第 {last} 个条目缺失。</translation>
     </message>
     <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
@@ -4431,23 +4851,23 @@
     </message>
     <message>
         <source>Entry {number} of station {station} is not the one that follows here. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
-        <translation>工位 {station} 的第 {number} 条记录与此处应接续的记录不符。可能是数据文件夹被复制后两份都在继续使用，或记录被改动过。请检查两边的档案库。</translation>
+        <translation>工位 {station} 的第 {number} 个条目与此处应接续的条目不符。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
         <source>Entry {number} of the archive {archive} is damaged. Restore the archive from a copy.</source>
-        <translation>档案库 {archive} 的第 {number} 条记录已损坏。请从备份恢复档案库。</translation>
+        <translation>档案库 {archive} 的第 {number} 个条目已损坏。请从备份恢复档案库。</translation>
     </message>
     <message>
         <source>Entry {number} of the chain {chain} does not follow the one before it: one of the two was replaced.</source>
-        <translation>链 {chain} 的第 {number} 条记录与前一条不衔接：两者之一被替换过。</translation>
+        <translation>链 {chain} 的第 {number} 个条目与前一条不衔接：两者之一被替换过。</translation>
     </message>
     <message>
         <source>Entry {number} of the chain {chain} is missing.</source>
-        <translation>链 {chain} 的第 {number} 条记录缺失。</translation>
+        <translation>链 {chain} 的第 {number} 个条目缺失。</translation>
     </message>
     <message>
         <source>Entry {number} of the chain {chain} was changed.</source>
-        <translation>链 {chain} 的第 {number} 条记录被改动过。</translation>
+        <translation>链 {chain} 的第 {number} 个条目被改动过。</translation>
     </message>
     <message>
         <source>Entry {number} put no tip in force. Choose one that did.</source>
@@ -4538,6 +4958,10 @@
         <translation>据 {swing}，LED {led} 相对其他 LED 移动了 {distance:.3f} mm：它被碰弯、碰撞或松动。</translation>
     </message>
     <message>
+        <source>LED {led} has moved by {distance:.3f} mm between the swings {first} and {swing}: no LED file is right for both. Give swings of after it only.</source>
+        <translation>在 {first} 与 {swing} 两次摆动之间，LED {led} 移动了 {distance:.3f} mm：没有一个 LED 文件对两者都正确。请只给出移动之后的摆动。</translation>
+    </message>
+    <message>
         <source>LED {led} is listed already on line {line}.</source>
         <translation>LED {led} 已在第 {line} 行列出。</translation>
     </message>
@@ -4611,7 +5035,7 @@
     </message>
     <message>
         <source>LEDs {first} and {second} are exchanged: each stands where the other belongs. LEDs 1 to 4 must follow each other along the back line, and 5 to 7 and 8 to 10 along the columns in the same direction. Exchange their coordinates.</source>
-        <translation>LED {first} 和 {second} 颠倒：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
+        <translation>LED {first} 和 {second} 互换了：各自在对方的位置上。LED 1 至 4 必须沿后排直线依次排列，5 至 7 和 8 至 10 沿两列同方向依次排列。请交换它们的坐标。</translation>
     </message>
     <message>
         <source>LEDs {first} and {second} are {distance:.2f} mm apart, too close for discs of {diameter:g} mm. Check their coordinates and the diameter.</source>
@@ -4711,7 +5135,7 @@
     </message>
     <message>
         <source>Next: clamp cone and camera, then repeat the swing.</source>
-        <translation>下一步：固定锥座和相机，然后重新摆动。</translation>
+        <translation>下一步：固定锥孔和相机，然后重新摆动。</translation>
     </message>
     <message>
         <source>Next: clean tip and artefact, clamp artefact and camera, and verify again.</source>
@@ -4782,6 +5206,10 @@
         <translation>没有视图覆盖图像的这些角：{corners}。</translation>
     </message>
     <message>
+        <source>Nobody can listen at {place}: {reason}. Choose a port from 1024 to 65535 that is free.</source>
+        <translation>无法在 {place} 接收：{reason}。请选择 1024 到 65535 之间空闲的端口。</translation>
+    </message>
+    <message>
         <source>Nominal tip, {axis}: {flaw}</source>
         <translation>标称测头，{axis}：{flaw}</translation>
     </message>
@@ -4795,7 +5223,7 @@
     </message>
     <message>
         <source>Nothing is chosen to be touched. Choose the fixed point, the ring or the length.</source>
-        <translation>没有选择要接触的内容。请选择固定点、圆环或长度。</translation>
+        <translation>没有选择要触测的内容。请选择固定点、圆环或长度。</translation>
     </message>
     <message>
         <source>Odd and even images put the tip {difference:.4f} mm apart, {usual:.4f} mm is usual. The tip may have moved: repeat the swing with the tip pressed in.</source>
@@ -4804,6 +5232,10 @@
     <message>
         <source>One swing tells nothing of how a pen changes; give two at least.</source>
         <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
+        <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
+        <translation>端口 {port} 已被另一个窗口或程序占用。请选择其他端口，或关闭那个程序。</translation>
     </message>
     <message>
         <source>Press the tip into the cone and keep it there.</source>
@@ -4832,6 +5264,10 @@
     <message>
         <source>Simulated pen</source>
         <translation>模拟光笔</translation>
+    </message>
+    <message>
+        <source>Streaming needs the package pyigtl, which is not installed. Install it with: pip install &quot;lightpen[stream]&quot;.</source>
+        <translation>实时数据流需要 pyigtl 软件包，但尚未安装。安装命令：pip install &quot;lightpen[stream]&quot;。</translation>
     </message>
     <message>
         <source>The GenTL producer {file} does not load: {why}. Choose the producer of this camera, for this system and 64 bit.</source>
@@ -4906,10 +5342,6 @@
         <translation>无法识别档案库服务器的地址。其格式为 postgresql://user:password@host/database。</translation>
     </message>
     <message>
-        <source>The adjustment did not settle in {n_steps} steps. The views may be too alike, or of another board than was said: check both.</source>
-        <translation>平差在 {n_steps} 步内未收敛。视图可能过于相似，或标定板与所指定的不符：请检查这两点。</translation>
-    </message>
-    <message>
         <source>The archive cannot be exported to {file}: {reason}. Free some space, or choose another folder.</source>
         <translation>无法将档案库导出到 {file}：{reason}。请释放一些空间，或选择其他文件夹。</translation>
     </message>
@@ -4967,7 +5399,7 @@
     </message>
     <message>
         <source>The camera file is of the camera {stated}, the camera in use is {used}. Give the file of this camera.</source>
-        <translation>相机文件属于相机 {stated}，而当前使用的相机是 {used}。请提供该相机的文件。</translation>
+        <translation>内参文件属于相机 {stated}，而当前使用的相机是 {used}。请提供该相机的文件。</translation>
     </message>
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
@@ -4976,10 +5408,6 @@
     <message>
         <source>The camera moved during the swing: fixed lamps in view shift by {shift:.2f} px, and the pen with them. It is taken out. Clamp the camera, and let it warm up.</source>
         <translation>相机在摆动过程中移动了：视野中的固定灯移动了 {shift:.2f} px，光笔也随之移动。此移动已被扣除。请固定相机，并让其充分预热。</translation>
-    </message>
-    <message>
-        <source>The camera moved: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much.</source>
-        <translation>相机移动了：视野中的固定灯在光笔处移动 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。接触的结果也有同样大的偏差。</translation>
     </message>
     <message>
         <source>The camera sends no images in the pixel format {wanted} that can be used; it offers {offered}. Choose Mono8, or another of Mono8 to Mono16.</source>
@@ -5039,7 +5467,7 @@
     </message>
     <message>
         <source>The chain {chain} does not end with the entry that was entered last.</source>
-        <translation>链 {chain} 的末尾不是最后登记的那条记录。</translation>
+        <translation>链 {chain} 的末尾不是最后录入的那个条目。</translation>
     </message>
     <message>
         <source>The cone moved by {distance:.4f} mm against the camera during the swing. Clamp both, let the camera warm up, and repeat. It is in the uncertainty.</source>
@@ -5047,7 +5475,7 @@
     </message>
     <message>
         <source>The diameter of the ball is not known, which a ring touched in its bore or from outside needs. Enter it where the tip is named.</source>
-        <translation>测球直径未知，而在孔内或外圆接触圆环时需要它。请在填写测头名称处输入。</translation>
+        <translation>测球直径未知，而在孔内或外圆触测圆环时需要它。请在填写测头名称处输入。</translation>
     </message>
     <message>
         <source>The difference from the tip that was in force before is accepted up to {gate:g} times U (k = 2) of the difference along each axis, with which an unchanged tip is accepted in 95 % of all cases; beyond it, or where that tip cannot be read, is CHECK. A CHECK is put in force only with a reason, a REPEAT not at all.</source>
@@ -5075,11 +5503,15 @@
     </message>
     <message>
         <source>The file {file} of entry {number} is missing.</source>
-        <translation>第 {number} 条记录的文件 {file} 缺失。</translation>
+        <translation>第 {number} 个条目的文件 {file} 缺失。</translation>
     </message>
     <message>
         <source>The file {file} of entry {number} is not as it was entered.</source>
-        <translation>第 {number} 条记录的文件 {file} 与登记时不符。</translation>
+        <translation>第 {number} 个条目的文件 {file} 与录入时不符。</translation>
+    </message>
+    <message>
+        <source>The file {file} of the tip library was written by a later version of the program. Use that version.</source>
+        <translation>测头库文件 {file} 由更新版本的程序写成。请使用该版本。</translation>
     </message>
     <message>
         <source>The file {file} was changed since it was closed.</source>
@@ -5095,7 +5527,7 @@
     </message>
     <message>
         <source>The fixed point is done: this touch of the cone does not count. Touch the ring.</source>
-        <translation>固定点已完成：这次对锥孔的接触不计入。请接触圆环。</translation>
+        <translation>固定点已完成：这次对锥孔的触测不计入。请触测圆环。</translation>
     </message>
     <message>
         <source>The folder {folder} cannot be made or read: {reason}. Choose another folder.</source>
@@ -5127,7 +5559,7 @@
     </message>
     <message>
         <source>The images contradict the LED file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this pen, or measure the pen again.</source>
-        <translation>图像与 LED 文件矛盾：图像要求{what}为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件给出 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于这支笔，或重新测量这支笔。</translation>
+        <translation>图像与 LED 文件矛盾：图像要求{what}为 {wanted:.6g} ± {wanted_u:.2g}{unit}，文件给出 {stated:.6g} ± {stated_u:.2g}{unit}。请检查该文件是否属于这支光笔，或重新测量这支光笔。</translation>
     </message>
     <message>
         <source>The images contradict the camera file: they want the {what} to be {wanted:.6g} ± {wanted_u:.2g}{unit}, the file says {stated:.6g} ± {stated_u:.2g}{unit}. Check that the file is of this camera, lens and focus, or calibrate the camera again.</source>
@@ -5183,7 +5615,7 @@
     </message>
     <message>
         <source>The length at {run} is off by {error:+.4f} mm (U {uncertainty:.4f} mm, limit {limit:.4f} mm). Is it the certified length of this bar? Else the scale of the LED file or the camera file is wrong, or the pen is warmer than when it was measured.</source>
-        <translation>{run} 处的长度偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。这是该标准杆的检定长度吗？否则是 LED 文件的尺度或内参文件有误，或光笔比测量 LED 时更热。</translation>
+        <translation>{run} 处的长度偏差 {error:+.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。输入的是这根标准棒的证书长度吗？否则是 LED 文件的尺度或内参文件有误，或光笔比测量 LED 时更热。</translation>
     </message>
     <message>
         <source>The length is not known. Enter the certified one.</source>
@@ -5218,6 +5650,10 @@
         <translation>{place} 的下一幅图像还要 {seconds:.1f} s。请等待，或加快回放。</translation>
     </message>
     <message>
+        <source>The nominal centre of tip {tip} is not possible: each coordinate is at most {most:g} mm from the origin of the pen frame.</source>
+        <translation>测头 {tip} 的标称中心不可能如此：各坐标距光笔坐标系原点最多 {most:g} mm。</translation>
+    </message>
+    <message>
         <source>The normal of LED {led} points away from the viewer (nz = {nz:.3f}); nz must be positive in the pen frame. Change its sign.</source>
         <translation>LED {led} 的法向量背向观察者 (nz = {nz:.3f})；在光笔坐标系中 nz 必须为正。请改变其符号。</translation>
     </message>
@@ -5238,16 +5674,32 @@
         <translation>光笔已抬起。放回测头即可继续。</translation>
     </message>
     <message>
+        <source>The pen is seen in {n} images of the spin; {needed} are needed. Spin it slowly, its LEDs to the camera.</source>
+        <translation>旋转的图像中只有 {n} 幅看到光笔；需要 {needed} 幅。请让 LED 朝向相机，慢慢旋转。</translation>
+    </message>
+    <message>
+        <source>The pen leans otherwise than at the touches before, so this one does not count. Hold it as before until the posture is done.</source>
+        <translation>光笔的倾斜与前几次接触不同，因此这一次不计入。在该姿态完成之前请保持原来的持法。</translation>
+    </message>
+    <message>
         <source>The pen was held alike each time: its postures differ by {found:.1f} degrees (rms), {needed:.0f} are needed to prove a tip. Lean it to all sides.</source>
         <translation>光笔每次的握持姿态相同：各姿态仅相差 {found:.1f}°（均方根），验证测头需要 {needed:.0f}°。请向各个方向倾斜。</translation>
     </message>
     <message>
+        <source>The pen was held like this before. Lean it another way, and touch the cone five times so.</source>
+        <translation>光笔此前已这样持过。请换一个方向倾斜，再接触锥孔五次。</translation>
+    </message>
+    <message>
         <source>The pen was lifted or moved before the touch was taken, so it does not count. Hold it still until it is.</source>
-        <translation>接触取得之前光笔被抬起或移动，因此不计入。请握住不动直到取得。</translation>
+        <translation>触测取得之前光笔被抬起或移动，因此不计入。请握住不动直到取得。</translation>
     </message>
     <message>
         <source>The pen was swung about one axis only, {axis}: that axis itself turned by {found:.1f} degrees (rms), {needed:.0f} degrees are needed, so the tip&apos;s place along it is not fixed. {advice}</source>
         <translation>光笔只绕一根轴摆动，即{axis}：该轴本身只转动了 {found:.1f}°（均方根），需要 {needed:.0f}°，因此测头沿该轴的位置无法确定。{advice}</translation>
+    </message>
+    <message>
+        <source>The pen was turned by {turn:.0f} degrees about its stylus; at least {needed:.0f} are needed. Keep the tip in the cone and turn it further to both sides.</source>
+        <translation>光笔绕测杆只转了 {turn:.0f} 度；至少需要 {needed:.0f} 度。请保持测头在锥孔中，向两侧再多转一些。</translation>
     </message>
     <message>
         <source>The point moves as the pen leans, by {deviation:.4f} mm along {axis} (limit {limit:.4f} mm): the tip sits {x:+.4f} {y:+.4f} {z:+.4f} mm from where it was calibrated. Was it exchanged, bent or screwed in anew, or is it the tip of another pen?</source>
@@ -5315,7 +5767,7 @@
     </message>
     <message>
         <source>The record of entry {number} of station {station} is missing or was changed. Get the entries from their station again.</source>
-        <translation>工位 {station} 第 {number} 条记录的标定数据缺失或被改动过。请从该工位重新获取这些记录。</translation>
+        <translation>工位 {station} 第 {number} 个条目的标定数据缺失或被改动过。请从该工位重新获取这些条目。</translation>
     </message>
     <message>
         <source>The record of {entry} is missing.</source>
@@ -5359,11 +5811,11 @@
     </message>
     <message>
         <source>The swing of the result {file} is not in {folder}. Copy it back there, then open the result again.</source>
-        <translation>校准结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
+        <translation>标定结果 {file} 对应的摆动记录不在 {folder} 中。请将其复制回该处，然后重新打开该结果。</translation>
     </message>
     <message>
         <source>The swing {folder} of entry {number} is missing.</source>
-        <translation>第 {number} 条记录的摆动 {folder} 缺失。</translation>
+        <translation>第 {number} 个条目的摆动 {folder} 缺失。</translation>
     </message>
     <message>
         <source>The swing {swing}, which was held out, does not confirm the new LED file: it leaves {after:.4f} px, the old one {before:.4f} px. The old file is as good, or the pen changed in between.</source>
@@ -5383,7 +5835,7 @@
     </message>
     <message>
         <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
-        <translation>{tip} 中的测头是用光笔文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
+        <translation>{tip} 中的测头是用 LED 文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
     <message>
         <source>The tip is being computed. Keep the pen at hand.</source>
@@ -5398,12 +5850,20 @@
         <translation>该测头需检查。{why}请注明理由后接受，否则不要接受。</translation>
     </message>
     <message>
+        <source>The tip library is not as it was laid down: {file} was changed or damaged since. Restore the file from a copy.</source>
+        <translation>测头库与当初保存的不一致：{file} 此后被更改或损坏。请从副本恢复该文件。</translation>
+    </message>
+    <message>
         <source>The tip lies {distance:.1f} mm from its nominal place. Is it the tip that is named?</source>
         <translation>测头偏离标称位置 {distance:.1f} mm。是否为所填写的测头？</translation>
     </message>
     <message>
         <source>The tip lies {distance:.4f} mm from that of {date}: along {axis} {difference:.4f} mm, where U (k = 2) of both explains {uncertainty:.4f} mm. Was it exchanged, bent, or mounted anew?</source>
         <translation>测头与 {date} 的结果相差 {distance:.4f} mm：沿 {axis} 方向相差 {difference:.4f} mm，而两者的 U (k = 2) 只能解释 {uncertainty:.4f} mm。测头是否更换、弯曲或重新安装过？</translation>
+    </message>
+    <message>
+        <source>The tip lies {distance:.4f} mm from that of {date}; its limit is {limit:.4f} mm. Was it exchanged, bent, or mounted anew?</source>
+        <translation>测头与 {date} 的位置相距 {distance:.4f} mm；其限值为 {limit:.4f} mm。是否更换过、弯曲过或重新安装过？</translation>
     </message>
     <message>
         <source>The tip repeats within {deviation:.4f} mm along {axis} (standard deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} mm.</source>
@@ -5418,12 +5878,16 @@
         <translation>各次标定的测头散布为 {of_tip:.4f} mm，而用它触测的固定点仅散布 {of_point:.4f} mm。标定误差会使二者同样变化：因此两次标定之间光笔上有东西移动。请检查测头是否拧紧、LED 是否松动或被碰，或 LED 是否测量得太粗。</translation>
     </message>
     <message>
+        <source>The tip {tip} is retired and cannot be put in force. Bring it back in the tip library, or calibrate another one.</source>
+        <translation>测头 {tip} 已停用，不能生效。请在测头库中恢复使用，或标定另一个测头。</translation>
+    </message>
+    <message>
         <source>The touches lie in one place or on a line, which is no circle. Touch the ring all round.</source>
         <translation>各触测点位于同一处或一条直线上，不成圆。请沿环一周触测。</translation>
     </message>
     <message>
         <source>The touches lie on a circle of radius {measured:.3f} mm, {certified} mm is certified. Is it this ring, and its radius rather than its diameter?</source>
-        <translation>触测点所在圆的半径为 {measured:.3f} mm，检定值为 {certified} mm。是这个环吗？给出的是半径而不是直径吗？</translation>
+        <translation>触测点所在圆的半径为 {measured:.3f} mm，证书值为 {certified} mm。是这个环吗？给出的是半径而不是直径吗？</translation>
     </message>
     <message>
         <source>The touches of {run} cover {covered:.0f} degrees of the ring, at least {needed:.0f} are needed: a radius from less is hardly worth anything. Touch the ring also in the gap between {first} and {second}.</source>
@@ -5443,7 +5907,11 @@
     </message>
     <message>
         <source>The two touches lie {distance:.2f} mm apart, {certified} mm is certified: they are not of its two ends. Touch the end opposite to the last touch.</source>
-        <translation>两次接触相距 {distance:.2f} mm，证书长度为 {certified} mm：它们不是该长度的两端。请接触与上一次接触相对的一端。</translation>
+        <translation>两次触测相距 {distance:.2f} mm，证书长度为 {certified} mm：它们不是该长度的两端。请触测与上一次触测相对的一端。</translation>
+    </message>
+    <message>
+        <source>The verification in {file} is not as it was written: it was changed or damaged since. Restore the file from a copy.</source>
+        <translation>{file} 中的验证与写入时不同：之后被更改或损坏。请从副本恢复该文件。</translation>
     </message>
     <message>
         <source>The verification is done. Put the pen down.</source>
@@ -5456,6 +5924,10 @@
     <message>
         <source>The views do not agree on where the second camera stands: {n_agree} of {n_pairs} do. Either a camera was moved meanwhile, or the images that are taken for one moment are not. Check their names and order.</source>
         <translation>各视图给出的第二台相机位置不一致：{n_pairs} 组中只有 {n_agree} 组一致。可能期间移动了某台相机，或配成一组的图像不是同一时刻。请检查图像的名称和顺序。</translation>
+    </message>
+    <message>
+        <source>The views do not reach the corners of the image, and the distortion that they tell would fold it there. {coefficients} is drawn towards 0, just so far that it does not: the corners are a guess. Add views with the board in each of them, or keep the pen out of them.</source>
+        <translation>视图未覆盖图像四角,由其得出的畸变会使图像在那里折叠。已将 {coefficients} 拉向 0,恰好使其不折叠:四角处只是推测。请补充标定板位于各角的视图,或不要让光笔进入四角。</translation>
     </message>
     <message>
         <source>The views leave the camera open: they are too alike. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image.</source>
@@ -5474,12 +5946,24 @@
         <translation>监视点只触测了一次，看不出漂移。请在工作之前、期间和之后各触测一次。</translation>
     </message>
     <message>
+        <source>The {kind} {id} is in the library already, retired. Bring it back, or give this one another id.</source>
+        <translation>测头库中已有{kind} {id}，但已停用。请恢复使用，或为这一个另取编号。</translation>
+    </message>
+    <message>
+        <source>The {kind} {id} is in the library already. Change that one, or give this one another id.</source>
+        <translation>测头库中已有{kind} {id}。请更改那一个，或为这一个另取编号。</translation>
+    </message>
+    <message>
+        <source>The {kind} {id} was to be used until {due} only. Have it looked after.</source>
+        <translation>{kind} {id} 只可用至 {due}。请安排检查。</translation>
+    </message>
+    <message>
         <source>The {what} of this camera cannot be set. Use the aperture of the lens.</source>
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
     <message>
         <source>There are entries of the chain {chain}, which the archive does not know.</source>
-        <translation>存在链 {chain} 的记录，但档案库中没有这条链。</translation>
+        <translation>存在链 {chain} 的条目，但档案库中没有这条链。</translation>
     </message>
     <message>
         <source>There are {n_few} images of {few} and {n_many} of {many}, and their names, such as {example} and {other}, do not tell which are of the same moment. Give the images of one moment the same name or number.</source>
@@ -5506,12 +5990,16 @@
         <translation>尚无主管密码。请与限值一起规定。</translation>
     </message>
     <message>
+        <source>There is no {kind} {id} in the library. Add it first.</source>
+        <translation>测头库中没有{kind} {id}。请先添加。</translation>
+    </message>
+    <message>
         <source>This end was touched before. Touch the other one.</source>
-        <translation>这一端已接触过。请接触另一端。</translation>
+        <translation>这一端已触测过。请触测另一端。</translation>
     </message>
     <message>
         <source>This place of the ring was touched before. Touch it where it was not.</source>
-        <translation>圆环的这一处已接触过。请接触未接触过的地方。</translation>
+        <translation>圆环的这一处已触测过。请触测未触测过的地方。</translation>
     </message>
     <message>
         <source>This posture was taken before. Leave the tip in the cone and lean the pen another way.</source>
@@ -5526,12 +6014,12 @@
         <translation>先触测长度的一端，再触测另一端，各保持不动：{n_touches} / 2。</translation>
     </message>
     <message>
-        <source>Touch the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees by {n_touches} touches.</source>
-        <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
+        <source>Touch the cone {needed} times in one posture and lift the tip in between: {n_touches} of {needed}. Posture {posture} of {n_postures}: upright, and leant to four sides.</source>
+        <translation>以同一姿态接触锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {posture} 个姿态，共 {n_postures} 个：竖直，以及向四个方向倾斜。</translation>
     </message>
     <message>
-        <source>Two cameras look at the pen, and a tip is verified by one. Choose a single camera with its intrinsics file.</source>
-        <translation>有两台相机看着光笔，而测头由一台相机验证。请选择单台相机及其内参文件。</translation>
+        <source>Touch the ring all round and hold still on each point: {covered:.0f} of {needed:.0f} degrees by {n_touches} touches.</source>
+        <translation>沿环一周触测，在每个点上保持不动：{n_touches} 次触测，{covered:.0f}° / {needed:.0f}°。</translation>
     </message>
     <message>
         <source>U (k = 2) cannot get below {floor:.1f} µm with this LED file; the limit is {limit:.1f} µm. No more images are asked for than the postures need.</source>
@@ -5555,7 +6043,7 @@
     </message>
     <message>
         <source>What would pass is CHECK nevertheless if odd and even images put the tip apart by more than the limit and by more than {halves:g} times U (k = 2) of their difference, if the images contradict a file by more than {contradicted:g} standard deviations, if cone and camera moved by more than {moved:.4f} mm, if the residuals exceed {sigma:g} px, if an LED stands out by more than {displaced:g} mm, if one of several cameras is out of step, if more than {dropped:.0f} % of the images take no part, if there are fewer than {n_images} images, or none on one of the eight sides.</source>
-        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥座与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；未参与计算的图像超过 {dropped:.0f} %；图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
+        <translation>即使 U 合格，出现下列任一情形仍判为“需检查”：由奇数图像与偶数图像求得的测头之差既超过限值，又超过该差值 U (k = 2) 的 {halves:g} 倍；图像与文件的矛盾超过 {contradicted:g} 倍标准差；锥孔与相机的相对移动超过 {moved:.4f} mm；残差超过 {sigma:g} px；某个 LED 明显偏离且超过 {displaced:g} mm；多台相机中有一台不同步；未参与计算的图像超过 {dropped:.0f} %；图像少于 {n_images} 幅；八个方向中有一个方向没有图像。</translation>
     </message>
     <message>
         <source>ball and cone, which are not quite round. Use better ones, and state their form error</source>
@@ -5587,7 +6075,7 @@
     </message>
     <message>
         <source>diameter of the discs</source>
-        <translation>发光圆面的直径</translation>
+        <translation>发光面的直径</translation>
     </message>
     <message>
         <source>downwards</source>
@@ -5595,7 +6083,7 @@
     </message>
     <message>
         <source>entry {number} of the chain {chain}</source>
-        <translation>链 {chain} 的第 {number} 条记录</translation>
+        <translation>链 {chain} 的第 {number} 个条目</translation>
     </message>
     <message>
         <source>exported archive</source>
@@ -5618,10 +6106,6 @@
         <translation>英寸</translation>
     </message>
     <message>
-        <source>k3 is held at 0: the views do not reach the corners, where it would fold the image. Error in views left out: {held_out:.4f} px.</source>
-        <translation>k3 固定为 0：视图未到达图像角部，否则 k3 会使图像在那里翻折。留出视图的误差：{held_out:.4f} px。</translation>
-    </message>
-    <message>
         <source>metres</source>
         <translation>米</translation>
     </message>
@@ -5631,7 +6115,7 @@
     </message>
     <message>
         <source>no entry</source>
-        <translation>无对应记录</translation>
+        <translation>无对应条目</translation>
     </message>
     <message>
         <source>no image</source>
@@ -5655,7 +6139,7 @@
     </message>
     <message>
         <source>scale of the LEDs</source>
-        <translation>LED 坐标的比例</translation>
+        <translation>LED 坐标的尺度</translation>
     </message>
     <message>
         <source>seal</source>
@@ -5663,7 +6147,7 @@
     </message>
     <message>
         <source>the diameter of the LED discs. State it and its uncertainty in the LED file</source>
-        <translation>LED 圆面的直径。请在 LED 文件中给出直径及其不确定度</translation>
+        <translation>LED 发光面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
         <source>top left</source>
@@ -5695,7 +6179,11 @@
     </message>
     <message>
         <source>{name} is of {n_cameras} cameras, and {n_files} files of cameras are beside it. Restore it from a copy.</source>
-        <translation>{name} 对应 {n_cameras} 台相机，而与之相配的相机文件有 {n_files} 个。请从备份恢复该文件。</translation>
+        <translation>{name} 对应 {n_cameras} 台相机，而与之相配的内参文件有 {n_files} 个。请从备份恢复该文件。</translation>
+    </message>
+    <message>
+        <source>{path} cannot be written: {reason} The images recorded so far are safe.</source>
+        <translation>无法写入 {path}：{reason}已记录的图像是安全的。</translation>
     </message>
     <message>
         <source>{path} does not hold all that is put on paper: it is no calibration, or one by an earlier version of the program. Give an accepted result or what the command calibrate wrote, or calibrate again from the images.</source>
@@ -5703,15 +6191,51 @@
     </message>
     <message>
         <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
-        <translation>{path} 既不是摆动记录，也不是校准结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
+        <translation>{path} 既不是摆动记录，也不是标定结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
     </message>
     <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
         <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
     <message>
+        <source>&apos;{id}&apos; is no id. Give up to {most} letters and digits, as its label has them.</source>
+        <translation>“{id}”不是编号。请按标签输入最多 {most} 个字母和数字。</translation>
+    </message>
+    <message>
+        <source>0 0 0 is no direction. Give the axis of the stylus from the ball into the pen, in the frame of the pen, such as 0 1 0.</source>
+        <translation>0 0 0 不是方向。请给出测杆轴线在光笔坐标系中由测球指向光笔的方向，例如 0 1 0。</translation>
+    </message>
+    <message>
+        <source>A ball of {diameter:g} mm is not possible: above 0 and up to {most:g} mm are. Measure it, or leave it out where it is not known.</source>
+        <translation>测球直径不可能是 {diameter:g} mm：须大于 0 且不超过 {most:g} mm。请测量；若未知则留空。</translation>
+    </message>
+    <message>
+        <source>A limit of {limit:g} mm for the change is not possible: above 0 and up to {most:g} mm are.</source>
+        <translation>变化限值不可能是 {limit:g} mm：须大于 0 且不超过 {most:g} mm。</translation>
+    </message>
+    <message>
+        <source>A touch {distance:.1f} mm from the others does not count: the tip was not in the cone. Put it into the cone and hold it still.</source>
+        <translation>与其他各点相距 {distance:.1f} mm 的一次接触不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
+    </message>
+    <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
+    </message>
+    <message>
+        <source>The adjustment did not settle in {n_steps} steps: the views are too alike, or of another board than was said. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image; if there are some, count and measure its squares again.</source>
+        <translation>平差在 {n_steps} 步内未收敛:视图过于相似,或标定板与所述不符。请补充标定板向各侧倾斜 20 至 40 度、并到达图像各角的视图;若已有这样的视图,请重新清点并测量其方格。</translation>
+    </message>
+    <message>
+        <source>The axis of the stylus is uncertain by {uncertainty:.1f} degrees, at most {needed:.1f} are of use: the pen was tilted while it was spun. Hold the stylus upright between two fingers and turn only.</source>
+        <translation>测杆轴线的不确定度为 {uncertainty:.1f} 度，最多 {needed:.1f} 度才可用：旋转时光笔发生了倾斜。请用两指扶直测杆，只转动。</translation>
+    </message>
+    <message>
+        <source>The calibration of a camera in {file} is not as it was written: it was changed or damaged since. Restore the file from a copy.</source>
+        <translation>{file} 中的相机标定与写入时不同：之后被更改或损坏。请从副本恢复该文件。</translation>
+    </message>
+    <message>
+        <source>The camera moved: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much, which its U counts.</source>
+        <translation>相机移动过：视野中固定的灯在光笔处偏移了 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。所测各点偏差与此相当，已计入其 U。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -5910,6 +6434,10 @@
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
     </message>
     <message>
+        <source>Where the tip has a limit of its own for its change, the distance from the tip that was in force before (as found) to the tip that is accepted (as left) is compared with it by simple acceptance; beyond it is CHECK.</source>
+        <translation>若测头自有变化限值，则将此前有效的测头（标定前状态）与所接受测头（标定后状态）之间的距离按简单接受与之比较；超出则为“需检查”。</translation>
+    </message>
+    <message>
         <source>Without these images there is no tip, so they stay in. {why}</source>
         <translation>剔除这些图像后求不出测头，因此它们仍参与计算。{why}</translation>
     </message>
@@ -5954,8 +6482,16 @@
         <translation>c11 至 c66 不是协方差：必须对称，相关系数在 -1 到 1 之间。请改正或删除这些列。</translation>
     </message>
     <message>
+        <source>calibration of a camera</source>
+        <translation>相机标定</translation>
+    </message>
+    <message>
         <source>camera file</source>
         <translation>内参文件</translation>
+    </message>
+    <message>
+        <source>cone</source>
+        <translation>锥孔</translation>
     </message>
     <message>
         <source>distortion coefficient {name}</source>
@@ -5968,6 +6504,10 @@
     <message>
         <source>file of LED centres</source>
         <translation>LED 中心文件</translation>
+    </message>
+    <message>
+        <source>file of the tip library</source>
+        <translation>测头库文件</translation>
     </message>
     <message>
         <source>focal length</source>
@@ -6014,12 +6554,20 @@
         <translation>看不到 LED</translation>
     </message>
     <message>
+        <source>pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
         <source>pen file</source>
         <translation>LED 文件</translation>
     </message>
     <message>
         <source>permission is denied. Choose another folder, or ask for access.</source>
         <translation>没有权限。请选择其他文件夹，或申请权限。</translation>
+    </message>
+    <message>
+        <source>picture</source>
+        <translation>图片</translation>
     </message>
     <message>
         <source>pose file</source>
@@ -6147,7 +6695,7 @@
     </message>
     <message>
         <source>the temperature of the pen. State its expansion in the LED file, and measure its temperature at the swing</source>
-        <translation>笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
+        <translation>光笔的温度。请在 LED 文件中给出其膨胀系数，并在摆动时测量其温度</translation>
     </message>
     <message>
         <source>the translation is more than {most:g} m. Check its units: millimetres are needed.</source>
@@ -6164,6 +6712,10 @@
     <message>
         <source>there is no LED {led}; the pen has LEDs 1 to {n_leds}. Check that the pen file is of this pen, and that LEDs are numbered from 1.</source>
         <translation>没有 LED {led}；光笔有 LED 1 至 {n_leds}。请检查 LED 文件是否属于这支光笔，LED 是否从 1 开始编号。</translation>
+    </message>
+    <message>
+        <source>tip</source>
+        <translation>测头</translation>
     </message>
     <message>
         <source>tip slipped</source>
@@ -6230,6 +6782,10 @@
         <translation>磁盘配额已用完。请清理空间，或写到其他地方。</translation>
     </message>
     <message>
+        <source>{address} is no address of this computer. Give one that it has in the network that may listen, or {loopback} for this computer alone.</source>
+        <translation>{address} 不是本机的地址。请填写本机在允许接收的网络中的地址，或填写 {loopback} 仅限本机。</translation>
+    </message>
+    <message>
         <source>{cell} is not a finite number.</source>
         <translation>{cell} 不是有限数。</translation>
     </message>
@@ -6256,6 +6812,10 @@
     <message>
         <source>{count} distortion coefficients</source>
         <translation>{count} 个畸变系数</translation>
+    </message>
+    <message>
+        <source>{count} is too few or too many: 1 to {most} days or swings are possible until a tip is due.</source>
+        <translation>{count} 太少或太多：测头到期前的天数或摆动次数可为 1 至 {most}。</translation>
     </message>
     <message>
         <source>{count} numbers</source>
@@ -6423,7 +6983,7 @@
     </message>
     <message>
         <source>{name} gives {one} and {other} the same camera file {file}. Each camera needs the file of its own calibration.</source>
-        <translation>{name} 为 {one} 和 {other} 指定了同一个相机文件 {file}。每台相机都需要自己的标定文件。</translation>
+        <translation>{name} 为 {one} 和 {other} 指定了同一个内参文件 {file}。每台相机都需要自己的标定文件。</translation>
     </message>
     <message>
         <source>{name} has LED discs {diameter:g} mm wide. A diameter of up to {most:g} mm is needed; check its units.</source>
@@ -6623,7 +7183,7 @@
     </message>
     <message>
         <source>{other} was made with another pen file than {first}. Give calibrations of one pen with one pen file.</source>
-        <translation>{other} 所用的光笔文件与 {first} 不同。请给出同一支光笔、同一光笔文件的标定结果。</translation>
+        <translation>{other} 所用的 LED 文件与 {first} 不同。请给出同一支光笔、同一 LED 文件的标定结果。</translation>
     </message>
     <message>
         <source>{path} cannot be changed: {reason}. Make sure that it is yours to write.</source>
@@ -6636,10 +7196,6 @@
     <message>
         <source>{path} cannot be written: {reason} What was there before is unchanged.</source>
         <translation>无法写入 {path}：{reason}原有内容未变。</translation>
-    </message>
-    <message>
-        <source>{path} cannot be written: {reason}. Free some space or choose another folder; the images recorded so far are safe.</source>
-        <translation>无法写入 {path}：{reason}。请清理空间或选择其他文件夹；已记录的图像是安全的。</translation>
     </message>
     <message>
         <source>{path} does not hold all that the tip was computed from: it is of an earlier version of the program, or was changed. Calibrate from the images.</source>
@@ -6674,8 +7230,16 @@
         <translation>{place}没有 {key}，或者它不是文本。请补上。</translation>
     </message>
     <message>
+        <source>{place} holds no images of two cameras. Give a folder with one folder for each camera in it, named as in the rig file: {names}.</source>
+        <translation>{place} 中没有两台相机的图像。请指定一个文件夹，其中每台相机各有一个文件夹，名称与相机组文件中的相同：{names}。</translation>
+    </message>
+    <message>
         <source>{place} holds no images. Choose a recording that holds some.</source>
         <translation>{place} 中没有图像。请选择有图像的录制。</translation>
+    </message>
+    <message>
+        <source>{place} holds the images of {n_given} cameras, and the tip is verified by {n_cameras}. Give the camera file, or the rig file, of these images.</source>
+        <translation>{place} 中有 {n_given} 台相机的图像，而验证测头用的是 {n_cameras} 台。请指定这些图像的相机文件或相机组文件。</translation>
     </message>
     <message>
         <source>{place} is no mapping with name, intrinsics and cam_from_rig.</source>
@@ -6793,6 +7357,34 @@
         <translation>备注</translation>
     </message>
     <message>
+        <source>Tip library</source>
+        <translation>测头库</translation>
+    </message>
+    <message>
+        <source>Verification</source>
+        <translation>验证</translation>
+    </message>
+    <message>
+        <source>Camera calibration</source>
+        <translation>相机标定</translation>
+    </message>
+    <message>
+        <source>Limits</source>
+        <translation>限值</translation>
+    </message>
+    <message>
+        <source>accepted</source>
+        <translation>已接受</translation>
+    </message>
+    <message>
+        <source>refused</source>
+        <translation>已拒绝</translation>
+    </message>
+    <message>
+        <source>abandoned</source>
+        <translation>已放弃</translation>
+    </message>
+    <message>
         <source>in force</source>
         <translation>有效</translation>
     </message>
@@ -6803,6 +7395,42 @@
     <message>
         <source>taken back</source>
         <translation>已撤回</translation>
+    </message>
+    <message>
+        <source>to be used until {0}</source>
+        <translation>可用至 {0}</translation>
+    </message>
+    <message>
+        <source>ball {0} mm</source>
+        <translation>测球 {0} mm</translation>
+    </message>
+    <message>
+        <source>nominal centre {0} mm</source>
+        <translation>标称中心 {0} mm</translation>
+    </message>
+    <message>
+        <source>axis {0}</source>
+        <translation>轴线 {0}</translation>
+    </message>
+    <message>
+        <source>change at most {0} mm</source>
+        <translation>最大变化 {0} mm</translation>
+    </message>
+    <message>
+        <source>{0} days at most</source>
+        <translation>最多 {0} 天</translation>
+    </message>
+    <message>
+        <source>{0} swings at most</source>
+        <translation>最多摆动 {0} 次</translation>
+    </message>
+    <message>
+        <source>signed by {0}</source>
+        <translation>由 {0} 签署</translation>
+    </message>
+    <message>
+        <source>retired</source>
+        <translation>已停用</translation>
     </message>
     <message>
         <source>Changed since it was entered</source>
@@ -6817,7 +7445,7 @@
     <name>paper</name>
     <message>
         <source>Misfit of each image / px</source>
-        <translation>各图像的拟合偏差 / px</translation>
+        <translation>各图像的拟合误差 / px</translation>
     </message>
     <message>
         <source>rms</source>
@@ -7044,6 +7672,22 @@
         <translation>需要查看</translation>
     </message>
     <message>
+        <source>Tip as found / mm</source>
+        <translation>标定前状态的测头 / mm</translation>
+    </message>
+    <message>
+        <source>As found, the tip in force until then lay {0} mm from the tip as left; it had no limit of change.</source>
+        <translation>标定前状态：此前有效的测头与标定后状态的测头相距 {0} mm；没有变化限值。</translation>
+    </message>
+    <message>
+        <source>As found, the tip in force until then lay {0} mm from the tip as left, within its limit of {1} mm.</source>
+        <translation>标定前状态：此前有效的测头与标定后状态的测头相距 {0} mm，在其限值 {1} mm 之内。</translation>
+    </message>
+    <message>
+        <source>As found, the tip in force until then lay {0} mm from the tip as left, BEYOND its limit of {1} mm.</source>
+        <translation>标定前状态：此前有效的测头与标定后状态的测头相距 {0} mm，超出其限值 {1} mm。</translation>
+    </message>
+    <message>
         <source>Odd minus even images / mm</source>
         <translation>奇数图像减偶数图像 / mm</translation>
     </message>
@@ -7069,7 +7713,7 @@
     </message>
     <message>
         <source>Budget of uncertainty</source>
-        <translation>不确定度评定</translation>
+        <translation>不确定度报告</translation>
     </message>
     <message>
         <source>Standard uncertainty (k = 1) / µm</source>
@@ -7285,15 +7929,15 @@
     </message>
     <message>
         <source>Drift of cone and camera</source>
-        <translation>锥座与相机的漂移</translation>
+        <translation>锥孔与相机的漂移</translation>
     </message>
     <message>
         <source>LED positions of the pen file</source>
-        <translation>光笔文件中的 LED 位置</translation>
+        <translation>LED 文件中的 LED 位置</translation>
     </message>
     <message>
         <source>Scale of the pen file</source>
-        <translation>光笔文件的尺度</translation>
+        <translation>LED 文件的尺度</translation>
     </message>
     <message>
         <source>Distance of the cones</source>
@@ -7301,11 +7945,11 @@
     </message>
     <message>
         <source>Diameter of the LED discs</source>
-        <translation>LED 圆盘直径</translation>
+        <translation>LED 发光面直径</translation>
     </message>
     <message>
         <source>Intrinsics of the camera file</source>
-        <translation>相机文件的内参</translation>
+        <translation>内参文件的内参</translation>
     </message>
     <message>
         <source>Places of the cameras</source>
@@ -7336,7 +7980,7 @@
     <name>phrases</name>
     <message>
         <source>Show the pen</source>
-        <translation>请出示光笔</translation>
+        <translation>让相机看到光笔</translation>
     </message>
     <message>
         <source>Seat the tip</source>
@@ -7357,6 +8001,10 @@
     <message>
         <source>{0} Accept it at the screen.</source>
         <translation>{0}请在屏幕上点击“接受”。</translation>
+    </message>
+    <message>
+        <source>centres</source>
+        <translation>中心</translation>
     </message>
     <message>
         <source>The LED table is not that of the file in use: save or discard it.</source>
@@ -7460,7 +8108,7 @@
     </message>
     <message>
         <source>Camera or cone moved</source>
-        <translation>相机或锥座移动</translation>
+        <translation>相机或锥孔移动</translation>
     </message>
     <message>
         <source>Not at the same time</source>
@@ -7485,10 +8133,6 @@
     <message>
         <source>noise</source>
         <translation>噪声</translation>
-    </message>
-    <message>
-        <source>centers</source>
-        <translation>中心</translation>
     </message>
     <message>
         <source>ball, cone</source>
@@ -7520,7 +8164,7 @@
     </message>
     <message>
         <source>discs</source>
-        <translation>圆面</translation>
+        <translation>发光面</translation>
     </message>
     <message>
         <source>camera</source>
@@ -7612,7 +8256,7 @@
     </message>
     <message>
         <source>READY</source>
-        <translation>准备</translation>
+        <translation>就绪</translation>
     </message>
     <message>
         <source>CAPTURING</source>
@@ -7780,6 +8424,37 @@
     <message>
         <source>none of {0} is installed</source>
         <translation>未安装 {0} 中的任何一个</translation>
+    </message>
+</context>
+<context>
+    <name>standing</name>
+    <message>
+        <source>valid</source>
+        <translation>有效</translation>
+    </message>
+    <message>
+        <source>OVERDUE</source>
+        <translation>已到期</translation>
+    </message>
+    <message>
+        <source>NOT CALIBRATED</source>
+        <translation>未标定</translation>
+    </message>
+    <message>
+        <source>RETIRED</source>
+        <translation>已停用</translation>
+    </message>
+    <message>
+        <source>Pen {0}</source>
+        <translation>光笔{0}</translation>
+    </message>
+    <message>
+        <source>Tip {0}</source>
+        <translation>测头{0}</translation>
+    </message>
+    <message>
+        <source>Cone {0}</source>
+        <translation>锥孔{0}</translation>
     </message>
 </context>
 </TS>
