@@ -72,13 +72,13 @@ class NamesForm(Translated, QWidget):
         self._station = StationField()
         self._operator = _name_edit()
         self._probe = QGroupBox()
-        self._lists = {kind: ItemButton() for kind in ItemKind}
-        self._pen = _ListedEdit(self._lists[ItemKind.PEN])
-        self._tip = _ListedEdit(self._lists[ItemKind.TIP])
+        self._pen = _ListedEdit()
+        self._tip = _ListedEdit()
         self._ball = NumberField("mm", (0.0, LARGEST_BALL), 4)
         self._ball.setKeyboardTracking(False)
-        self._cone = _ListedEdit(self._lists[ItemKind.CONE])
+        self._cone = _ListedEdit()
         self._nominal_tip = PointField()
+        self._lists = {kind: ItemButton() for kind in ItemKind}
         self._edits = (self._operator, self._pen, self._tip, self._cone)
         self._labels: dict[QWidget, QLabel] = {
             field: field_label(field)
@@ -90,11 +90,14 @@ class NamesForm(Translated, QWidget):
         place.addLayout(self._labelled(self._station), 0, 0)
         place.addLayout(self._labelled(self._operator), 0, 1)
         probe = _panel(self._probe)
-        probe.addLayout(self._listed(self._pen, ItemKind.PEN), 0, 0)
-        probe.addLayout(self._listed(self._cone, ItemKind.CONE), 0, 1)
-        probe.addLayout(self._listed(self._tip, ItemKind.TIP), 1, 0)
+        rows = {kind: QHBoxLayout() for kind in ItemKind}
+        probe.addLayout(self._beside(self._pen, rows[ItemKind.PEN]), 0, 0)
+        probe.addLayout(self._beside(self._cone, rows[ItemKind.CONE]), 0, 1)
+        probe.addLayout(self._beside(self._tip, rows[ItemKind.TIP]), 1, 0)
         probe.addLayout(self._labelled(self._ball), 1, 1)
         probe.addLayout(self._labelled(self._nominal_tip), 2, 0, 1, 2)
+        for kind, row in rows.items():  # the Tab key leads through all names first
+            row.addWidget(self._lists[kind])
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(2 * GRID)
@@ -108,8 +111,14 @@ class NamesForm(Translated, QWidget):
         for edit in self._edits:
             edit.textEdited.connect(self.value_edited)
             edit.editingFinished.connect(self.value_changed)
+        listed = {
+            ItemKind.PEN: self._pen,
+            ItemKind.TIP: self._tip,
+            ItemKind.CONE: self._cone,
+        }
         for kind, button in self._lists.items():
             button.chosen.connect(partial(self.item_chosen.emit, kind))
+            listed[kind].list_requested.connect(button.showMenu)
             button.library_requested.connect(partial(self.library_requested.emit, kind))
         self._ball.valueChanged.connect(self.value_changed)
         self._nominal_tip.value_changed.connect(self.nominal_tip_changed)
@@ -187,12 +196,10 @@ class NamesForm(Translated, QWidget):
     def _labelled(self, field: QWidget) -> QVBoxLayout:
         return stacked(self._labels[field], field)
 
-    def _listed(self, field: QWidget, kind: ItemKind) -> QVBoxLayout:
-        """Return a name with its label above and its list beside."""
-        row = QHBoxLayout()
+    def _beside(self, field: QWidget, row: QHBoxLayout) -> QVBoxLayout:
+        """Return a name with its label above, in a row with room for its list."""
         row.setSpacing(GRID // 2)
         row.addWidget(field, 1)
-        row.addWidget(self._lists[kind])
         layout = QVBoxLayout()
         layout.setSpacing(GRID // 2)
         layout.addWidget(self._labels[field])
@@ -349,17 +356,18 @@ class LimitsForm(Translated, QGroupBox):
 
 
 class _ListedEdit(QLineEdit):
-    """A name whose list an arrow key opens."""
+    """A name whose list an arrow key asks for."""
 
-    def __init__(self, button: ItemButton) -> None:
+    list_requested = Signal()
+
+    def __init__(self) -> None:
         super().__init__()
-        self._button = button
         self.setMaxLength(LONGEST_NAME)
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Down:
-            self._button.showMenu()
+            self.list_requested.emit()
         else:
             super().keyPressEvent(event)
 

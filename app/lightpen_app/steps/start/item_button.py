@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QMenu, QWidget
 
 from lightpen_app.look.words import shortened
@@ -37,7 +37,6 @@ class ItemButton(Translated, PushButton):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(0, parent)
         self._choices: tuple[ItemChoice, ...] = ()
-        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # a name's arrow key opens it
         self._menu = QMenu(self)
         self.setMenu(self._menu)
         self._retranslate()

@@ -1480,9 +1480,10 @@ def test_every_control_has_a_name_and_is_reached_by_tab(start: Opened) -> None:
         QTest.keyClick(widget, Key.Key_Tab)
 
     names = [w.accessibleName() or getattr(w, "text", str)() for w in seen]
-    assert names[:9] == [
+    assert names[:12] == [
         *("Station", "Operator", "Pen, serial number", "Cone", "Probe tip"),
         *("Ball diameter", "As in the LED file: 0.000  -90.000  -25.000 mm"),
+        *("List of pens", "List of tips", "List of cones"),
         *("U (k = 2) at most", "Images at least"),
     ]
     assert "Test the sounds" in names
