@@ -30,10 +30,10 @@ from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.settings import Settings, Station
 
 NAMES = Names("Bench", "Ann", "SIM-1", "T-1", "C-1", 10.0)
-PAGES = ("start", "camera", "leds", "verify", "history")
+PAGES = ("start", "camera", "leds", "swing", "verify", "history")
 MINIMISED = ("camera", "verify")
 TIP_PEN = [-1.3179, -90.4102, -23.8551]
-SETTLING_S = 8.0  # until the simulated pen rests, and what was begun has ended
+SETTLING_S = 4.0  # until what was begun on a page has ended
 
 
 def main() -> int:

@@ -3,7 +3,7 @@
 One thread looks at the images. While nothing is captured it takes the newest and passes
 over those that came meanwhile; during a swing or a verification it takes them all, in
 order, of two cameras those of one moment together. Where nothing moves it looks twice a
-second, in the midst of a swing after a while only; where nobody looks on, not at all.
+second, and where nobody looks on, not at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,8 +45,6 @@ from lightpen.verification.runner import VerificationRunner
 LONGEST_WAIT = 0.1  # s, after which a swing that began is noticed at the latest
 UNHURRIED = 0.5  # s from image to image while nothing moves
 LIVELY_NS = 2_000_000_000  # after the last move, for which every image is looked at
-# The same while images are captured: a hand that holds still for it has ended by then.
-PATIENT_NS = 10_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,19 +242,18 @@ class Live:
         """Return how long the camera may rest after each image, s; None for good."""
         if self._stream is not None and self._stream.is_heard:
             return 0.0
-        if self._moved_ns is None:  # the first image tells of what size they are
+        if self._verified() is not None:
             return 0.0
-        still_ns = self._seen_ns - self._moved_ns
         status = self._runner.status
         waits = status.state is None or status.state.phase is Phase.WAIT
-        is_captured = status.is_capturing and not (waits or status.is_paused_by_user)
-        if is_captured and status.setup is not None and status.setup.is_recording:
+        if status.is_capturing and not (waits or status.is_paused_by_user):
             return 0.0
-        if is_captured or self._verified() is not None:
-            return 0.0 if still_ns < PATIENT_NS else UNHURRIED
+        if self._moved_ns is None:  # the first image tells of what size they are
+            return 0.0
         if not self._is_watched:
             return None
-        return 0.0 if still_ns < LIVELY_NS else UNHURRIED
+        is_lively = self._seen_ns - self._moved_ns < LIVELY_NS
+        return 0.0 if is_lively else UNHURRIED
 
     def _notice(self, image: LiveImage) -> None:
         """Remember when anything was seen to move last."""
