@@ -197,7 +197,7 @@ def test_a_tip_that_was_never_calibrated_is_marked_in_list_panel_and_side_bar(
     assert sidebar.standing().text == (
         "Tip NOT CALIBRATED  \N{MIDDLE DOT}  Cone OVERDUE"
     )
-    assert told[-1][0].endswith(sidebar.standing().text)
+    assert sidebar.standing().text in told[-1][0]
     assert told[-1][1]
 
 
