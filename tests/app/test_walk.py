@@ -96,7 +96,7 @@ def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None
     assert not walker.main_button().isEnabled()
     for name, text in {**NAMES, **FEW}.items():
         walker.click_into(name, text)
-    walker.until_says("Pen\xa0LP-04  ·  Tip\xa0T-10  ·  Cone\xa0C-1")
+    walker.until_says("Pen LP-04\nTip T-10\nCone C-1")
     assert walker.says("SIMULATED")
     walker.click("Continue to the camera")
 

@@ -31,7 +31,7 @@ class _Verdict(Struct, frozen=True):
     limits_mm: dict[str, float] = {}
 
 
-class TouchRun(Struct, frozen=True):
+class KeptTouchRun(Struct, frozen=True):
     """Where the images of a run of live touches are kept, in the folder of touches."""
 
     folder: str
@@ -39,7 +39,7 @@ class TouchRun(Struct, frozen=True):
 
 
 class _Inputs(Struct, frozen=True):
-    touches: tuple[TouchRun, ...] = ()
+    touches: tuple[KeptTouchRun, ...] = ()
 
 
 class KeptVerification(Struct, frozen=True):

@@ -1207,7 +1207,7 @@ def test_a_record_that_is_gone_cannot_be_captured_into(
 
     assert "is damaged" in told.args[0]
     assert workbench.run.status.solution is not None
-    assert page.main_action().why_not == ""
+    qtbot.waitUntil(lambda: page.main_action().why_not == "")
 
 
 def test_a_repetition_is_asked_for_and_can_be_declined(
