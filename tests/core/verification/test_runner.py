@@ -464,7 +464,7 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
     at_it.touch(leant(4)[0])
     at_it.runner.touch_anew(TaskKind.FIXED_POINT)
     (first,) = at_it.runs
-    assert open_record(first).verdict == DISCARDED
+    at_it.ear.wait_until(lambda: open_record(first).verdict == DISCARDED)
     (at_it.kept / TOUCHES).rename(at_it.folder / "elsewhere")
     (at_it.kept / TOUCHES).write_text("A file where the folder should be.")
     at_it.touch(leant(4)[1])
