@@ -10,7 +10,12 @@ from lightpen.estimation.calibrate import Calibration
 from lightpen.estimation.led_quality import DISPLACED
 from lightpen.estimation.rig_report import late_cameras
 from lightpen.estimation.single_images import USUAL_SIGMA
-from lightpen.estimation.uncertainty import IMAGES_SHRINK, Halves, ShareName
+from lightpen.estimation.uncertainty import (
+    IMAGES_SHRINK,
+    POSTURES,
+    Halves,
+    ShareName,
+)
 from lightpen.messages import (
     Code,
     camera_moved,
@@ -43,6 +48,11 @@ AXES = "xyz"
 TINY = 1e-12  # mm
 
 _ADVICE = {
+    ShareName.CENTERS: sentence(
+        "share.centers",
+        "the LED centres, which are off alike whenever the pen leans alike. Focus the "
+        "lens, light the LEDs evenly, and state how far off they are left",
+    ),
     ShareName.LEDS: sentence(
         "share.leds", "the LED file. Measure the LEDs better, and state how well"
     ),
@@ -277,7 +287,9 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     budget = calibration.budget
     largest = budget.largest_share
     by_largest = budget.weakest_share(largest)
-    if largest.name in IMAGES_SHRINK:
+    n_images, n_used = len(calibration.used), int(calibration.used.sum())
+    is_same_in_more = largest.name is ShareName.CENTERS and n_used >= POSTURES
+    if largest.name in IMAGES_SHRINK and not is_same_in_more:
         reason = uncertain(uncertainty, limit)
     elif largest.name is ShareName.LEDS and calibration.led_sigma > DISPLACED:
         reason = leds_off(calibration.led_sigma, by_largest)
@@ -310,7 +322,6 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
         lengths = np.linalg.norm(calibration.leds.displacement, axis=1)
         led = max(calibration.leds.displaced, key=lambda each: lengths[each - 1])
         return Verdict(Grade.CHECK, led_displaced(led, float(lengths[led - 1])))
-    n_images, n_used = len(calibration.used), int(calibration.used.sum())
     if n_images - n_used > MANY_DROPPED * n_images:
         return Verdict(Grade.CHECK, many_dropped(n_images - n_used, n_images))
     if uncertainty > limit:
