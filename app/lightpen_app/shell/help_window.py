@@ -1,6 +1,8 @@
-"""Help about one step, in a window of its own."""
+"""Help about one step, and what it links, in a window of its own."""
 
-from PySide6.QtCore import Qt
+from pathlib import PurePosixPath
+
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import (
     QKeyEvent,
     QTextBlockFormat,
@@ -20,7 +22,7 @@ _PROPORTIONAL = QTextBlockFormat.LineHeightTypes.ProportionalHeight.value
 
 
 def help_text(key: str, language: Language) -> str:
-    """Return the help about a step, as Markdown; in English if need be."""
+    """Return the help about a step or a method, as Markdown; in English if need be."""
     for folder in (language, Language.ENGLISH):
         path = HELP / folder / f"{key}.md"
         if path.is_file():
@@ -41,6 +43,7 @@ class HelpWindow(Translated, QWidget):
         # Widgets
         self._browser = QTextBrowser()
         self._browser.setOpenLinks(False)
+        self._browser.anchorClicked.connect(self._on_anchor_clicked)
 
         # Layout
         layout = QVBoxLayout(self)
@@ -54,7 +57,7 @@ class HelpWindow(Translated, QWidget):
         return self._browser.toPlainText()
 
     def set_topic(self, key: str, language: Language) -> None:
-        """Show the help about a step."""
+        """Show the help about a step or a method."""
         self._key, self._language = key, language
         self._browser.setMarkdown(help_text(key, language))
         _space_out(self._browser.document())
@@ -65,6 +68,9 @@ class HelpWindow(Translated, QWidget):
             self.close()
         else:
             super().keyPressEvent(event)
+
+    def _on_anchor_clicked(self, link: QUrl) -> None:
+        self.set_topic(PurePosixPath(link.path()).stem, self._language)
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Help"))

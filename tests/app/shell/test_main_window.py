@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QMenu,
     QMessageBox,
     QPushButton,
+    QTextBrowser,
     QVBoxLayout,
     QWidget,
 )
@@ -22,6 +23,7 @@ from lightpen.model.origin import Origin
 from lightpen.record.names import Names
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import Appearance
+from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.shell.placement import fitted_place
@@ -467,6 +469,24 @@ def test_what_must_be_pressed_at_the_screen_is_not_pressed_from_afar(
     QTest.keyClick(shell.window, Key.Key_Return)
 
     assert shell.shown == "Camera"
+
+
+@pytest.mark.parametrize("language", Language)
+def test_the_help_of_review_links_how_the_tip_is_found(
+    language: Language, qtbot: QtBot
+) -> None:
+    window = HelpWindow()
+    qtbot.addWidget(window)
+    window.set_topic("review", language)
+    window.show()
+
+    browser = window.findChild(QTextBrowser)
+    assert browser is not None
+    QTest.keyClick(browser, Key.Key_Tab)
+    QTest.keyClick(browser, Key.Key_Return)
+
+    assert "what its uncertainty holds" in window.text().splitlines()[0]
+    assert "restricted maximum likelihood" in window.text()
 
 
 def test_f11_works_while_the_help_is_in_front(shell: Shell) -> None:
