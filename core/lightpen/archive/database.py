@@ -8,8 +8,9 @@ the steps in the folder ``migrations``.
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Event
 
 from sqlalchemy import (
     Connection,
@@ -63,6 +64,7 @@ class Database:
     engine: Engine
     name: str
     file: Path | None = None
+    _is_closed: Event = field(default_factory=Event)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -73,7 +75,7 @@ class Database:
         ArchiveError
             It cannot be read.
         """
-        with _telling(self.name), self.engine.begin() as connection:
+        with self._used(self.engine) as connection:
             yield connection
 
     @contextmanager
@@ -86,12 +88,22 @@ class Database:
             It cannot be written.
         """
         options = self.engine.execution_options(is_writing=True)
-        with _telling(self.name), options.begin() as connection:
+        with self._used(options) as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it."""
-        self.engine.dispose()
+        """Let go of it, of what others still read as soon as they are done."""
+        self._is_closed.set()
+        self.engine.pool.dispose()
+
+    @contextmanager
+    def _used(self, engine: Engine) -> Iterator[Connection]:
+        try:
+            with _telling(self.name), engine.begin() as connection:
+                yield connection
+        finally:
+            if self._is_closed.is_set():
+                self.engine.pool.dispose()
 
 
 def open_file(path: Path) -> Database:
@@ -113,8 +125,12 @@ def open_file(path: Path) -> Database:
 
     def connect() -> sqlite3.Connection:
         connection = _connected(str(path))
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+        except sqlite3.Error:
+            connection.close()
+            raise
         return connection
 
     return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))

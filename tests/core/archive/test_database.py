@@ -113,3 +113,19 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
 
     with pytest.raises(ArchiveError, match="holds the tables of another program"):
         open_server(address)
+
+
+def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    database = open_file(file)
+    with database.reading() as connection:
+        used = connection.connection.dbapi_connection
+        database.close()
+        connection.exec_driver_sql("SELECT 1")
+
+    assert isinstance(used, sqlite3.Connection)
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        used.execute("SELECT 1")
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
