@@ -36,6 +36,7 @@ VERSION = "1"  # of the tables, as the last of the migrations says
 VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
+MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -289,6 +290,8 @@ def _telling(name: str) -> Iterator[None]:
         yield
     except SQLAlchemyError as error:
         raise _unusable(name, _reason(error)) from error
+    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+        raise _unusable(name, MALFORMED) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:
