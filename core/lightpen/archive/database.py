@@ -37,6 +37,7 @@ VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
 LONGEST_FAREWELL_S = 2  # for those who use it when it closes
+MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -76,7 +77,7 @@ class Database:
         ArchiveError
             It cannot be read, or was closed.
         """
-        with self._uses.one(), _telling(self.name), self.engine.begin() as connection:
+        with self._used(self.engine) as connection:
             yield connection
 
     @contextmanager
@@ -89,16 +90,23 @@ class Database:
             It cannot be written, or was closed.
         """
         options = self.engine.execution_options(is_writing=True)
-        with self._uses.one(), _telling(self.name), options.begin() as connection:
+        with self._used(options) as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it, once those who use it now are done.
-
-        A connection that is still in use would stay open after the others.
-        """
+        """Let go of it, once those who use it now are done."""
         self._uses.end(LONGEST_FAREWELL_S)
-        self.engine.dispose()
+        self.engine.pool.dispose()
+
+    @contextmanager
+    def _used(self, engine: Engine) -> Iterator[Connection]:
+        with self._uses.one(), _telling(self.name):
+            try:
+                with engine.begin() as connection:
+                    yield connection
+            finally:
+                if self._uses.are_over:  # who is late takes its connection along
+                    self.engine.pool.dispose()
 
 
 def open_file(path: Path) -> Database:
@@ -120,8 +128,12 @@ def open_file(path: Path) -> Database:
 
     def connect() -> sqlite3.Connection:
         connection = _connected(str(path))
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+        except sqlite3.Error:
+            connection.close()
+            raise
         return connection
 
     return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
@@ -280,6 +292,8 @@ def _telling(name: str) -> Iterator[None]:
         yield
     except SQLAlchemyError as error:
         raise _unusable(name, _reason(error)) from error
+    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+        raise _unusable(name, MALFORMED) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:
