@@ -20,6 +20,7 @@ import fcntl
 import json
 import os
 import random
+import select
 import shutil
 import signal
 import struct
@@ -120,38 +121,50 @@ class Victim:
             [sys.executable, str(VICTIM), str(data)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            encoding="utf-8",
+            bufsize=0,
         )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._input, self._output = self._process.stdin, self._process.stdout
         self._child = 0
-        self._is_stopped = False
+        self._unread = b""
 
     def begin(self) -> None:
         """Let it write, and return when it has begun."""
-        self._input.write("go\n")
-        self._input.flush()
-        self._child = int(self._output.readline())
-        assert self._output.readline() == "begun\n"
+        assert self._process.stdin is not None
+        self._process.stdin.write(b"go\n")
+        self._child = int(self._line())
+        assert self._line() == "begun"
 
     def signal(self, number: int) -> None:
         """Send it a signal."""
         os.kill(self._child, number)
 
+    def told(self) -> list[str]:
+        """Return what it has told by now and was not returned yet."""
+        while select.select([self._output()], [], [], 0)[0]:
+            self._unread += os.read(self._output(), 65536)
+        *lines, self._unread = self._unread.split(b"\n")
+        return [line.decode() for line in lines]
+
     def killed(self) -> list[str]:
         """Kill it, and return what it had told."""
         self.signal(signal.SIGKILL)
         told = []
-        while (line := self._output.readline().rstrip("\n")) != "dead":
+        while (line := self._line()) != "dead":
             told.append(line)
         return told
 
     def close(self) -> None:
         """End it."""
-        self._input.close()
-        self._process.wait()
-        self._output.close()
+        self._process.communicate()
+
+    def _output(self) -> int:
+        assert self._process.stdout is not None
+        return self._process.stdout.fileno()
+
+    def _line(self) -> str:
+        while b"\n" not in self._unread:
+            self._unread += os.read(self._output(), 65536)
+        line, _, self._unread = self._unread.partition(b"\n")
+        return line.decode()
 
 
 def cut_rows() -> list[Row]:
@@ -295,9 +308,13 @@ class _OnDisk(_Trial):
         self._mount()
 
     def cut(self, victim: Victim) -> list[str]:
+        # What it tells when the disk is gone, no cut of the power lets anybody hear.
+        victim.signal(signal.SIGSTOP)
+        told = victim.told()
         self.stop()
+        victim.signal(signal.SIGCONT)
         time.sleep(WITHOUT_DISK_S)
-        told = victim.killed()
+        told += [line for line in victim.killed() if line.startswith("trouble")]
         _run("umount", str(self.place.folder))
         self._mount()
         return told

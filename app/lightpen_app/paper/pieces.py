@@ -185,7 +185,7 @@ def table(
         replace(
             _row(columns, widths, cells, size, bold=i in strong),
             head=head,
-            keeps=i + 2 == len(rows),  # the last one does not stand alone
+            keeps=i + 1 < len(rows) and i in (0, len(rows) - 2),  # none stands alone
         )
         for i, cells in enumerate(rows)
     ]

@@ -31,7 +31,7 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
-from lightpen.formats.files import printable, strerror, sync_folder
+from lightpen.formats.files import printable
 from lightpen.record.numbered_files import make_folder
 from lightpen.sentences import sentence
 
@@ -142,13 +142,7 @@ def open_file(path: Path) -> Database:
         connection.execute("PRAGMA synchronous = FULL")
         return connection
 
-    database = _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
-    try:
-        sync_folder(path.parent)  # SQLite does so for its journals only
-    except OSError as error:
-        database.close()
-        raise _unusable(name, strerror(error)) from error
-    return database
+    return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
 
 
 def look_into(path: Path) -> Database:
