@@ -26,7 +26,7 @@ from sqlalchemy import (
     table,
     text,
 )
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
@@ -186,6 +186,8 @@ def open_server(address: str) -> Database:
         url = make_url(address)
         if url.get_backend_name() != "postgresql":
             raise ArgumentError("no PostgreSQL")
+        if "@" in (url.host or ""):
+            raise ArgumentError("a password with a sign that is to be written as %40")
         url = url.set(drivername="postgresql+psycopg")
         engine = create_engine(url, connect_args=_CALLING)
         event.listen(engine, "connect", _ask_to_notice)
@@ -194,7 +196,8 @@ def open_server(address: str) -> Database:
             sentence(
                 "archive.no-address",
                 "The address of the archive's server cannot be read. It has the form "
-                "postgresql://user:password@host/database.",
+                "postgresql://user:password@host/database, with %40 for an @ in the "
+                "password.",
             )
         ) from error
     except ModuleNotFoundError as error:
@@ -205,7 +208,14 @@ def open_server(address: str) -> Database:
                 'installed. Install it with: pip install "lightpen[postgres]".',
             )
         ) from error
-    return _brought_up_to_date(Database(engine, url.render_as_string()))
+    return _brought_up_to_date(Database(engine, _without_password(url)))
+
+
+def _without_password(url: URL) -> str:
+    """Return an address fit to be shown: its options may hold the password, too."""
+    user = f"{url.username}@" if url.username else ""
+    place = f"{url.host or 'localhost'}:{url.port}" if url.port else url.host or ""
+    return printable(f"postgresql://{user}{place}/{url.database or ''}")
 
 
 def _read_only(path: Path) -> Database:
@@ -273,8 +283,9 @@ def _brought_up_to_date(database: Database) -> Database:
 
 
 def _ask_to_notice(connection: Any, record: object) -> None:
+    connection.autocommit = True  # a line cut here leaves nothing begun
     connection.execute(_SERVER_NOTICES)
-    connection.commit()
+    connection.autocommit = False
 
 
 @contextmanager

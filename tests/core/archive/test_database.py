@@ -128,6 +128,21 @@ def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> 
     assert PASSWORD not in told
 
 
+@pytest.mark.parametrize(
+    "address",
+    [
+        f"postgresql://plant:{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://plant:it-is@{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://127.0.0.1:1/plant?user=plant&password={PASSWORD}",
+    ],
+)
+def test_no_way_of_giving_a_password_has_it_told(address: str) -> None:
+    with pytest.raises(ArchiveError) as caught:
+        open_server(address)
+
+    assert PASSWORD not in str(caught.value.sentence)
+
+
 def test_a_server_that_is_no_postgresql_is_said_to_be_unusable(gopher: int) -> None:
     with pytest.raises(ArchiveError, match="cannot be used"):
         open_server(f"postgresql://plant:{PASSWORD}@127.0.0.1:{gopher}/plant")
