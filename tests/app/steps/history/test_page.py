@@ -24,6 +24,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
+from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
@@ -205,6 +206,27 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.select(0)
     limit = f"max_radius_mm {StationLimits().verification.radius}"
     desk.until(lambda: limit in _words(desk))
+
+
+def test_a_server_that_cannot_be_reached_is_told_without_the_password(
+    desk: Desk,
+) -> None:
+    folder = desk.workbench.folder
+    away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
+    desk.workbench.run.logbook = LateLogbook(folder, away)
+    desk.enter(1)
+    desk.open()
+    desk.show_tab(WHOLE)
+    panel = desk.child(ArchivePanel)
+
+    def told() -> str:
+        desk.page.entered()
+        return panel.told()[0].text
+
+    desk.until(lambda: "does not have all entries" in told())
+    assert "The archive postgresql" in told()
+    assert "secret-word" not in told()
+    desk.workbench.run.logbook.close()
 
 
 def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
