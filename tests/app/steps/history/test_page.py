@@ -48,9 +48,9 @@ from lightpen_app.steps.history.history_table import (
 )
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.trend_panel import TrendPanel
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
