@@ -143,6 +143,7 @@ class HistoryContent(Translated, QWidget):
         self._filter.set_known(opening.names)
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
+        self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
         # Later than what is seen at once.
