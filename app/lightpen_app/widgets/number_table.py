@@ -99,7 +99,13 @@ class NumberTable(QTableWidget):
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(20 * GRID, self.sizeHint().height())
+        columns, heads = range(self.columnCount()), self.horizontalHeader()
+        needed = (
+            max(self.sizeHintForColumn(i), heads.sectionSizeHint(i)) for i in columns
+        )
+        width = len(columns) * max(needed, default=0)
+        width += self.verticalHeader().sizeHint().width()
+        return QSize(max(width, 20 * GRID), self.sizeHint().height())
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:
