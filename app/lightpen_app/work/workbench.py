@@ -25,6 +25,7 @@ from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
+from lightpen.record.data_folder import check_writable
 from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
@@ -98,6 +99,9 @@ class Workbench(QObject):
         `subject` is different.
     others_counted(int)
         So many other windows of the program use the data folder, told when it changes.
+    folder_doubted(str)
+        The sentence why nothing can be kept in the data folder, or that it can again,
+        empty.
     troubled(str)
         A sentence to be read.
     swing_wanted(Path)
@@ -112,6 +116,7 @@ class Workbench(QObject):
     changed = Signal()
     subject_changed = Signal(object)
     others_counted = Signal(int)
+    folder_doubted = Signal(str)
     swing_wanted = Signal(object)
     troubled = Signal(str)
     relieved = Signal(str)
@@ -139,6 +144,7 @@ class Workbench(QObject):
         self._presence = Presence(folder)
         self._n_others = 0
         self._counter: Job | None = None
+        self._folder_trouble = ""
         self._counting = QTimer(self)
         self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
@@ -249,6 +255,7 @@ class Workbench(QObject):
             self._on_settings_troubled(self._settings.trouble)
         folder = self._folder  # a job that knew its parent would outlive it
         Job(lambda _: sweep_leftovers(folder), self).start()
+        self._check_folder()
         self.run.runner.open_logbook()
         self._read_supervision()
         self.library.refresh()
@@ -554,10 +561,30 @@ class Workbench(QObject):
         if supervision.is_guarded:
             self.set_supervision(supervision)
 
+    def _check_folder(self) -> None:
+        """See whether anything can be kept in the data folder."""
+        folder = self._folder
+        job = Job(lambda _: check_writable(folder), self)
+
+        # Connections
+        job.succeeded.connect(self._trust_folder)
+        job.failed.connect(self._doubt_folder)
+        job.start()
+
+    def _trust_folder(self, _: None) -> None:
+        self._doubt_folder("")
+
+    def _doubt_folder(self, trouble: str) -> None:
+        if trouble != self._folder_trouble:
+            self._folder_trouble = trouble
+            self.folder_doubted.emit(trouble)
+
     def _count_others(self) -> None:
         """See whether other windows use the same data folder."""
         if self._counter is not None:  # a disk that does not answer is asked once
             return
+        if self._folder_trouble:
+            self._check_folder()
         presence = self._presence
         self._counter = job = Job(lambda _: presence.count_others(), self)
 

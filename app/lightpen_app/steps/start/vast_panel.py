@@ -62,13 +62,16 @@ class VastPanel(QWidget):
 
         # Connections
         job.succeeded.connect(self._show)
-        job.failed.connect(lambda _: self._show(None))  # History tells why
+        job.failed.connect(self._on_failed)
         job.start()
 
     def shut_down(self) -> None:
         """Cancel what is under way."""
         if self._job is not None:
             self._job.cancel()
+
+    def _on_failed(self, _: str) -> None:
+        self._show(None)  # History tells why
 
     def _show(self, trend: "Trend | None") -> None:
         has_trend = trend is not None and len(trend.entries) >= LEAST_TREND

@@ -12,6 +12,7 @@ import pytest
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QApplication,
     QComboBox,
     QFileDialog,
     QLineEdit,
@@ -33,11 +34,13 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
     PEN,
+    STATION,
     TIP,
     UNREAD,
     WHAT,
@@ -205,6 +208,28 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.select(0)
     limit = f"max_radius_mm {StationLimits().verification.radius}"
     desk.until(lambda: limit in _words(desk))
+
+
+@pytest.mark.parametrize("language", list(Language))
+def test_at_the_usual_width_every_column_is_seen_and_told_whole(
+    desk: Desk, qapp: QApplication, language: Language
+) -> None:
+    LanguageSwitch(qapp).set_language(language)
+    desk.enter(3)
+    desk.open()
+    desk.page.resize(976, 700)  # that of a window of 1280 px
+    desk.until(lambda: desk.table.n_lines() == 3)
+
+    assert not desk.table.horizontalScrollBar().isVisible()
+    across = desk.table.horizontalHeader()
+    for column in range(WORDS):
+        if column != STATION:  # the only one
+            needed = desk.table.sizeHintForColumn(column)
+            assert across.sectionSize(column) >= needed, column
+    assert desk.table.isColumnHidden(STATION)
+
+    desk.page.resize(1616, 700)
+    assert not desk.table.isColumnHidden(STATION)
 
 
 def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
