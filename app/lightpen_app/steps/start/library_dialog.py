@@ -1,9 +1,10 @@
 """The tip library: pens, tips and cones with their state, limits and due dates."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Signal
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -23,7 +24,8 @@ from lightpen.record.tip_library import AnyItem, ItemKind, ListedTip
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.start.item_form import MADE, ItemForm
+from lightpen_app.steps.start.item_form import MADE, ItemForm, kept_picture
+from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
@@ -62,6 +64,11 @@ class Asked:
 class LibraryDialog(Translated, QDialog):
     """Shows what there is; adds, changes and retires.
 
+    Parameters
+    ----------
+    folder : Path
+        The data folder, in which pictures are kept.
+
     Signals
     -------
     change_asked(Asked)
@@ -72,8 +79,10 @@ class LibraryDialog(Translated, QDialog):
     change_asked = Signal(object)
     chosen = Signal(object, str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._folder = folder
+        self._pictured: ListedTip | None = None
         self._standings = Standings()
         self._pen = ""
         self._is_guarded = False
@@ -90,6 +99,7 @@ class LibraryDialog(Translated, QDialog):
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
+        self._picture = TipPicture()
         self._retired = QCheckBox()
         self._use, self._add, self._edit, self._retire, self._close = (
             PushButton() for _ in range(5)
@@ -97,7 +107,7 @@ class LibraryDialog(Translated, QDialog):
         self._panel = QFrame()
         self._panel.setProperty("area", "panel")
         self._what = text_label(TextSize.LEAD)
-        self._form = ItemForm()
+        self._form = ItemForm(folder)
         self._reason = EnterEdit()
         self._reason.setMaxLength(LONGEST_REASON)
         self._supervisor = SupervisorFields()
@@ -133,7 +143,11 @@ class LibraryDialog(Translated, QDialog):
         listed.setSpacing(GRID)
         listed.addWidget(self._lead)
         listed.addLayout(top)
-        listed.addWidget(self._table, 1)
+        shown = QHBoxLayout()
+        shown.setSpacing(2 * GRID)
+        shown.addWidget(self._table, 1)
+        shown.addWidget(self._picture, 0, Qt.AlignmentFlag.AlignTop)
+        listed.addLayout(shown, 1)
         listed.addLayout(buttons)
         layout = QVBoxLayout(self)
         margin = 2 * GRID
@@ -326,8 +340,17 @@ class LibraryDialog(Translated, QDialog):
         asked = Asked(item, picture, self._is_new, reason, signature)
         self.change_asked.emit(asked)
 
+    def _show_picture(self, item: AnyItem | None) -> None:
+        """Show the picture of the tip that is chosen, if it has one."""
+        pictured = item if isinstance(item, ListedTip) and item.picture else None
+        self._picture.setVisible(pictured is not None)
+        if pictured is not None and pictured != self._pictured:
+            self._picture.set_value(kept_picture(self._folder, pictured))
+        self._pictured = pictured
+
     def _refresh(self) -> None:
         item = self.current()
+        self._show_picture(item)
         nothing = "" if item is not None else self.tr("Choose one in the table.")
         is_retired = item is not None and item.is_retired
         why_not = self.tr("It is retired.") if is_retired else nothing
