@@ -26,6 +26,9 @@ class RowTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
         across = self.horizontalHeader()
         across.setHighlightSections(False)
+        across.setDefaultAlignment(
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        )
         across.setStretchLastSection(True)
 
     def show_other_words(self) -> None:

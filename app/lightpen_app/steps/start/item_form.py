@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -43,6 +43,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
+PICTURE_SIZE = QSize(26 * GRID, 22 * GRID)  # px
 MADE: dict[ItemKind, Callable[..., AnyItem]] = {
     ItemKind.PEN: ListedPen,
     ItemKind.TIP: ListedTip,
@@ -94,7 +95,7 @@ class ItemForm(Translated, QWidget):
         self._picture = PathField()
         self._browse = PushButton()
         self._picture.add_button(self._browse)
-        self._preview = TipPicture()
+        self._preview = TipPicture(PICTURE_SIZE)
         self._note = QLineEdit()
         self._note.setMaxLength(LONGEST_NOTE)
         own = (self._ball, self._change, self._days, self._swings)

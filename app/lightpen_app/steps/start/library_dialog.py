@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt, Signal
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -35,8 +35,11 @@ from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
 
 LEAST_ROWS = 7
-WIDTHS = (16, 22, 14, 12, 14, 20)  # of the columns but the last, in GRID
+WIDTHS = (12, 18, 13, 11, 14, 20)  # of the columns but the last, in GRID
+NUMBERS = (3, 4)  # columns of them
+PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
 KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE)
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 LONGEST_REASON = 200  # characters
 
 
@@ -99,7 +102,7 @@ class LibraryDialog(Translated, QDialog):
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
-        self._picture = TipPicture()
+        self._picture = TipPicture(PICTURE_SIZE)
         self._retired = QCheckBox()
         self._use, self._add, self._edit, self._retire, self._close = (
             PushButton() for _ in range(5)
@@ -128,14 +131,13 @@ class LibraryDialog(Translated, QDialog):
         buttons.addWidget(self._close)
         ends = QHBoxLayout()
         ends.setSpacing(GRID)
-        ends.addWidget(self._trouble, 1)
-        ends.addStretch(0)
+        ends.addWidget(self._reason, 1)
         ends.addWidget(self._leave)
         ends.addWidget(self._save)
         panel = QVBoxLayout(self._panel)
-        panel.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
+        panel.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
         panel.setSpacing(GRID)
-        for widget in (self._what, self._form, self._reason, self._supervisor):
+        for widget in (self._what, self._form, self._supervisor, self._trouble):
             panel.addWidget(widget)
         panel.addLayout(ends)
         listed = QVBoxLayout(self._list)
@@ -150,8 +152,7 @@ class LibraryDialog(Translated, QDialog):
         listed.addLayout(shown, 1)
         listed.addLayout(buttons)
         layout = QVBoxLayout(self)
-        margin = 2 * GRID
-        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
         layout.addWidget(self._list, 1)
         layout.addWidget(self._panel)
         self.setMinimumWidth(112 * GRID)
@@ -267,6 +268,8 @@ class LibraryDialog(Translated, QDialog):
             *(ball, change, pens, item.note),
         )
         row = [QStandardItem(text) for text in texts]
+        for column in NUMBERS:
+            row[column].setTextAlignment(RIGHT)
         row[1].setForeground(colors_of(self.palette()).tone(remark.tone))
         return row
 
@@ -393,6 +396,8 @@ class LibraryDialog(Translated, QDialog):
                 *(self.tr("Calibrated on pens"), self.tr("Note")),
             ]
         )
+        for column in NUMBERS:
+            self._model.horizontalHeaderItem(column).setTextAlignment(RIGHT)
         is_tips = self.kind() is ItemKind.TIP
         for column, width in enumerate(WIDTHS):
             self._table.setColumnWidth(column, width * GRID)

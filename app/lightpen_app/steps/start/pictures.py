@@ -13,6 +13,7 @@ from lightpen_app.widgets.pen_in_space import PenInSpace, PenStand
 from lightpen_app.widgets.translated import Translated
 
 LEAST_SIDE = 16 * GRID  # px, of a picture; with its words all fits 940 x 500
+ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
 UPRIGHT = Posture(0.0, 0.0, 0.0)
 LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
 RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
@@ -50,7 +51,9 @@ class Pictures(Translated, QWidget):
         self._retranslate()
 
     def set_vast(self) -> None:
-        """Put the steps beside the pictures, in larger letters."""
+        """Put the steps beside larger pictures, in larger letters."""
+        for picture in self._pictures:
+            picture.setMaximumHeight(ANY_HEIGHT)
         for label in (*self._words, self._steps):
             set_size(label, TextSize.LEAD)
         self._layout.addWidget(self._steps, 1, len(STANDS))
@@ -114,6 +117,6 @@ def _picture(posture: Posture, target: Posture | None) -> PenInSpace:
     picture = PenInSpace()
     expanding = QSizePolicy.Policy.Expanding
     picture.setSizePolicy(expanding, expanding)
-    picture.setMinimumHeight(LEAST_SIDE)
+    picture.setFixedHeight(LEAST_SIDE)
     picture.set_value(PenStand(paper_pen(), np.array(PAPER_TIP), posture, target))
     return picture

@@ -6,24 +6,28 @@ from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QSize, Qt
 from PySide6.QtGui import QImage, QImageReader, QPixmap
 from PySide6.QtWidgets import QLabel, QWidget
 
-from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.job import Job
 
 ReadPicture = Callable[[], bytes]  # raises a `LightpenError`
-SHOWN = QSize(26 * GRID, 22 * GRID)  # px, at the most
 
 
 class TipPicture(Translated, QLabel):
-    """Shows a picture, or why it cannot be shown; it is read off the GUI's thread."""
+    """Shows a picture, or why it cannot be shown; it is read off the GUI's thread.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    Parameters
+    ----------
+    place : QSize
+        In which it is shown as large as it can be, px.
+    """
+
+    def __init__(self, place: QSize, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._job: Job | None = None
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setWordWrap(True)
         self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setFixedSize(SHOWN)
+        self.setFixedSize(place)
         self.setProperty("area", "panel")
         self._retranslate()
 
@@ -36,8 +40,8 @@ class TipPicture(Translated, QLabel):
         if read is None:
             self._retranslate()
             return
-        density = self.devicePixelRatioF()
-        self._job = job = Job(lambda _: _scaled(read, density), self)
+        place, density = self.size(), self.devicePixelRatioF()
+        self._job = job = Job(lambda _: _scaled(read, place, density), self)
 
         # Connections
         job.succeeded.connect(self._on_read)
@@ -58,14 +62,14 @@ class TipPicture(Translated, QLabel):
             self.setText(self.tr("No picture"))
 
 
-def _scaled(read: ReadPicture, density: float) -> QImage:
-    """Return a picture as large as it is shown; black if its end is missing."""
+def _scaled(read: ReadPicture, place: QSize, density: float) -> QImage:
+    """Return a picture as large as it is shown."""
     buffer = QBuffer()
     buffer.setData(QByteArray(read()))
     buffer.open(QIODevice.OpenModeFlag.ReadOnly)
     reader = QImageReader(buffer)
     reader.setAutoTransform(True)  # as the camera was held
-    size = reader.size().scaled(SHOWN * density, Qt.AspectRatioMode.KeepAspectRatio)
+    size = reader.size().scaled(place * density, Qt.AspectRatioMode.KeepAspectRatio)
     reader.setScaledSize(size)
     image = reader.read()
     image.setDevicePixelRatio(density)
