@@ -93,7 +93,8 @@ class Wizard(QObject):
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
-        self.workbench.windows.counted.connect(self._on_others_counted)
+        self.workbench.folder_watch.counted.connect(self._on_others_counted)
+        self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
         self.workbench.subject_changed.connect(self.window.set_subject)
         self.workbench.relieved.connect(self.window.drop_notice)
         self.workbench.streaming.changed.connect(self._on_streaming_changed)
@@ -102,6 +103,11 @@ class Wizard(QObject):
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
         self._stream()
+
+    def _on_folder_doubted(self, trouble: str) -> None:
+        """Say where another data folder is chosen while nothing can be kept in it."""
+        folder = str(self.workbench.folder)
+        self.window.set_unwritable(folder if trouble else "", trouble)
 
     def _on_others_counted(self, n_others: int) -> None:
         """Say that other windows use the same data folder, while they do."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -130,14 +130,26 @@ class FixedPointStrip(TaskStrip):
         return self.tr("Touch the cone again"), self.tr("Touches")
 
 
+class SurfaceField(QComboBox):
+    """Where a ring is touched; as wide as its longest choice."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        # WORKAROUND for Qt 6: its own is kept from the language before.
+        return self.sizeHint()
+
+
 class RingStrip(TaskStrip):
     """A ring: its certified radius, where it is touched, and how often."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._radius = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
-        self._surface = QComboBox()
-        self._surface.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        self._surface = SurfaceField()
         for surface in Surface:
             self._surface.addItem("", surface)
         self._runs = NumberField("", (1, MOST_RUNS), 0)
