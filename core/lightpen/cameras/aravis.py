@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from lightpen.cameras.aravis_library import SUCCESS, Aravis, AravisError, load_aravis
+from lightpen.cameras.aravis_library import (
+    FITTING_BUFFER,
+    NO_PACKET_SOCKET,
+    SUCCESS,
+    Aravis,
+    AravisError,
+    load_aravis,
+)
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.device_camera import Delivery, DeviceCamera
 from lightpen.cameras.device_errors import busy, lost, not_found, refused
@@ -172,7 +179,15 @@ class AravisDevice:
         aravis, camera = self._open_ones()
         with self._told():
             payload = aravis.camera_get_payload(camera)
+            is_of_network = aravis.camera_is_gv_device(camera)
+            if is_of_network:
+                # Aravis 0.8 lets in the packets of all cameras until it has set the
+                # filter of a packet socket: their images are taken for this one's, and
+                # its own, with lower numbers, are thrown away as late.
+                aravis.camera_gv_set_stream_options(camera, NO_PACKET_SOCKET)
             self._stream = stream = aravis.camera_create_stream(camera, None, None)
+            if is_of_network:
+                aravis.set_property(stream, b"socket-buffer", FITTING_BUFFER, None)
             for _ in range(N_BUFFERS):
                 aravis.stream_push_buffer(stream, aravis.buffer_new_allocate(payload))
             aravis.camera_start_acquisition(camera)

@@ -3,6 +3,7 @@
 The simulated camera is Aravis' own, over UDP; only the images in it are ours.
 """
 
+import os
 import signal
 import subprocess
 import sys
@@ -42,6 +43,12 @@ def camera() -> DeviceCamera:
     return DeviceCamera(AravisDevice(ADDRESS))
 
 
+def sockets_of(process: int) -> list[Path]:
+    """Return the open files of a process that are sockets."""
+    files = Path(f"/proc/{process}/fd").iterdir()
+    return [each for each in files if each.is_socket()]
+
+
 @pytest.mark.parametrize(
     ("pixel_format", "kind", "highest"),
     [("Mono8", "u1", 255), ("Mono16", "<u2", 65535)],
@@ -63,6 +70,21 @@ def test_images_come_as_they_were_sent(
     np.testing.assert_array_equal(frame.image, scene)
     assert frame.full_scale == highest
     assert seen.serial == "LP01"  # though it was looked for by its address
+
+
+def test_no_socket_lets_in_the_images_of_other_cameras(gige: GigeSimulator) -> None:
+    seen = camera()
+    seen.open()
+    seen.configure(CameraSettings(region=Region(0, 0, 160, 120)))
+    seen.start()
+    seen.read(TIMEOUT)
+    lines = Path("/proc/net/packet").read_text().splitlines()[1:]
+    packet_sockets = {f"socket:[{line.split()[-1]}]" for line in lines}
+    own = {str(each.readlink()) for each in sockets_of(os.getpid())}
+    seen.close()
+
+    assert own
+    assert not own & packet_sockets
 
 
 def test_the_exposure_reaches_the_camera(gige: GigeSimulator) -> None:
