@@ -14,12 +14,13 @@ from threading import Event, Thread
 from typing import Protocol
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.pairing import FramePairs
+from lightpen.cameras.pairing import FramePairs, held_up
 from lightpen.cameras.protocol import (
     CameraSettings,
     DeviceLost,
     EndOfImages,
     Frame,
+    FramesHeldUp,
     FrameTimeout,
     ImageCamera,
     Stats,
@@ -29,6 +30,7 @@ from lightpen.cameras.worker import (
     CameraWorker,
     Failed,
     FrameReady,
+    Troubled,
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
@@ -330,13 +332,24 @@ class Live:
             self._refuse_recordings()
             return None
         n_images = counts.pop() if len(counts) == 1 else None
+        moment = self._pairs.take(n_images)
+        if moment is None:
+            self._add_next()
+            moment = self._pairs.take(n_images)
+        moved_ms = self._pairs.moved_ms()
+        if moved_ms is not None:
+            self._listener.on_camera(Troubled(FramesHeldUp(held_up(moved_ms))), 1)
+        return moment
+
+    def _add_next(self) -> None:
+        """Take the next frame of the camera whose turn it is."""
         wanted = self._pairs.wanted
         try:
             frame = self._workers[wanted].next_frame(LONGEST_WAIT)
         except FrameTimeout:  # what the other has sent goes on, and finds no partner
             wanted = 1 - wanted
             frame = self._workers[wanted].next_frame(0.0)
-        return self._pairs.add(wanted, frame, n_images)
+        self._pairs.add(wanted, frame)
 
     def _refuse_recordings(self) -> None:
         """Tell once that two recordings are not of the same moments."""
