@@ -111,6 +111,7 @@ def test_a_camera_held_up_for_long_is_told_and_paired_rightly_afterwards(
         (i, i) for i in range(n_held_up + 1, N_FRAMES)
     ]
     moved_ms = pairs.moved_ms()
+    assert moved_ms is not None
     assert moved_ms == pytest.approx(1.5 * PERIOD_MS)
     assert pairs.moved_ms() is None  # told once
     assert pairs.lag_ms == pytest.approx(0.0, abs=0.1)
