@@ -110,31 +110,8 @@ def observe_board_of_rig(
     return ObservedBoard(views.chosen(is_seen), unseen)
 
 
-def _look(load: Callable[[], Image], board: Board) -> _Look:
-    image = load()
-    return _Look((image.shape[1], image.shape[0]), find_points(image, board))
-
-
-def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
-    return FileError(
-        sentence(
-            "intrinsics.other-size",
-            "{name} has {width} x {height} px, {first} has {first_width} x "
-            "{first_height} px. Give images of one camera, with one region and "
-            "binning.",
-            name=printable(name),
-            width=other.size[0],
-            height=other.size[1],
-            first=printable(first_name),
-            first_width=first.size[0],
-            first_height=first.size[1],
-        )
-    )
-
-
-def _why_unseen(source: ImageSource, board: Board) -> Sentence:
-    """Return what the images show in place of the board."""
-    images = [load() for load in islice(source.open(), EXAMINED)]
+def why_unseen(images: Sequence[Image], board: Board) -> Sentence | None:
+    """Return what images show in place of the board; None if that is not known."""
     if _is_found([image[:, ::-1].copy() for image in images], board):
         return sentence(
             "intrinsics.mirrored",
@@ -175,7 +152,35 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
                     seen_columns=count[0],
                     seen_rows=count[1],
                 )
-    return sentence(
+    return None
+
+
+def _look(load: Callable[[], Image], board: Board) -> _Look:
+    image = load()
+    return _Look((image.shape[1], image.shape[0]), find_points(image, board))
+
+
+def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
+    return FileError(
+        sentence(
+            "intrinsics.other-size",
+            "{name} has {width} x {height} px, {first} has {first_width} x "
+            "{first_height} px. Give images of one camera, with one region and "
+            "binning.",
+            name=printable(name),
+            width=other.size[0],
+            height=other.size[1],
+            first=printable(first_name),
+            first_width=first.size[0],
+            first_height=first.size[1],
+        )
+    )
+
+
+def _why_unseen(source: ImageSource, board: Board) -> Sentence:
+    """Return what the images show in place of the board, as far as that is known."""
+    images = [load() for load in islice(source.open(), EXAMINED)]
+    return why_unseen(images, board) or sentence(
         "intrinsics.unseen",
         "None of the {n_images} images shows the board {board}. The whole board must "
         "be in the image, sharp, with a bright rim round it; check its kind and count.",
