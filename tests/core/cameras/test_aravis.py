@@ -3,7 +3,6 @@
 The simulated camera is Aravis' own, over UDP; only the images in it are ours.
 """
 
-import os
 import signal
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from tests.gige_simulator import ADDRESS, GigeSimulator
+from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
 
 from lightpen.arrays import Image
 from lightpen.cameras.aravis import AravisDevice
@@ -43,10 +42,12 @@ def camera() -> DeviceCamera:
     return DeviceCamera(AravisDevice(ADDRESS))
 
 
-def sockets_of(process: int) -> list[Path]:
-    """Return the open files of a process that are sockets."""
-    files = Path(f"/proc/{process}/fd").iterdir()
-    return [each for each in files if each.is_socket()]
+def n_packet_sockets() -> int:
+    """Return how many sockets of this process may take the packets of others."""
+    lines = Path("/proc/net/packet").read_text().splitlines()[1:]
+    names = {f"socket:[{line.split()[-1]}]" for line in lines}
+    files = [each for each in Path("/proc/self/fd").iterdir() if each.is_socket()]
+    return sum(str(each.readlink()) in names for each in files)
 
 
 @pytest.mark.parametrize(
@@ -72,19 +73,29 @@ def test_images_come_as_they_were_sent(
     assert seen.serial == "LP01"  # though it was looked for by its address
 
 
-def test_no_socket_lets_in_the_images_of_other_cameras(gige: GigeSimulator) -> None:
-    seen = camera()
-    seen.open()
-    seen.configure(CameraSettings(region=Region(0, 0, 160, 120)))
-    seen.start()
-    seen.read(TIMEOUT)
-    lines = Path("/proc/net/packet").read_text().splitlines()[1:]
-    packet_sockets = {f"socket:[{line.split()[-1]}]" for line in lines}
-    own = {str(each.readlink()) for each in sockets_of(os.getpid())}
-    seen.close()
+def test_a_second_stream_has_no_socket_that_lets_in_the_images_of_the_first(
+    gige: GigeSimulator, second_loopback: str
+) -> None:
+    other = GigeSimulator("LP02", second_loopback)
+    cameras = [DeviceCamera(AravisDevice(place)) for place in (ADDRESS, SECOND_ADDRESS)]
+    n_sockets = []
+    for seen in cameras:
+        seen.open()
+        seen.configure(CameraSettings(region=Region(0, 0, 160, 120)))
+        seen.start()
+        seen.read(TIMEOUT)
+        n_sockets.append(n_packet_sockets())
+    cameras[0].stop()  # and starts anew beside the second one
+    cameras[0].start()
+    cameras[0].read(TIMEOUT)
+    n_sockets.append(n_packet_sockets())
+    for seen in cameras:
+        seen.close()
+    other.unplug()
 
-    assert own
-    assert not own & packet_sockets
+    first, second, anew = n_sockets
+    assert second == first
+    assert anew == 0
 
 
 def test_the_exposure_reaches_the_camera(gige: GigeSimulator) -> None:
