@@ -12,7 +12,6 @@ import numpy as np
 
 from lightpen.cameras.aravis_library import (
     ANY_SOCKET,
-    FITTING_BUFFER,
     NO_PACKET_SOCKET,
     SUCCESS,
     Aravis,
@@ -27,6 +26,7 @@ from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
 from lightpen.sentences import Sentence, sentence
 
 N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+WAITING = 1 << 24  # bytes of packets that wait to be read, or fewer where so many may
 
 # Where this program may open packet sockets, Aravis 0.8 lets in the packets of all
 # cameras until it has set the filter of one: images of another that streams already are
@@ -194,7 +194,7 @@ class AravisDevice:
             self._stream = stream = aravis.camera_create_stream(camera, None, None)
             _STREAMS.add(stream)
             if aravis.camera_is_gv_device(camera):
-                aravis.set_property(stream, b"socket-buffer", FITTING_BUFFER, None)
+                aravis.set_property(stream, b"socket-buffer-size", WAITING, None)
             for _ in range(N_BUFFERS):
                 aravis.stream_push_buffer(stream, aravis.buffer_new_allocate(payload))
             aravis.camera_start_acquisition(camera)

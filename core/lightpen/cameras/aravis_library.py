@@ -27,7 +27,6 @@ NAME = "libaravis-0.8.so.0"
 GLIB, GOBJECT = "libglib-2.0.so.0", "libgobject-2.0.so.0"
 SUCCESS = 0  # of ArvBufferStatus
 ANY_SOCKET, NO_PACKET_SOCKET = 0, 1  # of ArvGvStreamOption
-FITTING_BUFFER = 1  # of ArvGvStreamSocketBuffer: room for a whole image
 GONE = {2, 3, 4, 5, 10}  # of ArvDeviceError: lost, broken, timed out, not controlled
 
 
