@@ -330,7 +330,8 @@ class CameraWorker:
         except FrameIncomplete as error:
             self._hear()
             self._count()
-            self._on_event(Troubled(error))
+            if not self._camera.caps.has_link:  # else it is told of many: see `_count`
+                self._on_event(Troubled(error))
         else:
             self._hear()
             self._change(Connection.STREAMING)
