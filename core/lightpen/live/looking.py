@@ -381,7 +381,8 @@ class Live:
         if wanted is not self._wanted:
             self._wanted = wanted
             self._last.clear()
-        aim = wanted.aims[c]
+        aims = wanted.aims
+        aim = aims[c] if c < len(aims) else Aim()  # of cameras that come or go
         camera, pen, mask = aim.camera, aim.pen, aim.mask
         if camera is None or pen is None or not camera.fits(frame.image):
             try:
