@@ -110,7 +110,7 @@ def second_loopback(loopback: str) -> Iterator[str]:
     from tests.gige_simulator import SECOND_ADDRESS
 
     words = ("ip", "address", "{0}", f"{SECOND_ADDRESS}/8", "dev", "lo")
-    added = [word.format("add") for word in words]
+    added = [word.format("replace") for word in words]  # a killed run left it there
     if shutil.which("ip") is None or subprocess.run(added, check=False).returncode:
         if os.environ.get("LIGHTPEN_CAMERAS") == "required":
             pytest.fail("The loopback needs a second address.")

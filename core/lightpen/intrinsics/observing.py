@@ -1,7 +1,7 @@
 """From images to views of a board, and why it is not seen where it is not."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -110,34 +110,14 @@ def observe_board_of_rig(
     return ObservedBoard(views.chosen(is_seen), unseen)
 
 
-def _look(load: Callable[[], Image], board: Board) -> _Look:
-    image = load()
-    return _Look((image.shape[1], image.shape[0]), find_points(image, board))
+def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence | None:
+    """Return what images show in place of the board; None if that is not known.
 
-
-def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
-    return FileError(
-        sentence(
-            "intrinsics.other-size",
-            "{name} has {width} x {height} px, {first} has {first_width} x "
-            "{first_height} px. Give images of one camera, with one region and "
-            "binning.",
-            name=printable(name),
-            width=other.size[0],
-            height=other.size[1],
-            first=printable(first_name),
-            first_width=first.size[0],
-            first_height=first.size[1],
-        )
-    )
-
-
-def _why_unseen(source: ImageSource, board: Board) -> Sentence:
-    """Return what the images show in place of the board."""
-
-    def images() -> Iterator[Image]:  # one at a time: they may be large
-        return (load() for load in islice(source.open(), EXAMINED))
-
+    Parameters
+    ----------
+    images : callable
+        Gives them anew, one at a time: they may be large.
+    """
     if _is_found((image[:, ::-1].copy() for image in images()), board):
         return sentence(
             "intrinsics.mirrored",
@@ -178,7 +158,38 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
                     seen_columns=count[0],
                     seen_rows=count[1],
                 )
-    return sentence(
+    return None
+
+
+def _look(load: Callable[[], Image], board: Board) -> _Look:
+    image = load()
+    return _Look((image.shape[1], image.shape[0]), find_points(image, board))
+
+
+def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileError:
+    return FileError(
+        sentence(
+            "intrinsics.other-size",
+            "{name} has {width} x {height} px, {first} has {first_width} x "
+            "{first_height} px. Give images of one camera, with one region and "
+            "binning.",
+            name=printable(name),
+            width=other.size[0],
+            height=other.size[1],
+            first=printable(first_name),
+            first_width=first.size[0],
+            first_height=first.size[1],
+        )
+    )
+
+
+def _why_unseen(source: ImageSource, board: Board) -> Sentence:
+    """Return what the images show in place of the board, as far as that is known."""
+
+    def images() -> Iterator[Image]:
+        return (load() for load in islice(source.open(), EXAMINED))
+
+    return why_unseen(images, board) or sentence(
         "intrinsics.unseen",
         "None of the {n_images} images shows the board {board}. The whole board must "
         "be in the image, sharp, with a bright rim round it; check its kind and count.",
@@ -187,5 +198,5 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     )
 
 
-def _is_found(images: Iterator[Image], board: Board) -> bool:
+def _is_found(images: Iterable[Image], board: Board) -> bool:
     return any(find_points(image, board) is not None for image in images)
