@@ -50,6 +50,11 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest, so that no process is left with it at the end."""
+    items.sort(key=lambda item: _how_small(item.path))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def no_power_cut() -> Iterator[None]:
     """Nothing waits for the disk; what is killed leaves its files to the system."""
@@ -417,6 +422,12 @@ def truth() -> Callable[[Path], dict[str, Any]]:
         return fields
 
     return read
+
+
+def _how_small(file: Path) -> tuple[bool, bool]:
+    """Return a key of a test file: the whole program, its windows, then its parts."""
+    place = file.relative_to(Path(__file__).parent).parent.parts
+    return len(place) > 1, place[:1] != ("app",)
 
 
 def _record_swing(
