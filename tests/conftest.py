@@ -1,5 +1,6 @@
 """Fixtures that every test may use."""
 
+import gc
 import io
 import json
 import os
@@ -48,6 +49,17 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 def pytest_xdist_auto_num_workers() -> int:
     """Let one more process work than there are cores: some tests wait, for a camera."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest, so that no process is left with it at the end."""
+    items.sort(key=lambda item: _how_small(item.path))
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass by thousands of tests, which stay."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -417,6 +429,12 @@ def truth() -> Callable[[Path], dict[str, Any]]:
         return fields
 
     return read
+
+
+def _how_small(file: Path) -> tuple[bool, bool]:
+    """Return a key of a test file: the whole program, its windows, then its parts."""
+    place = file.relative_to(Path(__file__).parent).parent.parts
+    return len(place) > 1, place[:1] != ("app",)
 
 
 def _record_swing(
