@@ -16,6 +16,7 @@ class TaskKind(StrEnum):
     CIRCLE = "circle"
     LENGTH = "length"
     ARTICULATION = "articulation"
+    DRIFT = "drift"  # of a cone that stands still, before, between and after the others
 
 
 WHOLE = TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH  # the paper's three

@@ -19,16 +19,10 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen.simulator.toucher import Artefacts, Toucher
 from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
+from lightpen.verification.counting import ALIKE, OTHER_POSTURE
 from lightpen.verification.guidance import fraction_done, instruction
-from lightpen.verification.session import (
-    ALIKE,
-    OTHER_POSTURE,
-    SessionSetup,
-    SessionState,
-    advance,
-    end_task,
-    touched_anew,
-)
+from lightpen.verification.session import advance, end_task, touched_anew
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touching import TouchEvent, TouchHappening
 
 LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict

@@ -17,7 +17,8 @@ from lightpen.verification.fixed_point import (
     scatter_of,
 )
 from lightpen.verification.length import Length
-from lightpen.verification.session import SessionSetup, SessionState, ring_fit
+from lightpen.verification.session import ring_fit
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touch import Touch
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label

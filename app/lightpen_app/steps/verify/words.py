@@ -12,13 +12,8 @@ from lightpen.verification.articulation import N_POSTURES, N_TOUCHES
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.circle import MIN_ANGLE
 from lightpen.verification.guidance import fraction_done, instruction
-from lightpen.verification.session import (
-    BROKEN_OFF,
-    SessionSetup,
-    SessionState,
-    covered,
-    rules_of,
-)
+from lightpen.verification.session import BROKEN_OFF, covered, rules_of
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.status import Reading, VerificationStatus
 from lightpen.verification.touching import HELD_ENOUGH, TouchPhase
 from lightpen_app.look.grades import GRADE_MARKS
