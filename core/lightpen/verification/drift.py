@@ -26,11 +26,17 @@ from lightpen.verification.assessment import (
     VERIFY_AGAIN,
     Conformity,
     accepted,
+    check,
     refused,
 )
 from lightpen.verification.touch import Touch, mean_point
 
 MIN_VISITS = 2
+TOUCH_LONGER = sentence(
+    "drift.touch-longer",
+    "Next: hold the pen alike at each visit, take more images of a touch, or bring the "
+    "camera nearer.",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +131,20 @@ def _assessment(
                 limit=limits.drift,
             ),
             VERIFY_AGAIN,
+        )
+    largest = float(uncertainties.max())
+    if largest > limits.drift:
+        return check(
+            sentence(
+                "drift.uncertain",
+                "The witness stays within {distance:.4f} mm, but U of it is "
+                "{uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move of "
+                "that size would not show.",
+                distance=distance,
+                uncertainty=largest,
+                limit=limits.drift,
+            ),
+            TOUCH_LONGER,
         )
     return accepted(
         sentence(

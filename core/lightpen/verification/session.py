@@ -273,6 +273,14 @@ def ring_fit(touches: Sequence[Touch]) -> CircleFit | None:
     return ring_so_far(np.array([touch.point_cam for touch in touches]).reshape(-1, 3))
 
 
+def drift_so_far(setup: SessionSetup, state: SessionState) -> Drift | None:
+    """Return how far the witness moved by its visits; None before there are two."""
+    if state.drift is not None or len(state.visits) < MIN_VISITS:
+        return state.drift
+    visits = _numbered(state.visits)
+    return measure_drift(visits, setup.instrument, setup.choices.limits)
+
+
 def covered(touches: Sequence[Touch]) -> float:
     """Return how much of a ring touches cover, degrees; 0 before they tell it."""
     fit = ring_fit(touches)

@@ -107,6 +107,12 @@ class UnderWay(Struct, frozen=True):
     def __post_init__(self) -> None:
         require_usual(self.began)
 
+    @property
+    def n_done(self) -> int:
+        """How many of its tasks are done."""
+        done = {run.task for run in self.runs if run.is_last}
+        return len(done | {images.task for images in self.read})
+
 
 @dataclass(frozen=True)
 class InterruptedVerification:

@@ -24,12 +24,14 @@ from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.verify.findings import (
     ArticulationFinding,
+    DriftFinding,
     FixedPointFinding,
     LengthFinding,
     RingFinding,
 )
 from lightpen_app.steps.verify.strips import (
     ArticulationStrip,
+    DriftStrip,
     FixedPointStrip,
     LengthStrip,
     RingStrip,
@@ -108,6 +110,7 @@ class VerifyPage(Rearranged, Page):
             TaskPanel(RingStrip(), RingFinding()),
             TaskPanel(LengthStrip(), LengthFinding()),
             TaskPanel(ArticulationStrip(), ArticulationFinding()),
+            TaskPanel(DriftStrip(), DriftFinding()),
         )
         self._tabs = QTabWidget()
         for panel in self._panels:
@@ -236,7 +239,7 @@ class VerifyPage(Rearranged, Page):
     @override
     def unsaved(self) -> str:
         state = self._runner.status.state
-        if state is None or not (state.touches or state.runs):
+        if state is None or not (state.touches or state.runs or state.visits):
             return ""
         return self.tr(
             "The verification is not finished. The touches of the task at hand are "

@@ -195,6 +195,25 @@ class ArticulationStrip(TaskStrip):
         return (self.tr("Touch the cone five times in each of five postures"),)
 
 
+class DriftStrip(TaskStrip):
+    """A cone as witness that the camera stands still, which needs nothing else."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(TaskKind.DRIFT, (), parent)
+
+    @override
+    def _with_fields(self, choices: VerificationChoices) -> VerificationChoices:
+        return choices
+
+    @override
+    def _show_fields(self, choices: VerificationChoices) -> None:
+        """It has no fields."""
+
+    @override
+    def _words(self) -> tuple[str, ...]:
+        return (self.tr("Touch the cone before, between and after the other tasks"),)
+
+
 class LengthStrip(TaskStrip):
     """A length: its certified size, and at how many places it is touched."""
 
