@@ -138,8 +138,8 @@ def _assessment(
             sentence(
                 "drift.uncertain",
                 "The witness stays within {distance:.4f} mm, but U of it is "
-                "{uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move of "
-                "that size would not show.",
+                "{uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move "
+                "of that size would not show.",
                 distance=distance,
                 uncertainty=largest,
                 limit=limits.drift,

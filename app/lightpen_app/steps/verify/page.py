@@ -1,5 +1,7 @@
 """The step Verify: from the tip in force to its verdict, without a key."""
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -41,6 +43,7 @@ from lightpen_app.steps.verify.touch_hand import TouchHand
 from lightpen_app.steps.verify.words import VerifyMoment, VerifyWords
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView
+from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
@@ -52,6 +55,9 @@ from lightpen_app.widgets.standing_mark import standing_text
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.verify.pen_panel import PenPanel
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PROGRESS_STEPS = 1000
@@ -112,9 +118,12 @@ class VerifyPage(Rearranged, Page):
             TaskPanel(ArticulationStrip(), ArticulationFinding()),
             TaskPanel(DriftStrip(), DriftFinding()),
         )
+        self._pen: Late[PenPanel] = Late(self._make_pen_panel)
+        self._pen_tab = PageScroll()
+        self._pen_tab.setWidget(Squeezed(self._pen))
         self._tabs = QTabWidget()
-        for panel in self._panels:
-            self._tabs.addTab(panel, "")
+        for tab in (*self._panels, self._pen_tab):
+            self._tabs.addTab(tab, "")
         self._image = ImageView()
         self._hand = TouchHand(self._live)
         self._showing = QTimer(self)
@@ -249,6 +258,9 @@ class VerifyPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._showing.stop()
+        pen = self._pen.content_so_far()
+        if pen is not None:
+            pen.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -275,6 +287,7 @@ class VerifyPage(Rearranged, Page):
         self._image.set_message(self.tr("No image yet."))
         self._progress.setAccessibleName(self.tr("Progress"))
         self._tabs.setAccessibleName(self.tr("Tasks"))
+        self._tabs.setTabText(self._tabs.indexOf(self._pen_tab), self.tr("Pen"))
         if self._room.is_narrow:
             index = self._tabs.indexOf(self._image)
             self._tabs.setTabText(index, self.tr("Live image"))
@@ -324,6 +337,12 @@ class VerifyPage(Rearranged, Page):
             self._image.setMinimumWidth(IMAGE_WIDTH)
             self._body.addWidget(self._image, 2)
             self._image.show()  # a tab that is not the current one is hidden
+
+    def _make_pen_panel(self) -> "PenPanel":
+        # What draws its plot takes long to be imported.
+        from lightpen_app.steps.verify.pen_panel import PenPanel
+
+        return PenPanel(self._workbench)
 
     def _moment(self) -> VerifyMoment:
         return VerifyMoment(self._run.status, self._live.connection, self._reading)
