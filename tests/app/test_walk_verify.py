@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 STATION = "Hall 2"
+TABS_BEFORE_PEN = 5
 TOUCHES = Station(
     *("Ann", "LP-04", "T-10", "C-1"),
     ball_diameter=10.0,
@@ -98,6 +99,29 @@ def test_without_a_tip_in_force_the_step_says_so(
     assert not walker.main_button().isEnabled()
 
 
+def test_the_pen_is_shown_over_its_swings_and_no_file_is_made_that_is_no_better(
+    known: "Walker",
+) -> None:
+    walker = known
+    workbench = walker.workbench
+    accept_tip(workbench.folder, workbench.preparation, seed=4)
+    walker.click_step("Verify")
+    walker.until_says("Touch the cone")
+    for _ in range(TABS_BEFORE_PEN):
+        walker.press(Qt.Key.Key_Right)
+    walker.until_says("No LED has moved against the others over 2 swings.")
+    assert not walker.offers("Improve the LED file")
+
+    for seed in (5, 6):
+        accept_tip(workbench.folder, workbench.preparation, seed=seed)
+    walker.press(Qt.Key.Key_Left)
+    walker.press(Qt.Key.Key_Right)
+    walker.until_says("No LED has moved against the others over 4 swings.")
+    walker.click("Improve the LED file")
+    walker.until_tells("does not confirm the new LED file")
+    assert not list(workbench.folder.rglob("led files/*"))
+
+
 # A verification that was interrupted
 
 
@@ -134,7 +158,7 @@ def test_a_verification_that_was_interrupted_is_gone_on_with(
     walker.click("Let the simulated operator touch")
     walker.until(lambda: walker.main_button().text() == "Back to Start")
 
-    assert walker.says("Visit 2")
+    assert walker.tells("The witness stays within")
     kinds = [each["verification"] for each in records(walker)]
     assert kinds == [TaskKind.FIXED_POINT, TaskKind.DRIFT, CONCLUSION]
     walker.click_step("Start")

@@ -262,9 +262,10 @@ class ReviewPage(Rearranged, Page):
         for job in (self._search, self._saving, self._reading):
             if job is not None:
                 job.cancel()
-        images = self._images.content_so_far()
-        if images is not None:
-            images.shut_down()
+        for panel in self._panels:
+            content = panel.content_so_far()
+            if content is not None:
+                content.shut_down()
 
     @override
     def _retranslate(self) -> None:
