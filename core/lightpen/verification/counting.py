@@ -8,7 +8,7 @@ import numpy as np
 from lightpen.errors import CalibrationError
 from lightpen.model.posture import angles_between
 from lightpen.sentences import Sentence, sentence
-from lightpen.verification.choices import TaskKind
+from lightpen.verification.choices import TaskKind, ball_offset
 from lightpen.verification.circle import ANOTHER
 from lightpen.verification.fixed_point import LIFTED
 from lightpen.verification.session_state import SessionSetup, SessionState
@@ -131,7 +131,10 @@ def _with_true_ends(
 ) -> SessionState:
     """Take the last touch for a first end if the two are those of no such length."""
     one, other = (touch.point_cam for touch in touches)
-    distance, certified = float(np.linalg.norm(one - other)), setup.choices.length
+    choices = setup.choices
+    beyond = 2 * ball_offset(choices.length_surface, setup.ball_diameter)
+    distance = float(np.linalg.norm(one - other)) + beyond
+    certified = choices.length
     if abs(distance - certified) <= ANOTHER * certified:
         return replace(state, touches=touches)
     trouble = sentence(

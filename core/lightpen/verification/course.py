@@ -694,7 +694,11 @@ def _asks_otherwise(
         {
             TaskKind.FIXED_POINT: (),
             TaskKind.CIRCLE: (of.radius, of.radius_uncertainty, of.surface),
-            TaskKind.LENGTH: (of.length, of.length_uncertainty),
+            TaskKind.LENGTH: (
+                of.length,
+                of.length_uncertainty,
+                of.length_surface,
+            ),
             TaskKind.ARTICULATION: (),
             TaskKind.DRIFT: (),
         }[kind]

@@ -32,6 +32,7 @@ from lightpen.verification.assessment import (
 from lightpen.verification.touch import Touch, mean_point
 
 MIN_VISITS = 2
+ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
 TOUCH_LONGER = sentence(
     "drift.touch-longer",
     "Next: hold the pen alike at each visit, take more images of a touch, or bring the "
@@ -116,7 +117,7 @@ def _assessment(
     worst = int(np.argmax(lengths))
     axis = int(np.argmax(np.abs(moves[worst])))
     distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
-    if distance > limits.drift:
+    if distance > max(limits.drift, uncertainty):
         return refused(
             sentence(
                 "drift.moved",
@@ -132,8 +133,9 @@ def _assessment(
             ),
             VERIFY_AGAIN,
         )
-    largest = float(uncertainties.max())
-    if largest > limits.drift:
+    across, along = uncertainties[:, :2].max(), uncertainties[:, 2].max()
+    largest = float(max(across, along / ALONG))
+    if max(largest, distance) > limits.drift:
         return check(
             sentence(
                 "drift.uncertain",
@@ -141,7 +143,7 @@ def _assessment(
                 "{uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move "
                 "of that size would not show.",
                 distance=distance,
-                uncertainty=largest,
+                uncertainty=float(uncertainties.max()),
                 limit=limits.drift,
             ),
             TOUCH_LONGER,

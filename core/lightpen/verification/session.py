@@ -214,6 +214,7 @@ def measure(setup: SessionSetup, task: TaskKind, runs: Runs) -> Found:
             return measure_length(
                 *(runs, instrument, choices.length, choices.limits),
                 certified_uncertainty=choices.length_uncertainty,
+                ball_offset=ball_offset(choices.length_surface, setup.ball_diameter),
                 drift=setup.drift,
             )
         case TaskKind.DRIFT:

@@ -108,7 +108,7 @@ class VerificationRow(WaitingRow):
             return "" if trouble is None else breakable(worded(trouble))
         names = under_way.names
         called = (shortened(name, LONGEST) for name in (names.pen, names.tip))
-        done = self.tr("verification, {0} of {1} tasks done").format(
+        done = self.tr("verification, {0} of {1} tasks").format(
             *(under_way.n_done, len(under_way.choices.kinds))
         )
         return PARTED.join(filter(None, (*called, done)))

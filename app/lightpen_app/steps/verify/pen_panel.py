@@ -59,6 +59,7 @@ class PenPanel(Translated, QWidget):
         self._left_out.setWordWrap(True)
         self._plot = LedMovesPlot()
         self._plot.setMinimumHeight(PLOT_HEIGHT)
+        self._head = text_label(TextSize.SMALL, Tone.QUIET)
         self._table = NumberTable()
         self._improve = PushButton()
         self._cancel = PushButton()
@@ -82,6 +83,7 @@ class PenPanel(Translated, QWidget):
         layout.addWidget(self._verdict)
         layout.addWidget(self._left_out)
         layout.addLayout(actions)
+        layout.addWidget(self._head)
         layout.addWidget(self._table)
         layout.addWidget(self._plot, 1)
 
@@ -116,7 +118,9 @@ class PenPanel(Translated, QWidget):
         self._cancel.setText(self.tr("Cancel"))
         self._use.setText(self.tr("Use the new file"))
         self._progress.setAccessibleName(self.tr("Progress"))
-        self._table.setAccessibleName(self.tr("LEDs since the first swing"))
+        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
+        self._head.setText(head)
+        self._table.setAccessibleName(head)
         title = self.tr("LEDs since the first swing / mm")
         self._plot.set_axes(Axes(title, self.tr("swing no.")))
         self._refresh()
@@ -224,7 +228,8 @@ class PenPanel(Translated, QWidget):
         self._verdict.set_value(self._health_remark(health))
         self._left_out.setText(self._left_out_text())
         self._left_out.setVisible(bool(self._left_out.text()))
-        self._table.setVisible(health is not None)
+        for widget in (self._head, self._table):
+            widget.setVisible(health is not None)
         self._plot.setVisible(health is not None)
         if health is not None and found is not None:
             self._table.set_value(self._figures(found, health))
@@ -289,13 +294,7 @@ class PenPanel(Translated, QWidget):
 
     def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
         """Return how far each LED moved and how much the pen grew, swing by swing."""
-        heads = (
-            *(
-                self.tr("LED {0} / \xb5m").format(j + 1)
-                for j in range(len(found.pen.leds))
-            ),
-            self.tr("Size / ppm"),
-        )
+        heads = *map(str, range(1, len(found.pen.leds) + 1)), self.tr("size")
         names, cells = [], []
         for swing, told in list(zip(found.swings, health.swings, strict=True))[
             -LATEST:

@@ -136,10 +136,7 @@ class RingStrip(TaskStrip):
     def __init__(self, parent: QWidget | None = None) -> None:
         self._radius = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
-        self._surface = QComboBox()
-        self._surface.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
-        for surface in Surface:
-            self._surface.addItem("", surface)
+        self._surface = _surface_field()
         self._runs = NumberField("", (1, MOST_RUNS), 0)
         fields = self._radius, self._uncertainty, self._surface, self._runs
         super().__init__(TaskKind.CIRCLE, fields, parent)
@@ -220,8 +217,9 @@ class LengthStrip(TaskStrip):
     def __init__(self, parent: QWidget | None = None) -> None:
         self._length = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
+        self._surface = _surface_field()
         self._places = NumberField("", (1, MOST_RUNS), 0)
-        fields = self._length, self._uncertainty, self._places
+        fields = self._length, self._uncertainty, self._surface, self._places
         super().__init__(TaskKind.LENGTH, fields, parent)
 
     @override
@@ -230,6 +228,7 @@ class LengthStrip(TaskStrip):
             choices,
             length=self._length.value(),
             length_uncertainty=self._uncertainty.value(),
+            length_surface=Surface(self._surface.currentData()),
             n_places=round(self._places.value()),
         )
 
@@ -237,21 +236,34 @@ class LengthStrip(TaskStrip):
     def _show_fields(self, choices: VerificationChoices) -> None:
         self._length.setValue(choices.length)
         self._uncertainty.setValue(choices.length_uncertainty)
+        self._surface.setCurrentIndex(self._surface.findData(choices.length_surface))
         self._places.setValue(choices.n_places)
 
     @override
     def _words(self) -> tuple[str, ...]:
+        names = self.tr("in cones"), self.tr("inner faces"), self.tr("outer faces")
+        for index, name in enumerate(names):
+            self._surface.setItemText(index, name)
         self._length.setSpecialValueText(self.tr("not known"))
         return (
             self.tr("Touch both ends of a length"),
             self.tr("Certified length"),
             self.tr("Its U (k = 2)"),
+            self.tr("Touched"),
             self.tr("Places"),
         )
 
 
 def _length_field() -> NumberField:
     return NumberField("mm", (0.0, LONGEST), 4)
+
+
+def _surface_field() -> QComboBox:
+    field = QComboBox()
+    field.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+    for surface in Surface:
+        field.addItem("", surface)
+    return field
 
 
 def _label(field: QWidget) -> QLabel:
