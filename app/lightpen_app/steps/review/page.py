@@ -729,6 +729,8 @@ class ReviewPage(Rearranged, Page):
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
+        if self._run.status.result is None:
+            self._reason.refuse()
         images = self._images.content_so_far()
         if images is not None:
             images.forget_refused()

@@ -137,6 +137,7 @@ class VerifyPage(Rearranged, Page):
         self._run.changed.connect(self._show_soon)
         self._run.happened.connect(self._on_happened)
         self._run.progressed.connect(self._on_progressed)
+        self._run.troubled.connect(self._on_troubled)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._show_soon)
         workbench.changed.connect(self._on_workbench_changed)
@@ -425,6 +426,10 @@ class VerifyPage(Rearranged, Page):
     def _on_happened(self, what: SessionHappening) -> None:
         value = self._words.operator_value(self._moment())
         self._sounds.play(SOUNDS[what], value.fraction or 0.0)
+
+    def _on_troubled(self) -> None:
+        if self._can_be_accepted():
+            self._reason.refuse()
 
     def _on_progressed(self, fraction: float) -> None:
         self._reading = fraction
