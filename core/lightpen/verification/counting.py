@@ -76,7 +76,8 @@ def _is_in_cone(state: SessionState, touch: Touch) -> bool:
 def _at_witness(state: SessionState, touches: tuple[Touch, ...]) -> SessionState:
     """Drop a touch in another posture than the first, or away from its cone."""
     first, last = (*state.visits, touches)[0][0], touches[-1]
-    kept = range(len(touches) - 1)
+    is_second = not state.visits and len(touches) == 2  # nobody knows which is right
+    kept = (1,) if is_second else tuple(range(len(touches) - 1))
     turned = angles_between(last.rotation[None], first.rotation[None])[0, 0]
     if turned > SAME_POSTURE:
         alone = _with_touches(state, touches, kept)

@@ -17,7 +17,7 @@ from pathlib import Path
 from msgspec import Struct, to_builtins
 
 from lightpen.errors import FileError
-from lightpen.formats.file_locks import locked
+from lightpen.formats.file_locks import NO_LOCKS, locked
 from lightpen.formats.files import (
     MEGABYTE,
     printable,
@@ -39,11 +39,10 @@ from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.names import Names, folder_name
 from lightpen.record.numbered_files import make_folder, numbered_files
-from lightpen.record.verifications import CONCLUSION, VERIFICATIONS
+from lightpen.record.verifications import CONCLUSION, UNDER_WAY, VERIFICATIONS
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.choices import TaskKind, VerificationChoices
 
-UNDER_WAY = "under way"  # a folder in that of the verifications
 SUFFIX, LOCK, DAMAGED = ".json", ".lock", ".damaged"
 WHAT = sentence("file.under-way", "file of a verification under way")
 
@@ -315,6 +314,10 @@ def _is_held(path: Path) -> bool:
         return False
     try:
         return not locked(descriptor)
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+        return path.stem.endswith(f"-{os.getpid()}")  # of this window, as it seems
     finally:
         os.close(descriptor)
 

@@ -408,6 +408,14 @@ def test_a_witness_held_otherwise_or_missed_does_not_count(witnessed: Session) -
     assert len(witnessed.state.touches) == 1
 
 
+def test_a_first_touch_beside_the_cone_does_not_hold_the_witness_up(
+    witnessed: Session,
+) -> None:
+    visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0), *UPRIGHT)
+
+    assert witnessed.state.task(witnessed.setup) is TaskKind.FIXED_POINT
+
+
 def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
     visit(witnessed)
     witnessed.touch(*leant(4))
