@@ -401,6 +401,8 @@ def test_a_camera_that_moved_between_visits_is_told_and_counts_in_what_was_touch
 
 
 def test_a_witness_held_otherwise_or_missed_does_not_count(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
     visit(witnessed, UPRIGHT[0], Hold(tilt=0.4))
     assert witnessed.says() == "session.other-than-first"
     visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0))
