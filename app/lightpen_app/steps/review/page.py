@@ -246,9 +246,10 @@ class ReviewPage(Rearranged, Page):
         if self._search is not None:
             self._search.cancel()
         self._along.shut_down()
-        images = self._images.content_so_far()
-        if images is not None:
-            images.shut_down()
+        for panel in self._panels:
+            content = panel.content_so_far()
+            if content is not None:
+                content.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -590,6 +591,8 @@ class ReviewPage(Rearranged, Page):
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
+        if self._run.status.result is None:
+            self._reason.refuse()
         images = self._images.content_so_far()
         if images is not None:
             images.forget_refused()

@@ -13,6 +13,7 @@ from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QLineEdit,
@@ -37,6 +38,7 @@ from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.steps.history.archive_panel import ArchivePanel
+from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -330,6 +332,26 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
 
 
+def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
+    desk: Desk,
+) -> None:
+    desk.enter(3)  # at x of 0, 1 and 2 mm
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel, row = desk.child(SelectionPanel), desk.child(CapabilityRow)
+    desk.until(lambda: panel.repeatability())
+    assert row.words() == ""
+    tolerance, x, *_ = row.findChildren(NumberField)
+    tolerance.setValue(9.0)
+    row.findChildren(QCheckBox)[0].click()
+    x.setValue(1.0)
+
+    assert "Cg: x 0.30" in row.words()  # 0.2 * 9 / (6 * 1)
+    assert "Cgk: x 0.30" in row.words()
+    assert "Not capable: 1.33 is asked for." in row.words()
+    assert "A study takes 30 to 50 repeats; these are 3." in row.words()
+
+
 def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     desk.enter(2)
     desk.open()
@@ -414,7 +436,7 @@ def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     assert panel.figures().cells[0][:2] == ("2026-01-04", "2026-02-03")
 
     desk.show_tab(DUE)
-    days = desk.child(NumberField)
+    days, _ = panel.findChildren(NumberField)
     days.setFocus()
     days.selectAll()
     QTest.keyClicks(days, "7")
