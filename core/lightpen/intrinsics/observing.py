@@ -1,7 +1,7 @@
 """From images to views of a board, and why it is not seen where it is not."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -14,7 +14,7 @@ from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.pairing import NONE, Pairing
 from lightpen.intrinsics.boards import Board, BoardKind
-from lightpen.intrinsics.sightings import count_corners, find_points
+from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
 from lightpen.sentences import Sentence, sentence
 
@@ -134,11 +134,8 @@ def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileE
 
 def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     """Return what the images show in place of the board."""
-
-    def images() -> Iterator[Image]:  # one at a time: they may be large
-        return (load() for load in islice(source.open(), EXAMINED))
-
-    if _is_found((image[:, ::-1].copy() for image in images()), board):
+    images = [for_search(load()) for load in islice(source.open(), EXAMINED)]
+    if _is_found([image[:, ::-1].copy() for image in images], board):
         return sentence(
             "intrinsics.mirrored",
             "The images show the board {board} mirrored. Switch off the mirroring of "
@@ -147,7 +144,7 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
         )
     if board.kind in OTHER_LAYOUT:
         other = replace(board, kind=OTHER_LAYOUT[board.kind])
-        if _is_found(images(), other):
+        if _is_found(images, other):
             return sentence(
                 "intrinsics.other-layout",
                 "No image shows the board {board}, but they show {other}: OpenCV laid "
@@ -156,7 +153,7 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
                 other=other.name,
             )
     across = replace(board, columns=board.rows, rows=board.columns)
-    if across != board and _is_found(images(), across):
+    if across != board and _is_found(images, across):
         return sentence(
             "intrinsics.across",
             "No image shows the board {board}, but they show {other}: columns and rows "
@@ -165,7 +162,7 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
             other=across.name,
         )
     if board.kind is BoardKind.CHESSBOARD:
-        for image in images():
+        for image in images:
             count = count_corners(image)
             if count is not None:
                 return sentence(
@@ -187,5 +184,5 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     )
 
 
-def _is_found(images: Iterator[Image], board: Board) -> bool:
+def _is_found(images: Sequence[Image], board: Board) -> bool:
     return any(find_points(image, board) is not None for image in images)
