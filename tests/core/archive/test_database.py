@@ -1,8 +1,11 @@
 """A database is looked at before it is written to, and said to be what it is."""
 
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from threading import Event
+from time import sleep
 
 import pytest
 from alembic.autogenerate import compare_metadata
@@ -14,6 +17,7 @@ from lightpen.archive.database import (
     MIGRATIONS,
     VERSION,
     VERSION_TABLE,
+    Database,
     look_into,
     open_file,
     open_server,
@@ -115,20 +119,28 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
         open_server(address)
 
 
-def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
-    tmp_path: Path,
-) -> None:
-    file = tmp_path / "archive.sqlite"
-    database = open_file(file)
-    with database.reading() as connection:
-        used = connection.connection.dbapi_connection
-        database.close()
-        connection.exec_driver_sql("SELECT 1")
+def test_an_archive_closes_after_those_who_use_it(tmp_path: Path) -> None:
+    database = open_file(tmp_path / "archive.sqlite")
+    is_read, may_end = Event(), Event()
 
-    assert isinstance(used, sqlite3.Connection)
-    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
-        used.execute("SELECT 1")
-    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+    def read() -> None:
+        with database.reading():
+            is_read.set()
+            may_end.wait()
+
+    with ThreadPoolExecutor() as pool:
+        reading = pool.submit(read)
+        is_read.wait()
+        closing_it = pool.submit(database.close)
+        while not _is_refused(database):
+            sleep(0.001)
+        assert not closing_it.done()
+        may_end.set()
+        reading.result()
+        closing_it.result()
+
+    # The last connection takes the journal along.
+    assert [file.name for file in tmp_path.iterdir()] == ["archive.sqlite"]
 
 
 def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
@@ -143,3 +155,11 @@ def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
     for opening in (open_file, look_into):
         with pytest.raises(ArchiveError, match="disk image is malformed"):
             opening(file)
+
+
+def _is_refused(database: Database) -> bool:
+    try:
+        with database.reading():
+            return False
+    except ArchiveError:
+        return True
