@@ -22,6 +22,7 @@ from PySide6.QtWidgets import QApplication
 from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.errors import UsageError
 from lightpen.estimation.summary import calibration_text
+from lightpen.formats.files import printable
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
 from lightpen.streaming.server import StreamPlace
@@ -152,7 +153,8 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     """Return the QApplication of the program."""
     sys.setswitchinterval(SWITCH_INTERVAL)
     QApplication.setStyle("Fusion")
-    application = QApplication(list(arguments))
+    # PySide crashes at an argument that is no text, as a path may be.
+    application = QApplication([printable(argument) for argument in arguments])
     application.setApplicationName("lightpen")
     application.setApplicationDisplayName("Lightpen")
     GarbageCollector(application)
