@@ -23,6 +23,7 @@ from lightpen.cameras.clock import MachineClock, SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
 from lightpen.estimation.summary import calibration_text
+from lightpen.formats.files import printable
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
 from lightpen.simulator.camera import SERIAL
@@ -162,7 +163,8 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     """Return the QApplication of the program."""
     sys.setswitchinterval(SWITCH_INTERVAL)
     QApplication.setStyle("Fusion")
-    application = QApplication(list(arguments))
+    # PySide crashes at an argument that is no text, as a path may be.
+    application = QApplication([printable(argument) for argument in arguments])
     application.setApplicationName("lightpen")
     application.setApplicationDisplayName("Lightpen")
     GarbageCollector(application)

@@ -1,6 +1,8 @@
 """A recorded swing that is opened from outside, as by a double click."""
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,3 +60,19 @@ def test_what_is_no_swing_is_told_in_a_sentence(
         lambda: any("neither a recorded swing" in text for text in walker.texts())
     )
     assert walker.window.page().key == "start"
+
+
+APPLICATION = """
+import os
+from lightpen_app.application import make_application
+application = make_application(["lightpen", "open", os.fsdecode(b"swing\\xff")])
+print(application.arguments()[-1])
+"""
+
+
+def test_a_path_that_is_no_utf_8_does_not_end_the_program() -> None:
+    outcome = subprocess.run(
+        [sys.executable, "-c", APPLICATION], capture_output=True, text=True, check=True
+    )
+
+    assert outcome.stdout == "swing\\udcff\n"

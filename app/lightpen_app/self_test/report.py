@@ -95,4 +95,7 @@ class Report:
         }
         with self._lock:
             text = json.dumps(entries, indent=1, ensure_ascii=False)
-            self.file.write_text(text + "\n", encoding="utf-8")
+            # A path need not be text; its bytes are then written as JSON escapes them.
+            self.file.write_text(
+                text + "\n", encoding="utf-8", errors="backslashreplace"
+            )

@@ -10,10 +10,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 
@@ -23,6 +21,9 @@ from lightpen.formats import videos
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.formats.files import printable
 from lightpen.sentences import sentence
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
@@ -55,6 +56,8 @@ def _decoder(
     send: Callable[..., None], path: Path, *arguments: int
 ) -> Iterator[Callable[[], Any]]:
     """Start a process that sends; yield what receives, or raises what it raised."""
+    from multiprocessing import get_context  # 10 ms of a start
+
     context = get_context("spawn")  # a fork would copy threads that hold locks
     ours, its = context.Pipe(duplex=False)
     process = context.Process(
@@ -82,7 +85,7 @@ def _decoder(
 
 
 def _serve(
-    to: Connection, send: Callable[..., None], path: Path, *arguments: int
+    to: "Connection", send: Callable[..., None], path: Path, *arguments: int
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked hears it, and ends this
     keep_freed_memory()
@@ -97,11 +100,11 @@ def _serve(
         return
 
 
-def _send_count(to: Connection, path: Path) -> None:
+def _send_count(to: "Connection", path: Path) -> None:
     to.send(videos.count_frames(path))
 
 
-def _send_frames(to: Connection, path: Path, n_frames: int) -> None:
+def _send_frames(to: "Connection", path: Path, n_frames: int) -> None:
     for load in videos.frame_loaders(path, n_frames):
         try:
             to.send(load())

@@ -14,7 +14,7 @@ from lightpen.formats.files import printable
 from lightpen.formats.images import ImageSource, look_at_all
 from lightpen.formats.pairing import NONE, Pairing
 from lightpen.intrinsics.boards import Board, BoardKind
-from lightpen.intrinsics.sightings import count_corners, find_points
+from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
 from lightpen.sentences import Sentence, sentence
 
@@ -187,7 +187,7 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     """Return what the images show in place of the board, as far as that is known."""
 
     def images() -> Iterator[Image]:
-        return (load() for load in islice(source.open(), EXAMINED))
+        return (for_search(load()) for load in islice(source.open(), EXAMINED))
 
     return why_unseen(images, board) or sentence(
         "intrinsics.unseen",

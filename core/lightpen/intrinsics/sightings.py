@@ -112,6 +112,12 @@ def count_corners(image: Image) -> tuple[int, int] | None:
     return (int(meta.shape[1]), int(meta.shape[0])) if found else None
 
 
+def for_search(image: Image) -> Image:
+    """Return a large image as small as a board is searched in."""
+    small, _ = _smaller(_to_8_bit(image))
+    return np.asarray(small, dtype=np.uint8)
+
+
 def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
     if image.dtype == np.uint8:
         return np.asarray(image, dtype=np.uint8)

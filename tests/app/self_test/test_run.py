@@ -79,3 +79,14 @@ def test_a_report_that_is_cut_off_is_not_one_of_success(tmp_path: Path) -> None:
         pass
 
     assert not report.ok
+
+
+def test_a_path_that_is_no_utf_8_is_in_the_report(tmp_path: Path) -> None:
+    report = Report(tmp_path / "report.json")
+
+    with report.check("path") as found:
+        found.append("/home/\udcff")
+    report.write()
+
+    written = json.loads(report.file.read_text(encoding="utf-8"))
+    assert written["checks"][0]["found"] == "/home/\udcff"
