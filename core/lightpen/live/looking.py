@@ -15,12 +15,13 @@ from threading import Event, Thread
 from typing import Protocol
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.pairing import FramePairs
+from lightpen.cameras.pairing import FramePairs, held_up
 from lightpen.cameras.protocol import (
     CameraSettings,
     DeviceLost,
     EndOfImages,
     Frame,
+    FramesHeldUp,
     FrameTimeout,
     ImageCamera,
     Stats,
@@ -30,6 +31,7 @@ from lightpen.cameras.worker import (
     CameraWorker,
     Failed,
     FrameReady,
+    Troubled,
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
@@ -353,13 +355,24 @@ class Live:
             self._refuse_recordings()
             return None
         n_images = counts.pop() if len(counts) == 1 else None
+        moment = self._pairs.take(n_images)
+        if moment is None:
+            self._add_next()
+            moment = self._pairs.take(n_images)
+        moved_ms = self._pairs.moved_ms()
+        if moved_ms is not None:
+            self._listener.on_camera(Troubled(FramesHeldUp(held_up(moved_ms))), 1)
+        return moment
+
+    def _add_next(self) -> None:
+        """Take the next frame of the camera whose turn it is."""
         wanted = self._pairs.wanted
         try:
             frame = self._workers[wanted].next_frame(LONGEST_WAIT)
         except FrameTimeout:  # what the other has sent goes on, and finds no partner
             wanted = 1 - wanted
             frame = self._workers[wanted].next_frame(0.0)
-        return self._pairs.add(wanted, frame, n_images)
+        self._pairs.add(wanted, frame)
 
     def _refuse_recordings(self) -> None:
         """Tell once that two recordings are not of the same moments."""
@@ -391,7 +404,8 @@ class Live:
         if wanted is not self._wanted:
             self._wanted = wanted
             self._last.clear()
-        aim = wanted.aims[c]
+        aims = wanted.aims
+        aim = aims[c] if c < len(aims) else Aim()  # of cameras that come or go
         camera, pen, mask = aim.camera, aim.pen, aim.mask
         if camera is None or pen is None or not camera.fits(frame.image):
             try:

@@ -1,25 +1,31 @@
 """A database is looked at before it is written to, and said to be what it is."""
 
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from threading import Event
+from time import sleep
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from tests.core.archive.conftest import PASSWORD, Postgres, Station
+from benchmarks.postgres_server import PASSWORD, Postgres
+from tests.core.archive.conftest import Station
 
+from lightpen.archive import database
 from lightpen.archive.database import (
     MIGRATIONS,
     VERSION,
     VERSION_TABLE,
+    Database,
     look_into,
     open_file,
     open_server,
 )
 from lightpen.archive.tables import METADATA
-from lightpen.errors import ArchiveError
+from lightpen.errors import ArchiveError, NoArchiveError
 
 
 def test_the_migrations_lead_to_the_tables_that_are_used(station: Station) -> None:
@@ -77,8 +83,37 @@ def test_a_file_that_is_no_database_is_refused_and_untouched(tmp_path: Path) -> 
 
 
 def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> None:
-    with pytest.raises(ArchiveError, match="There is no archive"):
+    with pytest.raises(NoArchiveError, match="There is no archive"):
         look_into(tmp_path / "archive.sqlite")
+
+
+def test_an_archive_that_was_cut_off_while_it_was_made_is_empty_and_made_anew(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    file.touch()
+
+    with pytest.raises(NoArchiveError, match="nothing was entered in it yet"):
+        look_into(file)
+    open_file(file).close()
+    look_into(file).close()
+
+
+def test_an_archive_that_another_program_holds_is_said_to_be_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(database, "LONGEST_WAIT_S", 0.05)
+    file = tmp_path / "archive.sqlite"
+    with (
+        closing(open_file(file)) as archive,
+        closing(sqlite3.connect(file, isolation_level=None)) as other,
+    ):
+        other.execute("BEGIN IMMEDIATE")
+        with (
+            pytest.raises(ArchiveError, match="is held by another program"),
+            archive.writing(),
+        ):
+            pass
 
 
 @pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])
@@ -97,6 +132,21 @@ def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> 
     assert PASSWORD not in told
 
 
+@pytest.mark.parametrize(
+    "address",
+    [
+        f"postgresql://plant:{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://plant:it-is@{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://127.0.0.1:1/plant?user=plant&password={PASSWORD}",
+    ],
+)
+def test_no_way_of_giving_a_password_has_it_told(address: str) -> None:
+    with pytest.raises(ArchiveError) as caught:
+        open_server(address)
+
+    assert PASSWORD not in str(caught.value.sentence)
+
+
 def test_a_server_that_is_no_postgresql_is_said_to_be_unusable(gopher: int) -> None:
     with pytest.raises(ArchiveError, match="cannot be used"):
         open_server(f"postgresql://plant:{PASSWORD}@127.0.0.1:{gopher}/plant")
@@ -113,3 +163,65 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
 
     with pytest.raises(ArchiveError, match="holds the tables of another program"):
         open_server(address)
+
+
+def test_an_archive_closes_after_those_who_use_it(tmp_path: Path) -> None:
+    database = open_file(tmp_path / "archive.sqlite")
+    is_read, may_end = Event(), Event()
+
+    def read() -> None:
+        with database.reading():
+            is_read.set()
+            may_end.wait()
+
+    with ThreadPoolExecutor() as pool:
+        reading = pool.submit(read)
+        is_read.wait()
+        closing_it = pool.submit(database.close)
+        while not _is_refused(database):
+            sleep(0.001)
+        assert not closing_it.done()
+        may_end.set()
+        reading.result()
+        closing_it.result()
+
+    # The last connection takes the journal along.
+    assert [file.name for file in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def _is_refused(database: Database) -> bool:
+    try:
+        with database.reading():
+            return False
+    except ArchiveError:
+        return True
+
+
+def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    database = open_file(file)
+    with database.reading() as connection:
+        used = connection.connection.dbapi_connection
+        database.close()
+        connection.exec_driver_sql("SELECT 1")
+
+    assert isinstance(used, sqlite3.Connection)
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        used.execute("SELECT 1")
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    open_file(file).close()
+    data = file.read_bytes()
+    damaged = data.replace(b"tablearchive_entries", b"table\x8brchive_entries")
+    file.write_bytes(damaged.replace(b"CREATE TABLE archive_entries", b"?" * 28))
+
+    for opening in (open_file, look_into):
+        with pytest.raises(ArchiveError, match="disk image is malformed"):
+            opening(file)

@@ -143,6 +143,7 @@ class HistoryContent(Translated, QWidget):
         self._filter.set_known(opening.names)
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
+        self._archive.set_delivery(opening.delivery)
         self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
@@ -181,6 +182,7 @@ class HistoryContent(Translated, QWidget):
     def _show_selection(self) -> None:
         entries = [line.entry for line in self._table.selected()]
         selected = [entry for entry in entries if entry is not None]
+        self._selection.set_limits(self._workbench.choices.limits)
         self._selection.set_value(selected, self._trend.entries)
 
     def _on_rule_changed(self, rule: DueRule) -> None:

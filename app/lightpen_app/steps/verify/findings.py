@@ -18,7 +18,8 @@ from lightpen.verification.fixed_point import (
     scatter_of,
 )
 from lightpen.verification.length import Length
-from lightpen.verification.session import SessionSetup, SessionState, ring_fit
+from lightpen.verification.session import drift_so_far, ring_fit
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touch import Touch
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -401,6 +402,61 @@ class ArticulationFinding(TaskFinding):
         pen = setup.instrument.pen
         postures = [posture_of(pen, touch.rotation) for touch in touched]
         return dial_of(postures, live_posture(setup, state))
+
+
+class DriftFinding(TaskFinding):
+    """The visits of the witness, and how far it moved since the first."""
+
+    kind = TaskKind.DRIFT
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._table = NumberTable()
+        self._told = text_label(TextSize.BODY, Tone.QUIET)
+        self._told.setWordWrap(True)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._table)
+        layout.addWidget(self._told)
+        layout.addStretch(1)
+
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        self._table.setAccessibleName(self.tr("Moves of the witness / mm"))
+        self._refresh()
+
+    @override
+    def _refresh(self) -> None:
+        drift = None if self._shown is None else drift_so_far(*self._shown)
+        if drift is None:
+            self._table.set_value(Figures())
+            self._told.setText(
+                self.tr(
+                    "A cone that stands still is the witness: what it moves by from "
+                    "one visit to the next counts in U of what is touched in between."
+                )
+            )
+            return
+        heads = (
+            *(f"{axis} / mm" for axis in AXES),
+            *(self.tr("U of {0} / mm").format(axis) for axis in AXES),
+        )
+        rows = zip(drift.moves, drift.uncertainties, strict=True)
+        cells = tuple((*_lengths(move), *_lengths(u)) for move, u in rows)
+        names = tuple(
+            self.tr("Visit {0}").format(i + 1) for i in range(len(drift.names))
+        )
+        self._table.set_value(Figures(heads, names, cells))
+        shares = ", ".join(_lengths(drift.share))
+        words = self.tr("Standard uncertainty by it along u, v, w: {0} mm.")
+        self._told.setText(words.format(shares))
 
 
 def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:

@@ -13,6 +13,7 @@ from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QApplication,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QLineEdit,
@@ -25,6 +26,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
+from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
@@ -36,6 +38,7 @@ from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.steps.history.archive_panel import ArchivePanel
+from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
@@ -210,6 +213,27 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.until(lambda: limit in _words(desk))
 
 
+def test_a_server_that_cannot_be_reached_is_told_without_the_password(
+    desk: Desk,
+) -> None:
+    folder = desk.workbench.folder
+    away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
+    desk.workbench.run.logbook = LateLogbook(folder, away)
+    desk.enter(1)
+    desk.open()
+    desk.show_tab(WHOLE)
+    panel = desk.child(ArchivePanel)
+
+    def told() -> str:
+        desk.page.entered()
+        return panel.told()[0].text
+
+    desk.until(lambda: "does not have all entries" in told())
+    assert "The archive postgresql" in told()
+    assert "secret-word" not in told()
+    desk.workbench.run.logbook.close()
+
+
 @pytest.mark.parametrize("language", list(Language))
 def test_at_the_usual_width_every_column_is_seen_and_told_whole(
     desk: Desk, qapp: QApplication, language: Language
@@ -308,6 +332,26 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
 
 
+def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
+    desk: Desk,
+) -> None:
+    desk.enter(3)  # at x of 0, 1 and 2 mm
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel, row = desk.child(SelectionPanel), desk.child(CapabilityRow)
+    desk.until(lambda: panel.repeatability())
+    assert row.words() == ""
+    tolerance, x, *_ = row.findChildren(NumberField)
+    tolerance.setValue(9.0)
+    row.findChildren(QCheckBox)[0].click()
+    x.setValue(1.0)
+
+    assert "Cg: x 0.30" in row.words()  # 0.2 * 9 / (6 * 1)
+    assert "Cgk: x 0.30" in row.words()
+    assert "Not capable: 1.33 is asked for." in row.words()
+    assert "A study takes 30 to 50 repeats; these are 3." in row.words()
+
+
 def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
     desk.enter(2)
     desk.open()
@@ -392,7 +436,7 @@ def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     assert panel.figures().cells[0][:2] == ("2026-01-04", "2026-02-03")
 
     desk.show_tab(DUE)
-    days = desk.child(NumberField)
+    days, _ = panel.findChildren(NumberField)
     days.setFocus()
     days.selectAll()
     QTest.keyClicks(days, "7")

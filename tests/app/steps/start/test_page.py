@@ -44,11 +44,12 @@ from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
+from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.steps.start.waiting_row import WaitingRow
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
@@ -129,7 +130,7 @@ class Opened:
         (panel,) = self.page.findChildren(LastResultPanel)
         return tuple(word for word in panel.words() if word != "SIMULATED")
 
-    def rows(self) -> tuple[InterruptedRow, ...]:
+    def rows(self) -> tuple[WaitingRow, ...]:
         (panel,) = self.page.findChildren(InterruptedPanel)
         assert panel.isVisibleTo(self.page) is bool(panel.rows())
         return panel.rows()
