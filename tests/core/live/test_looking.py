@@ -276,9 +276,11 @@ def test_in_a_swing_what_rests_for_long_is_looked_at_less_often_until_it_moves(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("lightpen.live.looking.PATIENT_NS", 1_000_000_000)
+    station.witness.follower = None  # so that the pen is held as it is
     station.begin(SwingLimits())
     make_live()
 
+    station.wait_for_phase(Phase.CAPTURING)
     screen.wait_for_images(2)
     assert gap_s(screen) < 2 / FRAME_RATE
     screen.wait_until(lambda: gap_s(screen) >= UNHURRIED)

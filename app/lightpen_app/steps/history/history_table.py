@@ -273,8 +273,11 @@ class HistoryTable(Translated, RowTable):
         letters = small if is_dense else body
         for each in (self, self.horizontalHeader()):
             set_size(each, TextSize.SMALL if is_dense else TextSize.BODY)
-        self.setColumnHidden(STATION, is_dense and self._is_of_one_station)
+        is_without = is_dense and self._is_of_one_station
+        self.setColumnHidden(STATION, is_without)
         least, most = self._widths(letters, 0), self._widths(letters, 1)
+        if is_without:
+            del least[STATION]
         wanted = {column: most[column] - least[column] for column in least}
         spare = room - sum(least.values())
         share = min(max(spare / sum(wanted.values()), 0.0), 1.0)
@@ -292,8 +295,6 @@ class HistoryTable(Translated, RowTable):
             U: UNCERTAINTY,
             **{column: names[longer] for column, names in NAMED.items()},
         }
-        if self.isColumnHidden(STATION):
-            del samples[STATION]
         across = Qt.Orientation.Horizontal
         return {
             column: CELL_MARGIN

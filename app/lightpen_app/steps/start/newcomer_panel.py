@@ -34,13 +34,11 @@ class NewcomerPanel(Translated, QGroupBox):
         self._play = PushButton()
 
         # Layout
-        layout = QGridLayout(self)
+        layout = self._layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
         layout.addWidget(self._words, 0, 0, 1, 2)
-        layout.addWidget(self._try, 1, 0, 1, 2)
-        layout.addWidget(self._explain, 2, 0)
-        layout.addWidget(self._play, 2, 1)
+        self.set_wide(False)
 
         # Connections
         self._try.clicked.connect(self.trial_requested)
@@ -48,6 +46,18 @@ class NewcomerPanel(Translated, QGroupBox):
         self._play.clicked.connect(self._on_play_clicked)
 
         self._retranslate()
+
+    def set_wide(self, wide: bool) -> None:
+        """Put its buttons in one row without words, or below them."""
+        layout = self._layout
+        self._words.setHidden(wide)
+        if wide:
+            for column, button in enumerate((self._try, self._explain, self._play)):
+                layout.addWidget(button, 1, column)
+        else:
+            layout.addWidget(self._try, 1, 0, 1, 2)
+            layout.addWidget(self._explain, 2, 0)
+            layout.addWidget(self._play, 2, 1)
 
     def set_why_not(self, why_not: str) -> None:
         """Say why nothing can be tried out now, or let it."""

@@ -118,8 +118,9 @@ class StartPage(Rearranged, Page):
         right.addWidget(self._last)
         right.addWidget(self._sound_test)
         right.addWidget(self._folder)
-        is_known = bool(workbench.stations())
-        right.insertWidget(right.count() if is_known else 0, self._newcomer)
+        self._is_known = bool(workbench.stations())
+        if self._is_known:
+            right.addWidget(self._newcomer)
         right.addStretch(1)
         content = QWidget()
         rows = QVBoxLayout(content)
@@ -231,6 +232,9 @@ class StartPage(Rearranged, Page):
         )
         # What waits for an answer comes first.
         column = self._left if is_narrow else self._right
+        if not self._is_known:
+            self._newcomer.set_wide(is_narrow)
+            column.insertWidget(0, self._newcomer)
         column.insertWidget(0, self._interrupted)
         self._last.set_room(self._room)
         self._vast.setVisible(self._room.is_vast)

@@ -37,6 +37,7 @@ from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
 from lightpen_app.look.languages import Language, LanguageSwitch
+from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
@@ -250,6 +251,8 @@ def test_at_the_usual_width_every_column_is_seen_and_told_whole(
         if column != STATION:  # the only one
             needed = desk.table.sizeHintForColumn(column)
             assert across.sectionSize(column) >= needed, column
+    assert desk.table.isColumnHidden(STATION)
+    apply_theme(qapp, LIGHT)
     assert desk.table.isColumnHidden(STATION)
 
     desk.page.resize(1616, 700)

@@ -33,6 +33,19 @@ def test_a_simulated_pen_is_at_the_swing_after_one_click(
     assert not walker.control("Try it with a simulated pen").isEnabled()
 
 
+def test_at_the_first_start_the_trial_is_seen_in_the_smallest_window(
+    open_wizard: "OpenWizard",
+) -> None:
+    walker = open_wizard()
+    walker.window.resize(940, 500)
+
+    def is_seen() -> bool:
+        trial = walker.control("Try it with a simulated pen")
+        return trial.visibleRegion().boundingRect() == trial.rect()
+
+    walker.until(is_seen)
+
+
 def test_enter_goes_to_the_first_field_that_is_missing(
     open_wizard: "OpenWizard",
 ) -> None:
