@@ -9,7 +9,7 @@ from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.sightings import find_points
+from lightpen.intrinsics.sightings import count_corners, find_points
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
@@ -154,6 +154,10 @@ def test_another_board_than_was_said_is_named(
     with pytest.raises(CalibrationError) as caught:
         observe_board(source_of(image), parse_board(said), lambda fraction: None)
     assert caught.value.sentence.code == code
+
+
+def test_the_corners_of_a_chessboard_are_counted_whole() -> None:
+    assert count_corners(image_of(parse_board("chessboard:9x6:20"))) == (9, 6)
 
 
 def test_a_mirrored_board_is_said_to_be_so() -> None:

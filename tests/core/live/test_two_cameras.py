@@ -3,23 +3,26 @@
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
+from typing_extensions import override
 
 from lightpen.arrays import Image
 from lightpen.cameras.aravis import AravisDevice
 from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.device_camera import DeviceCamera
-from lightpen.cameras.protocol import CameraSettings, ImageCamera, Region
+from lightpen.cameras.protocol import CameraSettings, Frame, ImageCamera, Region
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import (
     Connection,
     ConnectionChanged,
     Failed,
+    Troubled,
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
@@ -35,6 +38,8 @@ if TYPE_CHECKING:
 
 TIMEOUT = 60.0  # s until a test gives up
 TINY = Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43)
+HOUR_NS = 3_600_000_000_000
+HELD_UP_NS, N_HELD_UP = 60_000_000, 20
 SETTINGS = CameraSettings(frame_rate=25.0, region=Region(0, 0, 160, 120))
 
 
@@ -45,6 +50,7 @@ class Screen:
         self.images: tuple[list[LiveImage], list[LiveImage]] = ([], [])
         self.connections: tuple[list[Connection], list[Connection]] = ([], [])
         self.failures: list[str] = []
+        self.troubles: list[str] = []
         self._changed = threading.Condition()
 
     def on_image(self, image: LiveImage) -> None:
@@ -56,6 +62,8 @@ class Screen:
         with self._changed:
             if isinstance(event, ConnectionChanged):
                 self.connections[camera].append(event.connection)
+            if isinstance(event, Troubled):
+                self.troubles.append(str(event.error))
             if isinstance(event, Failed):
                 self.failures.append(str(event.error))
             self._changed.notify_all()
@@ -145,6 +153,43 @@ def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
     live.stop()
 
     assert screen.failures == []
+
+
+class HeldUpCamera(SimulatedCamera):
+    """Has a clock of its own; its first images are held up on their way."""
+
+    @override
+    def read(self, timeout_s: float) -> Frame:
+        frame = super().read(timeout_s)
+        assert frame.device_ts_ns is not None
+        late_ns = HELD_UP_NS if frame.seq < N_HELD_UP else 0
+        return replace(
+            frame,
+            host_ts_ns=frame.host_ts_ns + late_ns,
+            device_ts_ns=frame.device_ts_ns + HOUR_NS,
+        )
+
+
+def test_images_held_up_at_first_are_told_and_paired_rightly_afterwards(
+    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    make_live: MakeLive,
+    screen: Screen,
+) -> None:
+    first, _ = simulated
+    rig = beside(first.scene.camera, first.scene.cone_cam)
+    second = HeldUpCamera(first.scene, MachineClock(), first.operator, rig=rig)
+    make_live((first, second))
+    screen.wait_until(lambda: bool(screen.troubles))
+    n_before = len(screen.moments())
+    screen.wait_for_moments(4)
+
+    assert "60 ms apart" in screen.troubles[0]
+    assert len(screen.troubles) == 1
+    for one, other in screen.moments()[n_before + 1 :]:
+        assert one.frame.device_ts_ns is not None
+        assert other.frame.device_ts_ns is not None
+        apart_ns = other.frame.device_ts_ns - one.frame.device_ts_ns - HOUR_NS
+        assert abs(apart_ns) < 1000
 
 
 def test_a_lost_image_costs_its_moment_and_is_counted(

@@ -178,7 +178,7 @@ def test_another_board_held_before_the_camera_is_named(
         told.append(remark(window))
 
     assert "not seen" in told[0]
-    assert "of 8 x 6 inner corners, but one of 5 x 7" in told[-1]
+    assert "of 8 x 6 inner corners, but one of 7 x 5" in told[-1]
     press(window, "Stop")
 
 
