@@ -8,7 +8,7 @@ the steps in the folder ``migrations``.
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from sqlalchemy import (
@@ -27,6 +27,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
+from lightpen.archive.uses import Uses
 from lightpen.errors import ArchiveError
 from lightpen.formats.files import printable, strerror
 from lightpen.sentences import sentence
@@ -35,6 +36,7 @@ VERSION = "1"  # of the tables, as the last of the migrations says
 VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
+LONGEST_FAREWELL_S = 2  # for those who use it when it closes
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -63,6 +65,7 @@ class Database:
     engine: Engine
     name: str
     file: Path | None = None
+    _uses: Uses = field(default_factory=Uses, init=False, repr=False, compare=False)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -71,9 +74,9 @@ class Database:
         Raises
         ------
         ArchiveError
-            It cannot be read.
+            It cannot be read, or was closed.
         """
-        with _telling(self.name), self.engine.begin() as connection:
+        with self._uses.one(), _telling(self.name), self.engine.begin() as connection:
             yield connection
 
     @contextmanager
@@ -83,14 +86,18 @@ class Database:
         Raises
         ------
         ArchiveError
-            It cannot be written.
+            It cannot be written, or was closed.
         """
         options = self.engine.execution_options(is_writing=True)
-        with _telling(self.name), options.begin() as connection:
+        with self._uses.one(), _telling(self.name), options.begin() as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it."""
+        """Let go of it, once those who use it now are done.
+
+        A connection that is still in use would stay open after the others.
+        """
+        self._uses.end(LONGEST_FAREWELL_S)
         self.engine.dispose()
 
 

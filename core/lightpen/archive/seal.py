@@ -18,8 +18,7 @@ from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, writ
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
-    has_checksum,
-    parse_json,
+    parse_checked,
     with_checksum,
 )
 from lightpen.sentences import sentence
@@ -74,9 +73,7 @@ def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...]) -> bool:
         return False
     data = read_bytes(path, sentence("file.seal", "seal"), MEGABYTE)
     try:
-        if not has_checksum(data):
-            raise DamagedError("There is no checksum.")
-        seal = parse_json(data, Seal)
+        seal = parse_checked(data, Seal)
     except DamagedError as error:
         raise FileError(
             sentence(
