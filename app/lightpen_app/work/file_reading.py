@@ -1,7 +1,6 @@
 """Reads the files that are chosen, and tells why one is not."""
 
 from collections.abc import Callable
-from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
@@ -27,6 +26,7 @@ class FileReading(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._job: Job | None = None
+        self._on_read: Callable[[OpenedFiles], None] = _pass_over
         self._told: list[str] = []
 
     @property
@@ -41,10 +41,11 @@ class FileReading(QObject):
     ) -> None:
         """Read files, and hand them over."""
         self.cancel()
+        self._on_read = on_read
         self._job = job = Job(function, self)
 
         # Connections
-        job.succeeded.connect(partial(self._on_succeeded, on_read))
+        job.succeeded.connect(self._on_succeeded)
         job.failed.connect(self._on_failed)
         job.start()
 
@@ -59,10 +60,8 @@ class FileReading(QObject):
         while self._told:
             self.relieved.emit(self._told.pop())
 
-    def _on_succeeded(
-        self, on_read: Callable[[OpenedFiles], None], opened: OpenedFiles
-    ) -> None:
-        self._job = None
+    def _on_succeeded(self, opened: OpenedFiles) -> None:
+        self._job, on_read = None, self._on_read
         for trouble in opened.troubles:
             self._tell(worded(trouble))
         on_read(opened)
@@ -74,3 +73,7 @@ class FileReading(QObject):
     def _tell(self, sentence: str) -> None:
         self._told.append(sentence)
         self.troubled.emit(sentence)
+
+
+def _pass_over(opened: OpenedFiles) -> None:
+    """Do nothing with files that nobody has asked for."""
