@@ -1,12 +1,10 @@
-"""The archive with 100,000 entries, killed while it writes, and changed byte by byte.
+"""The archive with 100,000 entries, and changed byte by byte.
 
 Usage: python benchmarks/archive.py
 """
 
 import json
-import os
 import random
-import signal
 import statistics
 import subprocess
 import sys
@@ -25,7 +23,7 @@ from benchmarks.hostile_records import NAMES, make_data
 from benchmarks.machine import description
 from benchmarks.rows import Row, table
 
-from lightpen.archive.chains import append, copy_entries, entries_of, own_chain
+from lightpen.archive.chains import append, copy_entries, own_chain
 from lightpen.archive.check import check_archive
 from lightpen.archive.database import Database, look_into, open_file
 from lightpen.archive.entries import Event, Head, Kind, chained, text_sha256
@@ -42,7 +40,6 @@ RECORD = "{" + " " * 280_000 + "}"  # as long as that of 300 images
 SHORT_RECORD = '{"frames": []}'
 BATCH = 5000
 N_TIMED = 50
-N_KILLS, LONGEST_LIFE_S = 50, 0.2
 N_FLIPS = 1000
 SEED = 7
 START = datetime(2026, 1, 2, 8, tzinfo=UTC)
@@ -51,11 +48,8 @@ MAX_BLOCKED_MS = 50.0
 
 
 def archive_rows() -> list[Row]:
-    """Return how fast the archive is, and what survives and is found."""
-    rows = _speed_rows()
-    if sys.platform == "win32":
-        return [*rows, Row("archive, killed while it writes", "needs SIGKILL")]
-    return [*rows, _killed_row(), _changed_row()]
+    """Return how fast the archive is, and which changes of it are found."""
+    return [*_speed_rows(), _changed_row()]
 
 
 def _event(n: int, record: str) -> Event:
@@ -151,49 +145,6 @@ def _at_most(what: str, times: list[float], limit: float) -> Row:
     )
 
 
-def _killed_row() -> Row:
-    """Return what is there after kills at random moments of entering."""
-    rng = random.Random(SEED)
-    n_whole = n_there = n_acknowledged = 0
-    with _folder() as folder:
-        for _ in range(N_KILLS):
-            acknowledged = _enter_until_killed(folder, rng.uniform(0, LONGEST_LIFE_S))
-            n_acknowledged += len(acknowledged)
-            with closing(open_file(folder / ARCHIVE)) as database:
-                entries = entries_of(database, own_chain(database))
-                there = {each.sha256 for each in entries}
-                n_there += len(acknowledged & there)
-                n_whole += not check_archive(database).findings
-    return Row(
-        f"archive, killed {N_KILLS} times while it writes: acknowledged entries there",
-        f"{n_there} of {n_acknowledged}, chain whole {n_whole} times",
-        "all",
-        met=n_there == n_acknowledged > N_KILLS and n_whole == N_KILLS,
-    )
-
-
-def _enter_until_killed(folder: Path, seconds: float) -> set[str]:
-    """Return the hashes of the entries that a process told of before its end."""
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        with closing(open_file(folder / ARCHIVE)) as database:
-            chain = own_chain(database)
-            os.write(writing, b"\n")  # from now on it may be killed
-            for n in range(N_ENTRIES):
-                entry = append(database, chain, _event(n, RECORD), RECORD)
-                assert entry is not None
-                os.write(writing, f"{entry.sha256}\n".encode())
-        os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading, encoding="ascii") as told:
-        told.readline()
-        time.sleep(seconds)
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
-        return set(told.read().split())
-
-
 def _changed_row() -> Row:
     """Return how many changes of archive, result, swing or image are found."""
     rng = random.Random(SEED)
@@ -209,7 +160,7 @@ def _changed_row() -> Row:
             n_found += _is_found(folder)
             path.write_bytes(whole)
     return Row(
-        "- a bit changed anywhere in archive, result, swing or image: found",
+        "archive, a bit changed anywhere in archive, result, swing or image: found",
         f"{n_found} of {N_FLIPS}",
         "all",
         met=n_found == N_FLIPS,

@@ -16,6 +16,8 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from benchmarks.archive import archive_rows
+from benchmarks.archive_cuts import cut_rows
+from benchmarks.archive_plant import plant_rows
 from benchmarks.camera_calibrations import camera_calibration_rows
 from benchmarks.cramer_rao import cramer_rao_rows
 from benchmarks.guided import guided_rows
@@ -56,6 +58,8 @@ SECTIONS: dict[str, Section] = {
     "killed": lambda workers, data: killed_rows(),
     "hostile": lambda workers, data: hostile_rows(),
     "archive": lambda workers, data: archive_rows(),
+    "cuts": lambda workers, data: cut_rows(),
+    "plant": lambda workers, data: plant_rows(),
     "start": lambda workers, data: start_rows(),
     "idle": lambda workers, data: idle_rows(),
     "link": lambda workers, data: link_rows(),

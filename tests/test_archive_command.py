@@ -69,6 +69,23 @@ def test_the_newest_entries_are_listed_first(lightpen: Run, data: Path) -> None:
     assert " 1.0000 0.0000 -1.5000" in second
 
 
+def test_an_entry_that_was_changed_is_marked_and_not_passed_on(
+    lightpen: Run, data: Path, tmp_path: Path
+) -> None:
+    with closing(sqlite3.connect(data / ARCHIVE)) as connection, connection:
+        connection.execute(
+            "UPDATE archive_entries SET text = replace(text, 'Ann', 'Bob')"
+            " WHERE number = 2"
+        )
+
+    listed = lightpen("archive", "list", "--data", data).stdout.splitlines()
+    assert [line.endswith("CHANGED") for line in listed] == [False, True, False]
+    for words in (("list", "--csv"), ("export", tmp_path / "all.jsonl")):
+        refused = lightpen("archive", *words, "--data", data)
+        assert refused.returncode == 2
+        assert "Entry 2 of the archive" in refused.stderr
+
+
 def test_entries_of_one_kind_are_listed(lightpen: Run, data: Path) -> None:
     listed = ("archive", "list", "--data", data, "--kind")
 

@@ -29,6 +29,10 @@ class ArchiveError(LightpenError):
     """The archive cannot be read or written, or is not one of this program."""
 
 
+class NoArchiveError(ArchiveError):
+    """There is no archive, or nothing was ever entered in it."""
+
+
 class StreamError(LightpenError):
     """Poses cannot be streamed as it was asked for."""
 

@@ -123,13 +123,20 @@ def row_of_charts(charts: Sequence[Chart], height: float) -> Piece:
     def paint(painter: QPainter) -> None:
         for i, chart in enumerate(charts):
             left = i * (width + GAP)
+            names_left = _paint_names(painter, chart, left + width)
+            size = fitting_size(chart.title, names_left - left)
             title = QRectF(left, 0, width, PrintSize.BODY)
-            draw_text(painter, title, chart.title, PrintSize.BODY, bold=True)
-            _paint_names(painter, chart, left + width)
+            draw_text(painter, title, chart.title, size, bold=True)
             room = height - TITLE_ROOM
             chart.paint(painter, QRectF(left, TITLE_ROOM, width, room))
 
     return Piece(paint, height, space=90)
+
+
+def fitting_size(title: str, room: float) -> float:
+    """Return the size of letters in which a title fits into a room, dots."""
+    needed = text_width(title, PrintSize.BODY, bold=True)
+    return PrintSize.BODY * min(1.0, room / needed)
 
 
 def padded_range(x: FloatArray, y: FloatArray, *, from_zero: bool = False) -> PlotRange:
@@ -250,8 +257,8 @@ def _filling(series: int) -> QColor:
     return QColor((LIGHT.accent, LIGHT.partial, LIGHT.panel)[series])
 
 
-def _paint_names(painter: QPainter, chart: Chart, right: float) -> None:
-    """Draw the names of series with their marks, from the right."""
+def _paint_names(painter: QPainter, chart: Chart, right: float) -> float:
+    """Draw the names of series with their marks, from the right; return their left."""
     middle = 0.72 * LETTERS
     for series, name in reversed(list(enumerate(chart.names))):
         width = text_width(name, LETTERS)
@@ -269,6 +276,7 @@ def _paint_names(painter: QPainter, chart: Chart, right: float) -> None:
             painter.drawRect(QRectF(right - 75, middle - 25, 50, 50))
             painter.setBrush(Qt.BrushStyle.NoBrush)
         right -= 190
+    return right
 
 
 def _paint_below(painter: QPainter, plane: Plane, words: AxisWords) -> None:

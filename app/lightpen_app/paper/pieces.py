@@ -7,6 +7,7 @@ words are measured as they are printed.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cache
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import (
@@ -185,7 +186,7 @@ def table(
         replace(
             _row(columns, widths, cells, size, bold=i in strong),
             head=head,
-            keeps=i + 2 == len(rows),  # the last one does not stand alone
+            keeps=i + 1 < len(rows) and i in (0, len(rows) - 2),  # none stands alone
         )
         for i, cells in enumerate(rows)
     ]
@@ -215,7 +216,23 @@ def text_height(text: str, size: float, width: float, *, bold: bool = False) -> 
 
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
     """Return how wide words in one line are, dots."""
-    return QFontMetricsF(print_font(size, bold=bold)).horizontalAdvance(text)
+    shown = printed_text(text)
+    return QFontMetricsF(print_font(size, bold=bold)).horizontalAdvance(shown)
+
+
+def printed_text(text: str) -> str:
+    """Return words with the number of each character that no font here has."""
+    if text.isascii():
+        return text
+    return "".join(map(_printed, text))
+
+
+@cache
+def _printed(character: str) -> str:
+    metrics = QFontMetricsF(print_font(PrintSize.BODY))
+    if character.isspace() or metrics.inFontUcs4(ord(character)):
+        return character
+    return f"[U+{ord(character):04X}]"
 
 
 def line_pen(color: str, width: float = HAIRLINE) -> QPen:
@@ -231,7 +248,8 @@ def _lines(
     """Return words in lines; a word longer than a line is parted."""
     option = QTextOption(align)
     option.setWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
-    layout = QTextLayout(text.replace("\n", LINE_END), print_font(size, bold=bold))
+    words = printed_text(text).replace("\n", LINE_END)
+    layout = QTextLayout(words, print_font(size, bold=bold))
     layout.setTextOption(option)
     layout.beginLayout()
     top = 0.0

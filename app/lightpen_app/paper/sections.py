@@ -25,6 +25,7 @@ from lightpen_app.paper.pieces import (
     heading,
     line_pen,
     paragraph,
+    printed_text,
     text_height,
 )
 
@@ -148,6 +149,15 @@ def _items(statement: Statement) -> Iterable[Piece]:
             ),
         ]
     )
+    stated = (names.pen, names.tip, names.cone, names.station, names.operator)
+    if any(printed_text(each) != each for each in (*stated, statement.reason)):
+        yield paragraph(
+            translate(
+                "paper",
+                "What stands as [U+...] is the Unicode number of a character that the "
+                "fonts of this paper do not have.",
+            )
+        )
 
 
 def _proof(statement: Statement, entered: Entered | None) -> Iterable[Piece]:

@@ -26,7 +26,6 @@ class FileReading(QObject):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._job: Job | None = None
-        self._on_read: Callable[[OpenedFiles], None] = _pass_over
         self._told: list[str] = []
 
     @property
@@ -39,13 +38,13 @@ class FileReading(QObject):
         function: Callable[[Report], OpenedFiles],
         on_read: Callable[[OpenedFiles], None],
     ) -> None:
-        """Read files, and hand them over."""
+        """Read files, and hand them over once their troubles are told."""
         self.cancel()
-        self._on_read = on_read
         self._job = job = Job(function, self)
 
         # Connections
         job.succeeded.connect(self._on_succeeded)
+        job.succeeded.connect(on_read)
         job.failed.connect(self._on_failed)
         job.start()
 
@@ -61,10 +60,9 @@ class FileReading(QObject):
             self.relieved.emit(self._told.pop())
 
     def _on_succeeded(self, opened: OpenedFiles) -> None:
-        self._job, on_read = None, self._on_read
+        self._job = None
         for trouble in opened.troubles:
             self._tell(worded(trouble))
-        on_read(opened)
 
     def _on_failed(self, sentence: str) -> None:
         self._job = None
@@ -73,7 +71,3 @@ class FileReading(QObject):
     def _tell(self, sentence: str) -> None:
         self._told.append(sentence)
         self.troubled.emit(sentence)
-
-
-def _pass_over(opened: OpenedFiles) -> None:
-    """Do nothing with files that nobody has asked for."""

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 from uuid import uuid4
 
-from sqlalchemy import Connection, Row, func, insert, select, update
+from sqlalchemy import Column, Connection, Row, func, insert, select, update
 
 from lightpen.archive.database import Database
 from lightpen.archive.entries import (
@@ -27,6 +27,8 @@ from lightpen.sentences import Sentence, sentence
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
+# Of an entry that is to be read.
+READ: tuple[Column[Any], ...] = (ENTRIES.c.number, ENTRIES.c.sha256, ENTRIES.c.text)
 BATCH = 200  # entries that are copied in one transaction
 
 
@@ -147,14 +149,14 @@ def entries_of(database: Database, chain: str, after: int = 0) -> Iterator[Writt
 def batch_of(database: Database, chain: str, after: int) -> tuple[Written, ...]:
     """Return the next few entries of a chain, as `entries_of`."""
     wanted = (
-        select(ENTRIES.c.number, ENTRIES.c.text)
+        select(*READ)
         .where(ENTRIES.c.chain == chain, ENTRIES.c.number > after)
         .order_by(ENTRIES.c.number)
         .limit(BATCH)
     )
     with database.reading() as connection:
         rows = connection.execute(wanted).all()
-    return tuple(read_row(database, row.number, row.text) for row in rows)
+    return tuple(read_row(database, row) for row in rows)
 
 
 def records_of(database: Database, entries: Sequence[Written]) -> dict[str, str]:
@@ -167,12 +169,12 @@ def records_of(database: Database, entries: Sequence[Written]) -> dict[str, str]
 
 def entry_of_result(database: Database, chain: str, place: str) -> Written | None:
     """Return the entry of the result file at a place, if there is one."""
-    wanted = select(ENTRIES.c.number, ENTRIES.c.text).where(
+    wanted = select(*READ).where(
         ENTRIES.c.chain == chain, ENTRIES.c.result == searchable(place)
     )
     with database.reading() as connection:
         row = connection.execute(wanted).one_or_none()
-    return None if row is None else read_row(database, row.number, row.text)
+    return None if row is None else read_row(database, row)
 
 
 def entered_places(database: Database, chain: str) -> frozenset[str]:
@@ -365,23 +367,27 @@ def _forked(entry: Written) -> Sentence:
     )
 
 
-def read_row(database: Database, number: int, text: str) -> Written:
-    """Return the entry in a row, by its number and its text.
+def read_row(database: Database, row: Row[Any]) -> Written:
+    """Return the entry in a row with the columns `READ`.
 
     Raises
     ------
     ArchiveError
-        It is damaged.
+        It is damaged, or was changed since it was entered.
     """
+    damaged = ArchiveError(
+        sentence(
+            "archive.entry-damaged",
+            "Entry {number} of the archive {archive} is damaged. Restore the archive "
+            "from a copy.",
+            number=row.number,
+            archive=database.name,
+        )
+    )
     try:
-        return read_entry(text)
+        entry = read_entry(row.text)
     except DamagedError as error:
-        raise ArchiveError(
-            sentence(
-                "archive.entry-damaged",
-                "Entry {number} of the archive {archive} is damaged. Restore the "
-                "archive from a copy.",
-                number=number,
-                archive=database.name,
-            )
-        ) from error
+        raise damaged from error
+    if entry.sha256 != row.sha256:
+        raise damaged
+    return entry

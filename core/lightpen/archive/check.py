@@ -11,7 +11,7 @@ from lightpen.archive.chains import chain_at_home, heads, records_of, sound_entr
 from lightpen.archive.database import Database
 from lightpen.archive.entries import NOTHING_BEFORE, Head, text_sha256
 from lightpen.archive.files_check import FilesCheck
-from lightpen.archive.seal import is_sealed_otherwise
+from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
 from lightpen.errors import LightpenError
 from lightpen.sentences import Sentence, sentence
@@ -103,7 +103,19 @@ def _damage(database: Database) -> Iterator[Sentence]:
 
 
 def _broken_seal(database: Database, ends: tuple[Head, ...]) -> Iterator[Sentence]:
-    if database.file is not None and is_sealed_otherwise(database.file, ends):
+    seal = None if database.file is None else read_seal(database.file)
+    if database.file is None or seal is None:
+        return
+    for head in lost_heads(database, seal):
+        yield sentence(
+            "archive.sealed-missing",
+            "Entry {number} of the chain {chain} was there when the archive was "
+            "closed, and is not any more: entries were removed, or the archive was "
+            "replaced.",
+            number=head.number,
+            chain=head.chain[:SHORT],
+        )
+    if is_sealed_otherwise(database.file, ends, seal):
         yield sentence(
             "archive.seal-broken",
             "The file {file} was changed since it was closed.",
@@ -114,9 +126,17 @@ def _broken_seal(database: Database, ends: tuple[Head, ...]) -> Iterator[Sentenc
 def _walked(
     database: Database, head: Head, files: FilesCheck | None, report: Report
 ) -> Iterator[Sentence]:
-    """Yield what is not right from the first entry of a chain to its last."""
+    """Yield what is not right from the first entry of a chain to its last.
+
+    Entries that are added meanwhile are walked over, too.
+    """
     number, previous = 0, NOTHING_BEFORE
-    while rows := _rows_after(database, head.chain, number):
+    while True:
+        rows = _rows_after(database, head.chain, number)
+        if not rows:
+            head = _head_now(database, head)
+            if number >= head.number or not _rows_after(database, head.chain, number):
+                break
         sound = []
         for row in rows:
             if not isinstance(row.number, int):  # SQLite keeps a text there, too
@@ -144,6 +164,11 @@ def _walked(
             "The chain {chain} does not end with the entry that was entered last.",
             chain=head.chain[:SHORT],
         )
+
+
+def _head_now(database: Database, head: Head) -> Head:
+    """Return how far a chain has come by now; as far as before if it is gone."""
+    return next((h for h in heads(database) if h.chain == head.chain), head)
 
 
 def _rows_after(database: Database, chain: str, number: int) -> list[Row[Any]]:

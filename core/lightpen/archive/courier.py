@@ -3,8 +3,12 @@
 The archive of the station itself is what waits to be delivered: it has every entry
 before the server does, and keeps it. So nothing is lost while the server is away, and
 as entries are copied in their order and known ones passed over, none is doubled.
+
+The server is called for each delivery and then let go of: it has many stations to
+serve, and a line that is kept may be dead without either end knowing.
 """
 
+from contextlib import closing
 from threading import Event, Thread
 
 from lightpen.archive.database import Database, open_server
@@ -29,6 +33,8 @@ class Courier:
 
     Attributes
     ----------
+    n_delivered : int or None
+        Entries that the server has; None until it answered first.
     trouble : Sentence or None
         Why the last attempt failed.
     """
@@ -38,6 +44,7 @@ class Courier:
         self._chain = chain
         self._address = address
         self._is_due, self._is_ending = Event(), Event()
+        self.n_delivered: int | None = None
         self.trouble: Sentence | None = None
         self._thread = Thread(target=self._run, name="delivery", daemon=True)
         self._is_due.set()
@@ -54,17 +61,15 @@ class Courier:
         self._thread.join(timeout_s)
 
     def _run(self) -> None:
-        server: Database | None = None
         while True:
             self._is_due.wait(None if self.trouble is None else AGAIN_S)
             self._is_due.clear()
             try:
-                server = server or open_server(self._address)
-                deliver(self._database, self._chain, server)
+                with closing(open_server(self._address)) as server:
+                    copied = deliver(self._database, self._chain, server)
+                self.n_delivered = copied.n_known + copied.n_new
                 self.trouble = None
             except ArchiveError as error:
                 self.trouble = error.sentence
             if self._is_ending.is_set():
                 break
-        if server is not None:
-            server.close()

@@ -5,11 +5,20 @@ version of this one, stays as it is. One of an earlier version is brought up to 
 the steps in the folder ``migrations``.
 """
 
+import socket
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import (
+    AbstractContextManager,
+    closing,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Timer
+from typing import Any
 
 from sqlalchemy import (
     Connection,
@@ -23,13 +32,14 @@ from sqlalchemy import (
     table,
     text,
 )
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
 from lightpen.archive.uses import Uses
-from lightpen.errors import ArchiveError
-from lightpen.formats.files import printable, strerror
+from lightpen.errors import ArchiveError, FileError, NoArchiveError
+from lightpen.formats.files import printable
+from lightpen.record.numbered_files import make_folder
 from lightpen.sentences import sentence
 
 VERSION = "1"  # of the tables, as the last of the migrations says
@@ -37,6 +47,7 @@ VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
 LONGEST_FAREWELL_S = 2  # for those who use it when it closes
+MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -46,6 +57,18 @@ _CALLING = {
     "keepalives_count": 3,
     "tcp_user_timeout": 10_000,  # ms
 }
+
+# So does the server, or it would wait for hours for a station whose line was cut, and
+# let nobody else do what that one had begun.
+_SERVER_NOTICES = """\
+SET tcp_keepalives_idle = 5;
+SET tcp_keepalives_interval = 2;
+SET tcp_keepalives_count = 3;
+SET tcp_user_timeout = 10000;
+SET idle_in_transaction_session_timeout = 60000;
+SET lock_timeout = 30000"""
+# A relay between may keep a line open though nobody is at its other end any more.
+LONGEST_ANSWER_S = 120.0
 
 _VERSION = table(VERSION_TABLE, column("version_num", String))
 
@@ -76,7 +99,7 @@ class Database:
         ArchiveError
             It cannot be read, or was closed.
         """
-        with self._uses.one(), _telling(self.name), self.engine.begin() as connection:
+        with self._used(self.engine) as connection:
             yield connection
 
     @contextmanager
@@ -89,16 +112,27 @@ class Database:
             It cannot be written, or was closed.
         """
         options = self.engine.execution_options(is_writing=True)
-        with self._uses.one(), _telling(self.name), options.begin() as connection:
+        with self._used(options) as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it, once those who use it now are done.
-
-        A connection that is still in use would stay open after the others.
-        """
+        """Let go of it, once those who use it now are done."""
         self._uses.end(LONGEST_FAREWELL_S)
-        self.engine.dispose()
+        self.engine.pool.dispose()
+
+    @contextmanager
+    def _used(self, engine: Engine) -> Iterator[Connection]:
+        with self._uses.one(), _telling(self.name):
+            try:
+                with engine.begin() as connection, self._in_time(connection):
+                    yield connection
+            finally:
+                if self._uses.are_over:  # who is late takes its connection along
+                    self.engine.pool.dispose()
+
+    def _in_time(self, connection: Connection) -> AbstractContextManager[None]:
+        """Give up a server that answers no more."""
+        return nullcontext() if self.file else _given_up_in_time(connection)
 
 
 def open_file(path: Path) -> Database:
@@ -111,17 +145,21 @@ def open_file(path: Path) -> Database:
     """
     name = printable(str(path))
     if path.exists():
-        with closing(look_into(path)):  # which changes nothing
-            pass
+        with closing(_read_only(path)) as database:  # which changes nothing
+            _require_known(database)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _unusable(name, strerror(error)) from error
+        make_folder(path.parent)
+    except FileError as error:
+        raise ArchiveError(error.sentence) from error
 
     def connect() -> sqlite3.Connection:
         connection = _connected(str(path))
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+        except sqlite3.Error:
+            connection.close()
+            raise
         return connection
 
     return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
@@ -132,23 +170,23 @@ def look_into(path: Path) -> Database:
 
     Raises
     ------
+    NoArchiveError
+        It is not there, or nothing was ever entered in it.
     ArchiveError
         It is not of this program, or cannot be used.
     """
-    name = printable(str(path))
-    if not path.is_file():
-        raise ArchiveError(
+    database = _read_only(path)
+    if not path.is_file() or _require_known(database) is None:
+        database.close()
+        raise NoArchiveError(
             sentence(
                 "archive.missing",
-                "There is no archive {file}. Check the data folder.",
-                file=name,
+                "There is no archive {file}, or nothing was entered in it yet. Check "
+                "the data folder.",
+                file=database.name,
             )
         )
-    # With a journal beside it, somebody writes, or was killed while writing.
-    mode = "mode=ro" if Path(f"{path}-wal").exists() else "immutable=1"
-    place = f"{path.absolute().as_uri()}?{mode}"
-    database = Database(_sqlite_engine(lambda: _connected(place)), name, path)
-    return _looked_at(database)
+    return database
 
 
 def open_server(address: str) -> Database:
@@ -168,18 +206,18 @@ def open_server(address: str) -> Database:
         url = make_url(address)
         if url.get_backend_name() != "postgresql":
             raise ArgumentError("no PostgreSQL")
+        if "@" in (url.host or ""):
+            raise ArgumentError("a password with a sign that is to be written as %40")
         url = url.set(drivername="postgresql+psycopg")
-        engine = create_engine(
-            url,
-            pool_pre_ping=True,  # a server that was restarted is called again
-            connect_args=_CALLING,
-        )
+        engine = create_engine(url, connect_args=_CALLING)
+        event.listen(engine, "connect", _ask_to_notice)
     except (ArgumentError, ValueError) as error:
         raise ArchiveError(
             sentence(
                 "archive.no-address",
                 "The address of the archive's server cannot be read. It has the form "
-                "postgresql://user:password@host/database.",
+                "postgresql://user:password@host/database, with %40 for an @ in the "
+                "password.",
             )
         ) from error
     except ModuleNotFoundError as error:
@@ -190,7 +228,22 @@ def open_server(address: str) -> Database:
                 'installed. Install it with: pip install "lightpen[postgres]".',
             )
         ) from error
-    return _brought_up_to_date(Database(engine, url.render_as_string()))
+    return _brought_up_to_date(Database(engine, _without_password(url)))
+
+
+def _without_password(url: URL) -> str:
+    """Return an address fit to be shown: its options may hold the password, too."""
+    user = f"{url.username}@" if url.username else ""
+    place = f"{url.host or 'localhost'}:{url.port}" if url.port else url.host or ""
+    return printable(f"postgresql://{user}{place}/{url.database or ''}")
+
+
+def _read_only(path: Path) -> Database:
+    # With a journal beside it, somebody writes, or was killed while writing.
+    mode = "mode=ro" if Path(f"{path}-wal").exists() else "immutable=1"
+    place = f"{path.absolute().as_uri()}?{mode}"
+    engine = _sqlite_engine(lambda: _connected(place))
+    return Database(engine, printable(str(path)), path)
 
 
 def _sqlite_engine(connect: Callable[[], sqlite3.Connection]) -> Engine:
@@ -219,8 +272,11 @@ def _begin(connection: Connection) -> None:
     connection.exec_driver_sql("BEGIN IMMEDIATE" if is_writing else "BEGIN")
 
 
-def _looked_at(database: Database) -> Database:
-    """Return a database that holds nothing yet, or an archive that can be read."""
+def _require_known(database: Database) -> str | None:
+    """Return of which version a database is, None of one that holds nothing yet.
+
+    Of another program's, and of one of a later version, the reason is raised.
+    """
     try:
         with database.reading() as connection:
             found = _found_version(connection)
@@ -231,11 +287,11 @@ def _looked_at(database: Database) -> Database:
     except ArchiveError:
         database.close()
         raise
-    return database
+    return found
 
 
 def _brought_up_to_date(database: Database) -> Database:
-    _looked_at(database)
+    _require_known(database)
     try:
         with database.writing() as connection:
             if _found_version(connection) != VERSION:
@@ -244,6 +300,33 @@ def _brought_up_to_date(database: Database) -> Database:
         database.close()
         raise
     return database
+
+
+def _ask_to_notice(connection: Any, record: object) -> None:
+    connection.autocommit = True  # a line cut here leaves nothing begun
+    connection.execute(_SERVER_NOTICES)
+    connection.autocommit = False
+
+
+@contextmanager
+def _given_up_in_time(connection: Connection) -> Iterator[None]:
+    """End the line to a server that does not answer in time, so that waiting ends."""
+    line = connection.connection.dbapi_connection
+    assert line is not None
+    with socket.fromfd(line.fileno(), socket.AF_INET, socket.SOCK_STREAM) as end:
+        watch = Timer(LONGEST_ANSWER_S, _shut_down, (end,))
+        watch.daemon = True
+        watch.start()
+        try:
+            yield
+        finally:
+            watch.cancel()
+            watch.join()
+
+
+def _shut_down(end: socket.socket) -> None:
+    with suppress(OSError):  # it is closed already
+        end.shutdown(socket.SHUT_RDWR)
 
 
 def _found_version(connection: Connection) -> str | None:
@@ -279,7 +362,12 @@ def _telling(name: str) -> Iterator[None]:
     try:
         yield
     except SQLAlchemyError as error:
+        cause = getattr(error, "orig", None)
+        if getattr(cause, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
+            raise _busy(name) from error
         raise _unusable(name, _reason(error)) from error
+    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+        raise _unusable(name, MALFORMED) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:
@@ -297,6 +385,18 @@ def _unusable(name: str, reason: str) -> ArchiveError:
             "the password.",
             name=name,
             reason=reason,
+        )
+    )
+
+
+def _busy(name: str) -> ArchiveError:
+    return ArchiveError(
+        sentence(
+            "archive.busy",
+            "The archive {name} is held by another program, for more than {seconds} s "
+            "now. Let that one finish, or end it, and try again.",
+            name=name,
+            seconds=LONGEST_WAIT_S,
         )
     )
 

@@ -4,7 +4,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 
 from sqlalchemy import select
 
@@ -18,6 +18,7 @@ from lightpen.record.due_rule import DueRule
 from lightpen.record.tip_library import Library
 
 EMPTY = Library()
+CLOCKS_AGREE = timedelta(days=1)  # as far as need be to tell an age in days
 SWINGS = (Kind.ACCEPTED, Kind.REFUSED, Kind.ABANDONED)
 
 
@@ -43,8 +44,14 @@ class DueTip:
     n_left: int | None
 
     def is_due(self, now: datetime) -> bool:
-        """Return whether it is to be calibrated before it measures."""
-        return now > self.due or (self.n_left is not None and self.n_left <= 0)
+        """Return whether it is to be calibrated before it measures.
+
+        So it is where its age is not known: its day is still to come, by a clock that
+        was set back, or was ahead then.
+        """
+        is_to_come = self.entry.entry.event.at > now + CLOCKS_AGREE
+        is_old = now > self.due or is_to_come
+        return is_old or (self.n_left is not None and self.n_left <= 0)
 
 
 def due_tips(

@@ -1,9 +1,9 @@
 """Where a result is entered in the archive beside it, which is only read."""
 
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
-from lightpen.errors import FileError
+from lightpen.errors import FileError, NoArchiveError
 from lightpen.formats.files import printable
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.opening import data_folder_of
@@ -39,12 +39,14 @@ def entry_of_file(result: Path, sha256: str) -> Entered | None:
     from lightpen.archive.database import look_into
     from lightpen.archive.logbook import ARCHIVE
 
-    if not (data / ARCHIVE).is_file():
-        return None
-    with closing(look_into(data / ARCHIVE)) as database:
-        chain = chain_at_home(database)
-        place = FolderArchive(data).place_of(result)
-        found = None if chain is None else entry_of_result(database, chain, place)
+    found = None
+    with (
+        suppress(NoArchiveError),
+        closing(look_into(data / ARCHIVE)) as database,
+    ):
+        if chain := chain_at_home(database):
+            place = FolderArchive(data).place_of(result)
+            found = entry_of_result(database, chain, place)
     if found is None:
         return None
     entered = found.entry.event.result

@@ -33,6 +33,7 @@ from lightpen.sentences import sentence
 
 FORMAT = 1
 WHAT = sentence("file.exported-archive", "exported archive")
+DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
 
 
@@ -59,7 +60,7 @@ def deliver(database: Database, chain: str, server: Database) -> Copied:
     """
     known = next((h.number for h in heads(server) if h.chain == chain), 0)
     n_new, last = 0, max(0, known - 1)  # the last that it has is compared
-    while batch := batch_of(database, chain, last):
+    while batch := batch_of(database, chain, last)[:DELIVERED]:
         n_new += copy_entries(server, chain, batch, records_of(database, batch)).n_new
         last = batch[-1].entry.number
     return Copied(n_new, known)

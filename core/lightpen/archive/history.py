@@ -7,7 +7,7 @@ from typing import Any
 
 from sqlalchemy import Row, select
 
-from lightpen.archive.chains import read_row, sound_entry
+from lightpen.archive.chains import READ, read_row, sound_entry
 from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, Written
 from lightpen.archive.queries import (
@@ -108,14 +108,10 @@ def lines(
 
 def remarks_on(database: Database, entry: Written) -> tuple[Written, ...]:
     """Return what concerns an entry: notes, that it was taken back, or restored."""
-    found = (
-        select(ENTRIES.c.number, ENTRIES.c.text)
-        .where(ENTRIES.c.concerns == entry.sha256)
-        .order_by(*IN_ORDER)
-    )
+    found = select(*READ).where(ENTRIES.c.concerns == entry.sha256).order_by(*IN_ORDER)
     with database.reading() as connection:
         rows = connection.execute(found).all()
-    return tuple(read_row(database, row.number, row.text) for row in rows)
+    return tuple(read_row(database, row) for row in rows)
 
 
 def known_names(database: Database) -> KnownNames:

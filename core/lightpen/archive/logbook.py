@@ -12,7 +12,7 @@ that the archive does not tell of from the next start on, and no entry is of not
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Lock
@@ -31,6 +31,7 @@ from lightpen.archive.chains import (
     append,
     entered_places,
     entry_of_result,
+    heads,
     own_chain,
     records_of,
     searchable,
@@ -60,6 +61,22 @@ from lightpen.sentences import Sentence
 
 ARCHIVE = "archive.sqlite"
 LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """How far a server has what was entered.
+
+    Attributes
+    ----------
+    n_waiting : int or None
+        Entries that it does not have; None as long as it did not answer.
+    trouble : Sentence or None
+        Why the last attempt failed.
+    """
+
+    n_waiting: int | None
+    trouble: Sentence | None
 
 
 class Logbook:
@@ -186,6 +203,22 @@ class Logbook:
             self._results.store(result)
         self.enter_owed()
         return result
+
+    def delivery(self) -> Delivery | None:
+        """Return how far the server has what was entered; None if there is no server.
+
+        Raises
+        ------
+        ArchiveError
+            The archive cannot be read.
+        """
+        if self._courier is None:
+            return None
+        n_delivered, trouble = self._courier.n_delivered, self._courier.trouble
+        if n_delivered is None:
+            return Delivery(None, trouble)
+        ends = {head.chain: head.number for head in heads(self.database)}
+        return Delivery(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
     def close(self) -> None:
         """Let go of the archive, and seal its file if nobody else has it open.

@@ -14,7 +14,7 @@ from sqlalchemy import (
     tuple_,
 )
 
-from lightpen.archive.chains import read_row, searchable, since_us
+from lightpen.archive.chains import READ, read_row, searchable, since_us
 from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, Written
 from lightpen.archive.tables import ENTRIES
@@ -66,14 +66,14 @@ def newest(
         place = (since_us(before.since), before.chain, before.number)
         condition &= tuple_(*IN_ORDER) < place
     found = (
-        select(ENTRIES.c.number, ENTRIES.c.text)
+        select(*READ)
         .where(condition)
         .order_by(*(column.desc() for column in IN_ORDER))
         .limit(n_entries)
     )
     with database.reading() as connection:
         rows = connection.execute(found).all()
-    return tuple(read_row(database, row.number, row.text) for row in rows)
+    return tuple(read_row(database, row) for row in rows)
 
 
 def last_accepted(
@@ -101,15 +101,10 @@ def last_accepted(
     )
     if chain is not None:
         condition &= of_chain(chain)
-    found = (
-        select(ENTRIES.c.number, ENTRIES.c.text)
-        .where(condition)
-        .order_by(ENTRIES.c.since_us.desc())
-        .limit(1)
-    )
+    found = select(*READ).where(condition).order_by(ENTRIES.c.since_us.desc()).limit(1)
     with database.reading() as connection:
         row = connection.execute(found).one_or_none()
-    return None if row is None else read_row(database, row.number, row.text)
+    return None if row is None else read_row(database, row)
 
 
 def of_chain(chain: str) -> ColumnElement[bool]:

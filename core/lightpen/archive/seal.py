@@ -1,17 +1,22 @@
-"""The seal of an archive's file: its hash, taken when it was closed.
+"""The seal of an archive's file: its hash, and how far it had come, when it was closed.
 
 Chains and hashes tell of every entry and record that was changed, but a file of SQLite
 has bytes that belong to neither. As long as nothing was entered since, the file must be
-as it was sealed, bit by bit.
+as it was sealed, bit by bit. Whatever was entered since, the archive must still hold
+the last entries of then: so one whose last entries were taken out, with all that tells
+of them, is found, and one that was replaced by an older copy of itself.
 """
 
 from pathlib import Path
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct, to_builtins
+from sqlalchemy import select
 
 from lightpen.archive.chains import heads
 from lightpen.archive.database import Database
-from lightpen.archive.entries import Head, text_sha256
+from lightpen.archive.entries import Chain, Head
+from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
 from lightpen.estimation.report import json_bytes
 from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, write_whole
@@ -24,18 +29,26 @@ from lightpen.formats.own_json import (
 from lightpen.sentences import sentence
 
 
+class SealedHead(Struct, frozen=True):
+    """How far a chain had come."""
+
+    chain: Chain
+    number: Annotated[int, Meta(ge=0)]
+    sha256: Digest
+
+
 class Seal(Struct, frozen=True):
     """What a file was when it was closed.
 
     Attributes
     ----------
-    heads : str
-        Hash of how far each chain had come.
+    heads : tuple of SealedHead
+        Of all chains.
     sha256 : str
         Of the file.
     """
 
-    heads: Digest
+    heads: tuple[SealedHead, ...]
     sha256: Digest
 
 
@@ -47,33 +60,40 @@ def seal_of(archive: Path) -> Path:
 def close_sealed(database: Database) -> None:
     """Close an archive, and seal its file if nobody else has it open.
 
+    A seal that is damaged, or tells of entries which the archive does not hold, stays
+    as it is, to be found.
+
     Raises
     ------
     ArchiveError, FileError
         It cannot be read any more, or the seal not be written.
     """
-    ends = heads(database)
-    database.close()
     archive = database.file
-    if archive is not None and not Path(f"{archive}-wal").exists():
-        seal = {"heads": _told(ends), "sha256": sha256(archive)}
-        write_whole(seal_of(archive), with_checksum(json_bytes(seal)))
+    try:
+        ends = sealed_heads(heads(database))
+        is_due = archive is not None and not _tells_of_change(database, archive)
+    finally:
+        database.close()
+    if archive is None or not is_due or _is_open(archive):
+        return
+    seal = to_builtins(Seal(ends, sha256(archive)))
+    write_whole(seal_of(archive), with_checksum(json_bytes(seal)))
 
 
-def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...]) -> bool:
-    """Return whether a file is not as it was sealed, though nothing was entered.
+def read_seal(archive: Path) -> Seal | None:
+    """Return the seal of an archive; None where there is none.
 
     Raises
     ------
     FileError
-        The seal is damaged, or one of the files cannot be read.
+        It is damaged, or cannot be read.
     """
     path = seal_of(archive)
-    if not path.exists() or Path(f"{archive}-wal").exists():
-        return False
+    if not path.exists():
+        return None
     data = read_bytes(path, sentence("file.seal", "seal"), MEGABYTE)
     try:
-        seal = parse_checked(data, Seal)
+        return parse_checked(data, Seal)
     except DamagedError as error:
         raise FileError(
             sentence(
@@ -82,8 +102,55 @@ def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...]) -> bool:
                 file=printable(str(path)),
             )
         ) from error
-    return seal.heads == _told(ends) and seal.sha256 != sha256(archive)
 
 
-def _told(ends: tuple[Head, ...]) -> str:
-    return text_sha256(" ".join(f"{h.chain} {h.number} {h.sha256}" for h in ends))
+def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
+    """Return the last entries of then that an archive does not hold any more.
+
+    Raises
+    ------
+    ArchiveError
+        It cannot be read.
+    """
+    with database.reading() as connection:
+        return tuple(
+            head
+            for head in seal.heads
+            if head.number
+            and connection.execute(
+                select(ENTRIES.c.sha256).where(
+                    ENTRIES.c.chain == head.chain, ENTRIES.c.number == head.number
+                )
+            ).scalar_one_or_none()
+            != head.sha256
+        )
+
+
+def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...], seal: Seal) -> bool:
+    """Return whether a file is not as it was sealed, though nothing was entered.
+
+    Raises
+    ------
+    FileError
+        It cannot be read.
+    """
+    if _is_open(archive):
+        return False
+    return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)
+
+
+def sealed_heads(ends: tuple[Head, ...]) -> tuple[SealedHead, ...]:
+    """Return how far chains have come, as a seal tells it."""
+    return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
+
+
+def _tells_of_change(database: Database, archive: Path) -> bool:
+    try:
+        seal = read_seal(archive)
+    except FileError:
+        return True
+    return seal is not None and bool(lost_heads(database, seal))
+
+
+def _is_open(archive: Path) -> bool:
+    return Path(f"{archive}-wal").exists()

@@ -8,10 +8,11 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
 from lightpen.archive.chains import own_chain
-from lightpen.archive.check import check_archive
+from lightpen.archive.check import SHORT, check_archive
 from lightpen.archive.database import Database, look_into, open_file, open_server
-from lightpen.archive.entries import Kind, Written
+from lightpen.archive.entries import Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
+from lightpen.archive.history import Line, lines
 from lightpen.archive.late_logbook import SERVER
 from lightpen.archive.listing import entries_csv
 from lightpen.archive.logbook import ARCHIVE
@@ -55,8 +56,11 @@ def _list(options: argparse.Namespace) -> None:
         end=_midnight(options.until and options.until + timedelta(days=1)),
     )
     with _looked_into(_data(options)) as database:
-        entries = newest(database, wanted, options.most)
-    told = entries_csv(entries) if options.csv else "\n".join(map(_line, entries))
+        if options.csv:
+            told = entries_csv(newest(database, wanted, options.most))
+        else:
+            found = lines(database, wanted, 0, options.most)
+            told = "\n".join(map(_line, found))
     print(shown(told.removesuffix("\n")))
 
 
@@ -140,8 +144,10 @@ def _midnight(day: date | None) -> datetime | None:
     return None if day is None else local_time(datetime.combine(day, time()))
 
 
-def _line(entry: Written) -> str:
-    event = entry.entry.event
+def _line(line: Line) -> str:
+    if line.entry is None:
+        return f"entry {line.number} of the chain {line.chain[:SHORT]}  CHANGED"
+    event = line.entry.entry.event
     names, tip = event.names, event.tip_pen_mm
     when = f"{local_time(event.at):%Y-%m-%d %H:%M}"
     words = [when, names.station, names.pen, names.tip, event.kind.value, event.grade]

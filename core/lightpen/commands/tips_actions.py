@@ -19,7 +19,7 @@ from lightpen.archive.standing import standings
 from lightpen.commands.console import Command, printing, progress, shown
 from lightpen.commands.tips import FORGOTTEN
 from lightpen.detection.observations import observe_images
-from lightpen.errors import ArchiveError, UsageError
+from lightpen.errors import ArchiveError, NoArchiveError, UsageError
 from lightpen.estimation.spin import SpinFit, fit_spin
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
@@ -232,11 +232,12 @@ def _tell(options: argparse.Namespace, item: AnyItem, library: Library) -> None:
 def _standings(data: Path, library: Library, max_days: int | None) -> Standings:
     rule = DueRule() if not max_days else DueRule(max_days)
     now = local_now()
-    if not (data / ARCHIVE).is_file():
+    try:
+        with closing(look_into(data / ARCHIVE)) as database:
+            chain = chain_at_home(database) or ""
+            return standings(database, chain, rule, library, now)
+    except NoArchiveError:
         return Standings(library, now=now)
-    with closing(look_into(data / ARCHIVE)) as database:
-        chain = chain_at_home(database) or ""
-        return standings(database, chain, rule, library, now)
 
 
 def _record(item: AnyItem, found: Standings) -> dict[str, Any]:

@@ -43,7 +43,7 @@ def add_numbered(folder: Path, data: bytes) -> Path:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, unless it is there.
+    """Make a folder, and those that it is in, unless they are there.
 
     Raises
     ------
@@ -51,8 +51,10 @@ def make_folder(folder: Path) -> None:
         It cannot be made.
     """
     try:
+        new = [each for each in folder.parents if not each.exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        sync_folder(folder.parent)
+        for each in (folder, *new):
+            sync_folder(each.parent)
     except OSError as error:
         raise FileError(
             sentence(

@@ -38,6 +38,7 @@ from lightpen.record.writing import OtherView, RecordWriter, make_folder, note_t
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.capture import Rule, capture_image
+from lightpen.swing.moment import seen_by_rig
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.recorded import pass_over, read_image
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
@@ -259,6 +260,8 @@ class SwingCourse:
         status, choices = self._status, self._attendance.choices
         if status is self._stopped_at:
             return
+        if sighting is not None and setup is not None:
+            sighting = seen_by_rig(setup.rig, setup.pen, sighting)
         if status.state is None:
             if self._attendance.is_due and choices is not None:
                 self.begin(choices)

@@ -4,8 +4,16 @@ from dataclasses import replace
 
 from PySide6.QtGui import QPainter
 
+from lightpen_app.paper.charts import fitting_size
 from lightpen_app.paper.pages import PlacedPiece, lay_out
-from lightpen_app.paper.pieces import Column, Piece, heading, table
+from lightpen_app.paper.pieces import (
+    Column,
+    Piece,
+    PrintSize,
+    heading,
+    table,
+    text_width,
+)
 
 ROOM = 100.0
 
@@ -66,6 +74,25 @@ def test_the_last_row_of_a_table_does_not_stand_alone() -> None:
     pages = lay_out(rows, rows[0].height + 5 * rows[1].height)
 
     assert [len(page) for page in pages] == [5, 3]
+
+
+def test_the_first_row_of_a_table_does_not_stand_alone() -> None:
+    rows = table([Column("LED")], [(str(i),) for i in range(6)])
+    head = rows[0].height + rows[0].space
+
+    pages = lay_out([piece(50), *rows], 50 + head + 1.5 * rows[1].height)
+
+    assert len(pages[0]) == 1
+    assert pages[1][0].piece is rows[0]
+
+
+def test_a_title_keeps_off_the_names_of_series_beside_it() -> None:
+    title = "Tip by the images so far, from the result / \xb5m"
+    whole = text_width(title, PrintSize.BODY, bold=True)
+
+    assert fitting_size(title, whole) == PrintSize.BODY
+    size = fitting_size(title, 0.9 * whole)
+    assert text_width(title, size, bold=True) <= 0.91 * whole
 
 
 def test_no_heading_ends_a_page() -> None:

@@ -143,6 +143,21 @@ def test_in_chinese_no_word_is_left_in_english(
     assert "\u6807\u5b9a\u8bb0\u5f55" in lines
 
 
+def test_a_character_that_no_font_has_is_told_by_its_number(
+    result: Result, printed: Printed, words: Words
+) -> None:
+    second_level, unassigned = "\u946b\u65fb", "\u0378"  # of GB 2312; of nobody
+    names = replace(result.names, operator=f"{second_level} {unassigned}")
+
+    told = " ".join(words(printed(replace(result, names=names)))[0])
+
+    assert second_level in told
+    assert "U+0378]" in told
+    assert "What stands as [U+...] is the Unicode number" in told
+    plain = " ".join(words(printed(result))[0])
+    assert "U+" not in plain
+
+
 def test_it_is_whole_without_the_curves_where_the_file_does_not_hold_enough(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:

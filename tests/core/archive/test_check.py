@@ -52,6 +52,18 @@ def test_an_archive_as_it_was_entered_passes(archive: Path) -> None:
     assert (checked.n_entries, checked.findings) == (5, ())
 
 
+def test_what_is_entered_during_a_check_is_no_change(station: Station) -> None:
+    station.enter(2)
+    left = [3]
+
+    def enter(fraction: float) -> None:
+        if left:
+            station.enter(left.pop(), first=2)
+
+    assert check_archive(station.database, None, enter).findings == ()
+    assert not left
+
+
 @pytest.mark.parametrize(
     ("column", "value"),
     [
@@ -180,3 +192,36 @@ def test_copies_of_other_chains_are_checked_too(
 
     (found,) = findings(archive)[:1]
     assert found == f"Entry 2 of the chain {other.chain[:8]} is missing."
+
+
+def test_last_entries_that_were_taken_out_with_all_that_tells_of_them_are_named(
+    archive: Path, make_station: Callable[[str], Station]
+) -> None:
+    with closing(sqlite3.connect(archive)) as connection, connection:
+        connection.execute("DELETE FROM archive_entries WHERE number > 3")
+        connection.execute(
+            "UPDATE archive_chains SET number = 3, sha256 ="
+            " (SELECT sha256 FROM archive_entries WHERE number = 3)"
+        )
+        connection.execute("DELETE FROM archive_records WHERE text LIKE '%: 4%'")
+
+    (found,) = findings(archive)
+    assert found.startswith("Entry 5 of the chain")
+    assert "entries were removed" in found
+    station = make_station(archive.parent.name)
+    station.enter(4, first=10)
+    close_sealed(station.database)  # which does not hide it
+    assert findings(archive) == [found]
+
+
+def test_an_archive_that_was_emptied_and_begun_anew_is_found(
+    archive: Path, make_station: Callable[[str], Station]
+) -> None:
+    archive.write_bytes(b"")
+    assert "nothing was entered in it yet" in findings(archive)[0]
+
+    station = make_station(archive.parent.name)
+    station.enter(7)
+    close_sealed(station.database)
+    (found,) = findings(archive)
+    assert found.startswith("Entry 5 of the chain")

@@ -6,7 +6,8 @@ from contextlib import closing
 from threading import Thread
 
 import pytest
-from tests.core.archive.conftest import Postgres, Station
+from benchmarks.postgres_server import Postgres
+from tests.core.archive.conftest import Station
 
 from lightpen.archive import courier
 from lightpen.archive.chains import entries_of

@@ -11,8 +11,10 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from tests.core.archive.conftest import PASSWORD, Postgres, Station
+from benchmarks.postgres_server import PASSWORD, Postgres
+from tests.core.archive.conftest import Station
 
+from lightpen.archive import database
 from lightpen.archive.database import (
     MIGRATIONS,
     VERSION,
@@ -23,7 +25,7 @@ from lightpen.archive.database import (
     open_server,
 )
 from lightpen.archive.tables import METADATA
-from lightpen.errors import ArchiveError
+from lightpen.errors import ArchiveError, NoArchiveError
 
 
 def test_the_migrations_lead_to_the_tables_that_are_used(station: Station) -> None:
@@ -81,8 +83,37 @@ def test_a_file_that_is_no_database_is_refused_and_untouched(tmp_path: Path) -> 
 
 
 def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> None:
-    with pytest.raises(ArchiveError, match="There is no archive"):
+    with pytest.raises(NoArchiveError, match="There is no archive"):
         look_into(tmp_path / "archive.sqlite")
+
+
+def test_an_archive_that_was_cut_off_while_it_was_made_is_empty_and_made_anew(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    file.touch()
+
+    with pytest.raises(NoArchiveError, match="nothing was entered in it yet"):
+        look_into(file)
+    open_file(file).close()
+    look_into(file).close()
+
+
+def test_an_archive_that_another_program_holds_is_said_to_be_held(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(database, "LONGEST_WAIT_S", 0.05)
+    file = tmp_path / "archive.sqlite"
+    with (
+        closing(open_file(file)) as archive,
+        closing(sqlite3.connect(file, isolation_level=None)) as other,
+    ):
+        other.execute("BEGIN IMMEDIATE")
+        with (
+            pytest.raises(ArchiveError, match="is held by another program"),
+            archive.writing(),
+        ):
+            pass
 
 
 @pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])
@@ -99,6 +130,21 @@ def test_wrong_credentials_are_said_without_the_password(postgres: Postgres) -> 
     told = str(caught.value.sentence)
     assert "password authentication failed" in told
     assert PASSWORD not in told
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        f"postgresql://plant:{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://plant:it-is@{PASSWORD}@127.0.0.1:1/plant",
+        f"postgresql://127.0.0.1:1/plant?user=plant&password={PASSWORD}",
+    ],
+)
+def test_no_way_of_giving_a_password_has_it_told(address: str) -> None:
+    with pytest.raises(ArchiveError) as caught:
+        open_server(address)
+
+    assert PASSWORD not in str(caught.value.sentence)
 
 
 def test_a_server_that_is_no_postgresql_is_said_to_be_unusable(gopher: int) -> None:
@@ -149,3 +195,33 @@ def _is_refused(database: Database) -> bool:
             return False
     except ArchiveError:
         return True
+
+
+def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    database = open_file(file)
+    with database.reading() as connection:
+        used = connection.connection.dbapi_connection
+        database.close()
+        connection.exec_driver_sql("SELECT 1")
+
+    assert isinstance(used, sqlite3.Connection)
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        used.execute("SELECT 1")
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    open_file(file).close()
+    data = file.read_bytes()
+    damaged = data.replace(b"tablearchive_entries", b"table\x8brchive_entries")
+    file.write_bytes(damaged.replace(b"CREATE TABLE archive_entries", b"?" * 28))
+
+    for opening in (open_file, look_into):
+        with pytest.raises(ArchiveError, match="disk image is malformed"):
+            opening(file)

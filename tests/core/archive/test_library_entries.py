@@ -134,6 +134,16 @@ def test_tips_are_valid_overdue_not_calibrated_or_retired(station: Station) -> N
     assert Standings().of_tip("LP-04", "T-10") is None  # nothing was read yet
 
 
+def test_a_tip_of_a_day_still_to_come_is_overdue_for_its_age_is_not_known(
+    station: Station,
+) -> None:
+    append(station.database, station.chain, *accepted(0))
+    library = Library()
+
+    assert stand(station, library, -0.5).of_tip("LP-04", "T-10") is TipStanding.VALID
+    assert stand(station, library, -40).of_tip("LP-04", "T-10") is TipStanding.OVERDUE
+
+
 def test_a_tip_is_due_by_its_own_rule_or_its_own_date(station: Station) -> None:
     append(station.database, station.chain, *accepted(0))
     weekly = Library(tips={"T-10": ListedTip(id="T-10", max_days=7)})

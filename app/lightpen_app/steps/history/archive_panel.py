@@ -8,6 +8,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QProgressBar, QVBoxLayout, QWidget
 
 from lightpen.archive.check import Checked
+from lightpen.archive.logbook import Delivery
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
@@ -34,7 +35,7 @@ class Saving(Enum):
 
 
 class ArchivePanel(Translated, QWidget):
-    """Three buttons, and what the last check came to.
+    """Three buttons, what the last check came to, and what the server has.
 
     Signals
     -------
@@ -51,6 +52,7 @@ class ArchivePanel(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._checked: Checked | None = None
+        self._delivery: Delivery | None = None
 
         # Widgets
         self._check = PushButton()
@@ -66,6 +68,7 @@ class ArchivePanel(Translated, QWidget):
         self._progress.setRange(0, 100)
         self._cancel = PushButton()
         self._working = QWidget()
+        self._delivered = SignLabel()
         self._outcome = SignLabel()
         self._findings: list[SignLabel] = []
 
@@ -85,6 +88,7 @@ class ArchivePanel(Translated, QWidget):
         layout.setSpacing(GRID)
         layout.addLayout(buttons)
         layout.addWidget(self._working)
+        layout.addWidget(self._delivered)
         layout.addWidget(self._outcome)
         layout.addStretch(1)
         self._working.hide()
@@ -115,9 +119,14 @@ class ArchivePanel(Translated, QWidget):
         self._checked = checked
         self._retranslate()
 
+    def set_delivery(self, delivery: Delivery | None) -> None:
+        """Show how far the server has what was entered; None without a server."""
+        self._delivery = delivery
+        self._show_delivery()
+
     def told(self) -> Sequence[Remark]:
-        """Return what is said of the check."""
-        labels = (self._outcome, *self._findings)
+        """Return what is said of the server and of the check."""
+        labels = (self._delivered, self._outcome, *self._findings)
         return [label.value() for label in labels if label.value().text]
 
     def _retranslate(self) -> None:
@@ -132,6 +141,7 @@ class ArchivePanel(Translated, QWidget):
         ):
             self._savings[saving].setText(text)
         self._refresh_buttons()
+        self._show_delivery()
         self._show_outcome()
 
     def _refresh_buttons(self) -> None:
@@ -145,6 +155,23 @@ class ArchivePanel(Translated, QWidget):
         buttons = (self._check, self._save, self._import)
         for button, words in zip(buttons, told, strict=True):
             button.set_why_not(why_not, words)
+
+    def _show_delivery(self) -> None:
+        delivery = self._delivery
+        remark = Remark("") if delivery is None else self._remark_on(delivery)
+        self._delivered.set_value(remark)
+
+    def _remark_on(self, delivery: Delivery) -> Remark:
+        n_waiting, trouble = delivery.n_waiting, delivery.trouble
+        if trouble is not None:
+            text = self.tr(
+                "The server does not have all entries. They stay here, and are "
+                "delivered when it answers. {0}"
+            )
+            return Remark(text.format(worded(trouble)), Sign.WARNING, Tone.WARN)
+        if n_waiting == 0:
+            return Remark(self.tr("The server has all entries."), Sign.CHECK, Tone.GOOD)
+        return Remark(self.tr("Entries are being delivered to the server."))
 
     def _show_outcome(self) -> None:
         checked = self._checked

@@ -27,9 +27,9 @@ from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.steps.history.reader import HistoryReader, Opening
 from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.trend_panel import TrendPanel
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
@@ -143,6 +143,8 @@ class HistoryContent(Translated, QWidget):
         self._filter.set_known(opening.names)
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
+        self._archive.set_delivery(opening.delivery)
+        self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
         # Later than what is seen at once.

@@ -11,6 +11,7 @@ from lightpen.archive.due import DueTip, due_tips
 from lightpen.archive.entries import Written
 from lightpen.archive.history import KnownNames, Line, known_names, lines, remarks_on
 from lightpen.archive.late_logbook import LateLogbook
+from lightpen.archive.logbook import Delivery
 from lightpen.archive.queries import Wanted, n_wanted
 from lightpen.record.due_rule import DueRule
 from lightpen.record.tip_library import Library
@@ -30,12 +31,15 @@ class Opening:
     ----------
     first : tuple of Line
         The newest.
+    delivery : Delivery or None
+        How far the server has what was entered here; None if there is no server.
     """
 
     wanted: Wanted
     n_lines: int
     first: tuple[Line, ...]
     names: KnownNames
+    delivery: Delivery | None = None
 
 
 class HistoryReader(QObject):
@@ -80,12 +84,14 @@ class HistoryReader(QObject):
         logbook = self._logbook
 
         def read(_: Report) -> Opening:
-            database = logbook.opened().database
+            opened = logbook.opened()
+            database = opened.database
             return Opening(
                 wanted,
                 n_wanted(database, wanted),
                 lines(database, wanted, 0, BLOCK),
                 known_names(database),
+                opened.delivery(),
             )
 
         self._start("open", read, self.opened.emit)

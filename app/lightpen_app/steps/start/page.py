@@ -48,6 +48,7 @@ from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.steps.start.vast_panel import VastPanel
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
@@ -65,6 +66,7 @@ class StartPage(Rearranged, Page):
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
+    vast_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
     def __init__(
         self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
@@ -96,6 +98,7 @@ class StartPage(Rearranged, Page):
         self._sound_test = SoundTest(sounds)
         self._folder = DataFolderPanel(workbench.folder)
         self._newcomer = NewcomerPanel()
+        self._vast = VastPanel(workbench.run.logbook)
         self._typing = QTimer(self)
         self._typing.setSingleShot(True)
         self._typing.setInterval(TYPING_PAUSE_MS)
@@ -119,12 +122,16 @@ class StartPage(Rearranged, Page):
         right.insertWidget(right.count() if is_known else 0, self._newcomer)
         right.addStretch(1)
         content = QWidget()
-        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
-        columns.setContentsMargins(0, 0, 0, 0)
+        rows = QVBoxLayout(content)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.setSpacing(3 * GRID)
+        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         columns.setSpacing(3 * GRID)
         self._use_room()  # before the columns: the order of the Tab key
         columns.addLayout(left, 5)
         columns.addLayout(right, 4)
+        rows.addLayout(columns)
+        rows.addWidget(self._vast, 1)
         scroll = PageScroll()
         scroll.setWidget(content)
         layout = QVBoxLayout(self)
@@ -155,7 +162,8 @@ class StartPage(Rearranged, Page):
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         self._folder.change_requested.connect(self.data_folder_requested)
-        workbench.windows.counted.connect(self._folder.set_others)
+        workbench.folder_watch.counted.connect(self._folder.set_others)
+        workbench.folder_watch.doubted.connect(self._folder.set_trouble)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.swing_wanted.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
@@ -209,6 +217,7 @@ class StartPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._searching.stop()
+        self._vast.shut_down()
         for job in (self._lookup, self._search, self._work, self._signing):
             if job is not None:
                 job.cancel()
@@ -223,7 +232,9 @@ class StartPage(Rearranged, Page):
         # What waits for an answer comes first.
         column = self._left if is_narrow else self._right
         column.insertWidget(0, self._interrupted)
-        self._last.set_large(self._room.is_large)
+        self._last.set_room(self._room)
+        self._vast.setVisible(self._room.is_vast)
+        self._show_vast()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
@@ -420,6 +431,7 @@ class StartPage(Rearranged, Page):
         if self._lookup is not None:
             self._lookup.cancel()
         self._looked_up = pen, tip, is_simulated = _key(self._workbench.preparation)
+        self._show_vast()
         if not (pen and tip):
             self._last.set_value(LastResult(is_named=False))
             return
@@ -430,6 +442,12 @@ class StartPage(Rearranged, Page):
         )
         self._lookup.failed.connect(self._on_lookup_failed)
         self._lookup.crashed.connect(self._on_lookup_crashed)
+
+    def _show_vast(self) -> None:
+        """Show more of the tip that is named where there is the room."""
+        if self._room.is_vast:
+            pen, tip, is_simulated = _key(self._workbench.preparation)
+            self._vast.set_value(pen, tip, is_simulated=is_simulated)
 
     def _on_looked_up(self, result: Result | None) -> None:
         is_simulated = self._looked_up[2]

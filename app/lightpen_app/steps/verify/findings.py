@@ -3,7 +3,8 @@
 from itertools import chain
 
 import numpy as np
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -25,10 +26,12 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.translated import Translated
 
 AXES = ("u", "v", "w")
 DECIMALS = 4  # of mm
+DIAL_SHARE, LARGE_DIAL_SHARE, TABLES_SHARE = 3, 9, 13  # of the width
 LATEST = 6  # touches of a ring, which fit beside it
 TENTHS_OF_PER_MILLE = 1e4  # as the paper tells a relative error
 
@@ -65,10 +68,12 @@ class TaskFinding(Translated, QWidget):
         raise NotImplementedError
 
 
-class FixedPointFinding(TaskFinding):
+class FixedPointFinding(Rearranged, TaskFinding):
     """The postures, u v w of each touch, and both tips beside each other."""
 
     kind = TaskKind.FIXED_POINT
+    narrow_below = 116 * GRID  # px; then one table is below the other
+    large_from = QSize(160 * GRID, 80 * GRID)  # px; then all is larger
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -84,7 +89,9 @@ class FixedPointFinding(TaskFinding):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(2 * GRID)
-        layout.addWidget(self._dial, 3)
+        layout.addWidget(self._dial)
+        self._tables = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._tables.setSpacing(2 * GRID)
         for head, table, share in zip(
             self._heads, (self._touches, self._summary), (6, 7), strict=True
         ):
@@ -93,9 +100,23 @@ class FixedPointFinding(TaskFinding):
             column.addWidget(head)
             column.addWidget(table)
             column.addStretch(1)
-            layout.addLayout(column, share)
+            self._tables.addLayout(column, share)
+        layout.addLayout(self._tables, TABLES_SHARE)
+        self._columns = layout
+        self._use_room()
 
         self._retranslate()
+
+    @override
+    def _use_room(self) -> None:
+        direction = QBoxLayout.Direction
+        self._tables.setDirection(
+            direction.TopToBottom if self._room.is_narrow else direction.LeftToRight
+        )
+        is_large = self._room.is_large
+        for table in (self._touches, self._summary):
+            table.set_large(is_large)
+        self._columns.setStretch(0, LARGE_DIAL_SHARE if is_large else DIAL_SHARE)
 
     @override
     def _retranslate(self) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -130,13 +130,28 @@ class FixedPointStrip(TaskStrip):
         return self.tr("Touch the cone again"), self.tr("Touches")
 
 
+class SurfaceField(QComboBox):
+    """Where something is touched; as wide as its longest choice."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        for surface in Surface:
+            self.addItem("", surface)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        # WORKAROUND for Qt 6: its own is kept from the language before.
+        return self.sizeHint()
+
+
 class RingStrip(TaskStrip):
     """A ring: its certified radius, where it is touched, and how often."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._radius = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
-        self._surface = _surface_field()
+        self._surface = SurfaceField()
         self._runs = NumberField("", (1, MOST_RUNS), 0)
         fields = self._radius, self._uncertainty, self._surface, self._runs
         super().__init__(TaskKind.CIRCLE, fields, parent)
@@ -217,7 +232,7 @@ class LengthStrip(TaskStrip):
     def __init__(self, parent: QWidget | None = None) -> None:
         self._length = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
-        self._surface = _surface_field()
+        self._surface = SurfaceField()
         self._places = NumberField("", (1, MOST_RUNS), 0)
         fields = self._length, self._uncertainty, self._surface, self._places
         super().__init__(TaskKind.LENGTH, fields, parent)
@@ -256,14 +271,6 @@ class LengthStrip(TaskStrip):
 
 def _length_field() -> NumberField:
     return NumberField("mm", (0.0, LONGEST), 4)
-
-
-def _surface_field() -> QComboBox:
-    field = QComboBox()
-    field.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
-    for surface in Surface:
-        field.addItem("", surface)
-    return field
 
 
 def _label(field: QWidget) -> QLabel:

@@ -12,6 +12,7 @@ import pytest
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QApplication,
     QCheckBox,
     QComboBox,
     QFileDialog,
@@ -25,6 +26,7 @@ from pytestqt.qtbot import QtBot
 
 from lightpen.archive.chains import append
 from lightpen.archive.entries import Event, Kind
+from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
@@ -34,12 +36,14 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
     PEN,
+    STATION,
     TIP,
     UNREAD,
     WHAT,
@@ -50,9 +54,9 @@ from lightpen_app.steps.history.history_table import (
 )
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.trend_panel import TrendPanel
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -207,6 +211,49 @@ def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk.select(0)
     limit = f"max_radius_mm {StationLimits().verification.radius}"
     desk.until(lambda: limit in _words(desk))
+
+
+def test_a_server_that_cannot_be_reached_is_told_without_the_password(
+    desk: Desk,
+) -> None:
+    folder = desk.workbench.folder
+    away = "postgresql://plant:secret-word@127.0.0.1:1/plant"
+    desk.workbench.run.logbook = LateLogbook(folder, away)
+    desk.enter(1)
+    desk.open()
+    desk.show_tab(WHOLE)
+    panel = desk.child(ArchivePanel)
+
+    def told() -> str:
+        desk.page.entered()
+        return panel.told()[0].text
+
+    desk.until(lambda: "does not have all entries" in told())
+    assert "The archive postgresql" in told()
+    assert "secret-word" not in told()
+    desk.workbench.run.logbook.close()
+
+
+@pytest.mark.parametrize("language", list(Language))
+def test_at_the_usual_width_every_column_is_seen_and_told_whole(
+    desk: Desk, qapp: QApplication, language: Language
+) -> None:
+    LanguageSwitch(qapp).set_language(language)
+    desk.enter(3)
+    desk.open()
+    desk.page.resize(976, 700)  # that of a window of 1280 px
+    desk.until(lambda: desk.table.n_lines() == 3)
+
+    assert not desk.table.horizontalScrollBar().isVisible()
+    across = desk.table.horizontalHeader()
+    for column in range(WORDS):
+        if column != STATION:  # the only one
+            needed = desk.table.sizeHintForColumn(column)
+            assert across.sectionSize(column) >= needed, column
+    assert desk.table.isColumnHidden(STATION)
+
+    desk.page.resize(1616, 700)
+    assert not desk.table.isColumnHidden(STATION)
 
 
 def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(

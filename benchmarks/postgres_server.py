@@ -1,0 +1,75 @@
+"""A PostgreSQL server of this machine, on the loopback, for benchmarks and tests."""
+
+import os
+import secrets
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+PASSWORD = "a-secret-of-the-plant"
+START_S = 60.0  # on a machine that does other things besides
+
+
+def postgres_programs() -> Path | None:
+    """Return the folder of its programs, as Debian installs them; None without any."""
+    programs = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+    return programs[-1].parent if programs else None
+
+
+class Postgres:
+    """A server on the loopback, which can be stopped and started again."""
+
+    def __init__(self, folder: Path, programs: Path) -> None:
+        self._folder, self._programs = folder, programs
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self.port: int = free.getsockname()[1]
+        self._user = "postgres" if os.geteuid() == 0 else None
+        secret = folder / "password"
+        secret.write_text(PASSWORD)
+        if self._user is not None:
+            for path in (folder, secret):
+                shutil.chown(path, self._user)
+        self._run(
+            *("initdb", "--no-sync", "--auth=scram-sha-256", "--username=plant"),
+            f"--pwfile={secret}",
+        )
+        self.start()
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        options = f"-p {self.port} -c listen_addresses=127.0.0.1 -k {self._folder}"
+        self._run(
+            *("pg_ctl", "start", "--wait", f"--timeout={START_S:.0f}"),
+            *(f"--log={self._folder / 'log'}", f"--options={options}"),
+        )
+
+    def stop(self) -> None:
+        """Stop it at once, as a power cut does."""
+        self._run("pg_ctl", "stop", "--wait", "--mode=immediate")
+
+    def new_database(self) -> str:
+        """Return the address of a database that is made anew."""
+        from sqlalchemy import create_engine, text
+
+        name = f"plant_{secrets.token_hex(4)}"
+        address = self.address("postgres").replace("://", "+psycopg://")
+        engine = create_engine(address, isolation_level="AUTOCOMMIT")
+        with engine.connect() as connection:
+            connection.execute(text(f"CREATE DATABASE {name}"))
+        engine.dispose()
+        return self.address(name)
+
+    def address(self, name: str, password: str = PASSWORD) -> str:
+        """Return the address of a database."""
+        return f"postgresql://plant:{password}@127.0.0.1:{self.port}/{name}"
+
+    def _run(self, program: str, *words: str) -> None:
+        subprocess.run(
+            [self._programs / program, f"--pgdata={self._folder / 'data'}", *words],
+            user=self._user,
+            cwd=self._folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            check=True,
+        )
