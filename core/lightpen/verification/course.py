@@ -5,7 +5,7 @@ takes long done elsewhere.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -19,22 +19,15 @@ from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, FileError, LightpenError
 from lightpen.estimation.verdict import Grade
-from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.outcome import TrialOutcome
 from lightpen.record.supervision import Signature, require_supervisor
-from lightpen.record.verifications import TOUCHES
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import OneTask, Report, Start
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
 from lightpen.verification.conclusion import Conclusion
 from lightpen.verification.going_on import GoneOn, go_on_with
-from lightpen.verification.keeping import (
-    TouchedImages,
-    task_record,
-    verifications_folder,
-)
 from lightpen.verification.recorded_runs import Done, read_runs
 from lightpen.verification.session import (
     SessionTransition,
@@ -45,11 +38,7 @@ from lightpen.verification.session import (
     touched_anew,
     with_found,
 )
-from lightpen.verification.session_records import (
-    KeptRecord,
-    SessionRecords,
-    concluding,
-)
+from lightpen.verification.session_keeping import SessionKeeping
 from lightpen.verification.session_state import (
     SessionSetup,
     SessionState,
@@ -67,7 +56,6 @@ from lightpen.verification.tip_in_force import (
 )
 from lightpen.verification.touch_images import (
     NewRecord,
-    TouchImages,
     is_held_on,
     new_record,
 )
@@ -75,9 +63,6 @@ from lightpen.verification.touching import TouchHappening, TouchPhase, read_rule
 from lightpen.verification.under_way import (
     InterruptedVerification,
     ReadImages,
-    UnderWay,
-    UnderWayFile,
-    under_way_path,
 )
 from lightpen.verification.witness import LampWatch, LampWitness
 
@@ -98,14 +83,6 @@ BUG = sentence(
 )
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, eq=False)
-class _TaskDone:
-    """A task that is done, and the images of its touches."""
-
-    task: TaskKind
-    images: TouchedImages
 
 
 class VerificationCourse:
@@ -136,14 +113,10 @@ class VerificationCourse:
         self._status = VerificationStatus()
         self._preparation: Preparation | None = None
         self._choices = VerificationChoices()
-        self._records = SessionRecords(data)
-        self._unkept_tasks: tuple[_TaskDone, ...] = ()  # whose drift is not known yet
-        self._read_images: tuple[ReadImages, ...] = ()
+        self._keeping = SessionKeeping(data, self._new_record, now)
         self._trouble: Sentence | None = None
         self._task = OneTask(start, self.recover, listener.on_progress)
         self._lamps = LampWatch()
-        self._images = TouchImages(self._new_record)
-        self._file: UnderWayFile | None = None  # of the verification under way
         self._unkept: Sentence | None = None  # why images are not kept now
         self._unnoted: Sentence | None = None  # why it could not be gone on with
 
@@ -217,7 +190,7 @@ class VerificationCourse:
         self._write()  # what is accepted is named by its files
         status = self._status
         tip, found, began = status.tip, status.assessment, status.began
-        is_written = not self._records.are_waiting
+        is_written = not self._keeping.is_behind
         is_open = status.is_done and is_written and not status.accepted_by
         if not is_open or tip is None or found is None or began is None or not reason:
             return
@@ -238,10 +211,10 @@ class VerificationCourse:
         conclusion = Conclusion(
             *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
-        self._records.write_now(concluding(tip, conclusion, None))
+        self._keeping.accept(tip, conclusion)
         self._relieve()
         accepted_by = supervisor or tip.names.operator
-        kept = self._records.files
+        kept = self._keeping.files
         self._publish(replace(status, files=kept, accepted_by=accepted_by))
 
     def end_task(self) -> None:
@@ -251,7 +224,7 @@ class VerificationCourse:
             return
         transition = end_task(status.setup, status.state)
         try:
-            self._images.follow(status.state, transition)
+            self._keeping.images.follow(status.state, transition)
         except FileError as error:
             self._tell_trouble(error.sentence)
             return
@@ -300,48 +273,29 @@ class VerificationCourse:
         )
 
     def _on_gone_on(self, path: Path, before: GoneOn) -> None:
-        under_way, file = before.under_way, UnderWayFile(path)
         self._give_up()
         try:
-            file.hold()
-            folder = self._root(before.tip) / TOUCHES
-            self._images.take_over(under_way.runs, folder)
+            self._keeping.take_over(path, before)
         except FileError as error:
-            file.let_go()
             self._on_runs_unread(error.sentence)
             return
         self._relieve()
-        self._choices, self._file = before.setup.choices, file
-        self._records.begin(before.files)
-        self._read_images, self._lamps = under_way.read, LampWatch()
-        self._unkept_tasks = self._unkept_of(before)
+        self._choices, self._lamps = before.setup.choices, LampWatch()
         self._publish(
             VerificationStatus(
                 tip=before.tip,
                 setup=before.setup,
                 state=before.state,
                 aim=before.tip.aim,
-                began=under_way.began,
+                began=before.under_way.began,
                 files=before.files,
                 is_here=self._status.is_here,
                 refusal=self._why_not(before.tip),
             )
         )
-        self._keep_witnessed()
+        self._keep()
         self._conclude_done()
         self._publish(self._status)
-
-    def _unkept_of(self, before: GoneOn) -> tuple[_TaskDone, ...]:
-        """Return the tasks that were done and not written yet."""
-        found = [kind for kind in TaskKind if before.state.found(kind) is not None]
-        return tuple(
-            _TaskDone(
-                kind,
-                TouchedImages(before.tip.origin, records=self._images.records(kind)),
-            )
-            for kind in found
-            if kind in before.unwritten
-        )
 
     def cancel(self) -> None:
         """Stop reading."""
@@ -373,7 +327,7 @@ class VerificationCourse:
         try:
             name = self._name(frame, together, setup, state)
             transition = advance(self._with_drift(setup, state), state, name, together)
-            self._images.follow(state, transition)
+            self._keeping.images.follow(state, transition)
         except FileError as error:  # an image that is not kept does not count
             self._unkept = error.sentence
             self._tell_trouble(error.sentence)
@@ -403,7 +357,7 @@ class VerificationCourse:
             return str(frame.seq)
         if not is_held_on(rules_of(setup, task), state):
             return str(frame.seq)
-        return self._images.keep(frame, seen, task)
+        return self._keeping.images.keep(frame, seen, task)
 
     def _new_record(self) -> NewRecord:
         """Make a record for the images of the run at hand."""
@@ -418,7 +372,7 @@ class VerificationCourse:
                 "tip_sha256": tip.tip_file.sha256,
             }
         )
-        return new_record(self._root(tip), tip.names, header)
+        return new_record(self._keeping.root(tip), tip.names, header)
 
     def _become(self, transition: SessionTransition) -> None:
         before, state = self._status.state, transition.state
@@ -428,17 +382,13 @@ class VerificationCourse:
         if before is not None and _is_known(state) and not _is_known(before):
             happened.append(SessionHappening.KNOWN)
         if finished is not None:
-            tip, found = self._status.tip, state.found(finished)
+            tip = self._status.tip
             assert tip is not None
-            assert found is not None
             witness = self._witness(tip)
-            records = self._images.records(finished)
-            images = TouchedImages(tip.origin, witness=witness, records=records)
+            self._keeping.add_task(finished, tip, witness)
             self._status = replace(self._status, witness=witness)
-            done = _TaskDone(finished, images)
-            self._unkept_tasks = (*self._unkept_tasks, done)
             happened.append(_ending(self._status))
-        self._keep_witnessed()
+        self._keep()
         if finished is not None:
             self._conclude_done()
         self._publish(self._status, *happened)
@@ -450,15 +400,7 @@ class VerificationCourse:
 
     def _touch_again(self, state: SessionState) -> None:
         """Go on with another state, in which something is to be touched again."""
-        kinds = [kind for kind in TaskKind if state.found(kind) is not None]
-        if state.visits:
-            kinds.append(TaskKind.DRIFT)
-        self._images.forget_but(kinds)
-        self._unkept_tasks = tuple(
-            done for done in self._unkept_tasks if done.task in kinds
-        )
-        read = (images for images in self._read_images if images.task in kinds)
-        self._read_images = tuple(read)
+        self._keeping.forget_but(state)
         self._publish(replace(self._status, state=state))
 
     # The tip
@@ -490,7 +432,7 @@ class VerificationCourse:
             self._publish(self._status)
         else:
             self._touch_again(state)
-        self._keep_witnessed()
+        self._keep()
 
     def _read_tip(self) -> None:
         preparation = self._preparation
@@ -536,8 +478,8 @@ class VerificationCourse:
         self._relieve()
         self._status = replace(status, began=status.began or self._now())
         self._touch_again(with_found(status.state, done.found))
-        self._read_images = (*self._read_images, images)
-        self._keep(done)
+        self._keeping.add_read(images, done, self._status)
+        self._write()
         self._conclude_done()
         self._publish(self._status, _ending(self._status))
 
@@ -557,30 +499,9 @@ class VerificationCourse:
 
     # Records
 
-    def _keep_witnessed(self) -> None:
+    def _keep(self) -> None:
         """Keep what tasks have found, unless a witness will tell more of them."""
-        tip, state = self._status.tip, self._status.state
-        if tip is None or state is None:
-            return
-        waiting = {task for task, _ in state.unwitnessed}
-        done = self._unkept_tasks
-        self._unkept_tasks = tuple(each for each in done if each.task in waiting)
-        for each in done:
-            found = state.found(each.task)
-            if each.task not in waiting and found is not None:
-                self._keep(Done(each.task, found, tip, each.images))
-
-    def _keep(self, done: Done) -> None:
-        """Keep what a task has found, now or as soon as it can be written."""
-        setup = self._status.setup
-        assert setup is not None
-        record = task_record(
-            *(done.task, done.found, done.tip, setup.choices),
-            *(self._status.began or self._now(), done.images),
-        )
-        origins = done.tip.origin, done.images.origin
-        is_simulated = Origin.SIMULATED in origins
-        self._records.add(KeptRecord(lambda _: record, is_simulated, done.task))
+        self._keeping.settle(self._status)
         self._write()
 
     def _conclude_done(self) -> None:
@@ -588,71 +509,31 @@ class VerificationCourse:
         found = self._status.assessment
         if self._status.is_done and found is not None:
             is_kept = found.is_accepted
-            self._conclude(TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED)
+            outcome = TrialOutcome.ACCEPTED if is_kept else TrialOutcome.REFUSED
+            self._keeping.conclude(self._status, outcome)
+            self._write()
 
     def _give_up(self) -> None:
         """Conclude what was begun and is not done."""
-        status = self._status
-        self._images.forget_but(())
-        if status.state is not None:
-            state = replace(status.state, unwitnessed=())
-            self._status = replace(status, state=state)
-            self._keep_witnessed()
-        if status.began is not None and not status.is_done:
-            self._conclude(TrialOutcome.ABANDONED)
-        self._records.begin()
-        self._unkept_tasks, self._read_images, self._file = (), (), None
-
-    def _conclude(self, outcome: TrialOutcome) -> None:
-        """Say what became of the verification, with all records of it."""
-        status = self._status
-        if status.tip is None or status.began is None:
-            return
-        conclusion = Conclusion(outcome, status.began, self._now(), status.assessment)
-        self._records.add(concluding(status.tip, conclusion, self._file))
+        self._keeping.give_up(self._status)
         self._write()
+        self._keeping.begin()
 
     def _write(self) -> None:
         """Write what waits for it, or tell why it cannot be."""
-        if not self._records.are_waiting:
+        if not self._keeping.is_behind:
             return
         try:
-            self._records.write()
+            self._keeping.write()
             self._relieve()
         except LightpenError as error:
             self._tell_trouble(error.sentence)
-        self._status = replace(self._status, files=self._records.files)
+        self._status = replace(self._status, files=self._keeping.files)
 
     def _note_under_way(self) -> None:
         """Put on the disk what it takes to go on, should the program be killed."""
-        status, tip, runs = self._status, self._status.tip, self._images.runs
-        has_some = bool(runs or self._read_images)
-        if tip is None or status.began is None or status.is_done or not has_some:
-            return
-        root = self._root(tip)
-        if self._file is None:
-            path = under_way_path(root, tip.names, status.began)
-            self._file = UnderWayFile(path)
         try:
-            self._file.note(
-                UnderWay(
-                    began=status.began,
-                    names=tip.names,
-                    origin=tip.origin,
-                    tip_file=tip.tip_file.path.name,
-                    tip_sha256=tip.tip_file.sha256,
-                    pen_sha256=tip.pen_file.sha256,
-                    seen_by=tip.viewers.hashes,
-                    choices=self._choices,
-                    runs=runs,
-                    read=self._read_images,
-                    files=tuple(file.name for file in self._records.files),
-                    unwritten=(
-                        *(done.task for done in self._unkept_tasks),
-                        *self._records.waiting,
-                    ),
-                )
-            )
+            self._keeping.note(self._status, self._choices)
         except FileError as error:
             if self._trouble is None:  # what stands in its way may be told already
                 self._unnoted = error.sentence
@@ -661,10 +542,6 @@ class VerificationCourse:
         if self._unnoted is not None and self._unnoted is self._trouble:
             self._relieve()
         self._unnoted = None
-
-    def _root(self, tip: TipInForce) -> Path:
-        is_simulated = tip.origin is Origin.SIMULATED
-        return verifications_folder(self._data, is_simulated=is_simulated)
 
     def _publish(self, status: VerificationStatus, *events: SessionHappening) -> None:
         """Become this status, and tell of it."""

@@ -111,9 +111,10 @@ class SessionState:
 
     @property
     def assessment(self) -> Conformity | None:
-        """The worst that was found so far; the drift first, as it explains the rest."""
-        kinds = sorted(TaskKind, key=lambda kind: kind is not TaskKind.DRIFT)
-        found = [each for each in map(self.found, kinds) if each is not None]
+        """The worst that was found so far; a drift first, as it explains the rest."""
+        found = [each for each in map(self.found, TaskKind) if each is not None]
+        if self.drift is not None and not self.drift.assessment.is_accepted:
+            found.insert(0, self.drift)
         return worst([each.assessment for each in found]) if found else None
 
 

@@ -30,7 +30,7 @@ from lightpen.formats.own_json import (
     DamagedError,
     Digest,
     Moment,
-    has_checksum,
+    parse_checked,
     parse_json,
     require_usual,
     with_checksum,
@@ -325,9 +325,7 @@ def _is_held(path: Path) -> bool:
 def _read(path: Path) -> InterruptedVerification:
     try:
         data = read_bytes(path, WHAT, MEGABYTE)
-        if not has_checksum(data):
-            raise DamagedError("There is no checksum.")
-        return InterruptedVerification(path, parse_json(data, UnderWay))
+        return InterruptedVerification(path, parse_checked(data, UnderWay))
     except FileError as error:
         return InterruptedVerification(path, None, error.sentence)
     except DamagedError:
