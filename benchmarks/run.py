@@ -2,9 +2,9 @@
 
 Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
 
-Figures on the image sets need LIGHTPEN_DATA. Takes half an hour on two cores, of which
-ten minutes are the section `soak`; nothing else should run meanwhile. Exit status 1 if a
-limit is missed.
+Figures on the image sets need LIGHTPEN_DATA. Takes half an hour on two cores, ten
+minutes of it for the section `soak`; nothing else should run meanwhile. Exit status 1
+if a limit is missed.
 """
 
 import argparse

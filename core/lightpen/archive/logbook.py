@@ -49,6 +49,7 @@ from lightpen.archive.station_accounts import (
 from lightpen.errors import FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
+from lightpen.record.acceptance import require_in_use
 from lightpen.record.assessment import Assessment
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.journal import JOURNAL, last_verdict
@@ -188,9 +189,12 @@ class Logbook:
         ------
         ArchiveError
             The entry put no tip in force, or it cannot be entered; it stays owed then.
+        AcceptanceError
+            The tip is retired.
         FileError
             It cannot be put in force; what was in force stays so.
         """
+        require_in_use(self._results, entry.entry.event.names.tip)
         event, record = entry.entry.event, entry.entry.event.record_sha256 or ""
         now = local_now()
         with self._lock:
