@@ -46,7 +46,7 @@ from lightpen.archive.station_accounts import (
     is_station_file,
     station_files,
 )
-from lightpen.errors import FileError
+from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
 from lightpen.record.acceptance import require_in_use
@@ -104,7 +104,11 @@ class Logbook:
         self._results = FolderArchive(data)
         self._lock = Lock()
         self.database: Database = open_file(data / ARCHIVE)
-        self.chain = own_chain(self.database)
+        try:
+            self.chain = own_chain(self.database)
+        except ArchiveError:
+            self.database.close()
+            raise
         self._courier = Courier(self.database, self.chain, server) if server else None
 
     def enter_owed(
