@@ -30,7 +30,8 @@ from benchmarks.rows import Row, table
 from lightpen.formats.files import write_whole
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.leftovers import OLDEST, sweep_leftovers
-from lightpen.record.reading import Record, open_record, source
+from lightpen.record.reading import Record, open_record
+from lightpen.record.recorded_source import source
 from lightpen.record.unfinished import find_unfinished
 from lightpen_app.work.settings_store import load
 

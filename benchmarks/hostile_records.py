@@ -30,9 +30,11 @@ from lightpen.live.sources import Surroundings, sample_files
 from lightpen.model.origin import Origin
 from lightpen.record.archive import Archive
 from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import HEADER, OPENER, open_record, record_files, source
+from lightpen.record.reading import OPENER, open_record, record_files
+from lightpen.record.recorded_source import source
 from lightpen.record.results import Result
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter

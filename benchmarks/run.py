@@ -2,9 +2,9 @@
 
 Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
 
-Figures on the image sets need LIGHTPEN_DATA. Takes half an hour on two cores, ten
-minutes of it for the section `soak`; nothing else should run meanwhile. Exit status 1
-if a limit is missed.
+Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
+sections `files`, `hostile`, `archive` and `soak` take from ten minutes to an hour, all
+others together some thirty minutes. Exit status 1 if a limit is missed.
 """
 
 import argparse
@@ -27,6 +27,7 @@ from benchmarks.image_sets import data_folder
 from benchmarks.killed import killed_rows
 from benchmarks.labelling import labelling_rows
 from benchmarks.machine import description
+from benchmarks.readme import with_section
 from benchmarks.rows import NEEDS_DATA, Row, table
 from benchmarks.speed import speed_rows
 from benchmarks.tips import repeat_rows, tip_rows
@@ -38,7 +39,6 @@ from benchmarks.workers import Workers, one_core_workers
 from benchmarks.wrong_files import wrong_file_rows
 
 README = Path(__file__).resolve().parents[1] / "README.md"
-BEGIN, END = "<!-- benchmark:begin -->", "<!-- benchmark:end -->"
 
 Section = Callable[[Workers, Path | None], list[Row]]
 
@@ -76,22 +76,30 @@ def main() -> int:
         "sections", nargs="*", metavar="SECTION", help=f"of {', '.join(SECTIONS)}; all"
     )
     parser.add_argument(
-        "--update-readme", action="store_true", help="put the table into README.md"
+        "--update-readme", action="store_true", help="put these sections into README.md"
     )
     options = parser.parse_args()
     unknown = set(options.sections) - set(SECTIONS)
     if unknown:
         parser.error(f"unknown: {', '.join(sorted(unknown))}")
     data = data_folder()
-    if options.update_readme and (options.sections or data is None):
-        parser.error("README.md takes the whole table only, which needs LIGHTPEN_DATA.")
+    if options.update_readme and data is None:
+        parser.error("README.md takes whole sections only, which need LIGHTPEN_DATA.")
     if data is not None and not (data / "swing-full").is_dir():
         parser.error(f"LIGHTPEN_DATA names {data}, which holds no folder swing-full.")
-    rows = _measured(options.sections or list(SECTIONS), data)
-    text = f"{description()}\n\n{table(rows)}"
-    print(text)
-    if options.update_readme:
-        _update_readme(text)
+    rows: list[Row] = []
+    with one_core_workers() as workers:
+        for name in options.sections or SECTIONS:
+            start = time.perf_counter()
+            of_section = SECTIONS[name](workers, data)
+            rows += of_section
+            text = f"{description()}\n\n{table(of_section)}"
+            print(f"{name}\n\n{text}\n", flush=True)
+            _say(f"{name}: {time.perf_counter() - start:.0f} s")
+            if options.update_readme:
+                content = README.read_text(encoding="utf-8")
+                renewed = with_section(content, name, text, list(SECTIONS))
+                README.write_text(renewed, encoding="utf-8")
     missed = [row for row in rows if not row.met]
     n_without_data = sum(row.measured == NEEDS_DATA for row in rows)
     _say(
@@ -99,25 +107,6 @@ def main() -> int:
         "need LIGHTPEN_DATA."
     )
     return 1 if missed else 0
-
-
-def _measured(sections: list[str], data: Path | None) -> list[Row]:
-    rows = []
-    with one_core_workers() as workers:
-        for name in sections:
-            start = time.perf_counter()
-            rows += SECTIONS[name](workers, data)
-            _say(f"{name}: {time.perf_counter() - start:.0f} s")
-    return rows
-
-
-def _update_readme(text: str) -> None:
-    content = README.read_text(encoding="utf-8")
-    before, begin, rest = content.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise ValueError(f"{README} has no lines {BEGIN} and {END}.")
-    README.write_text(f"{before}{begin}\n{text}\n{end}{after}", encoding="utf-8")
 
 
 def _say(text: str) -> None:

@@ -13,8 +13,10 @@ import pytest
 from lightpen.detection.observations import observe_images
 from lightpen.estimation.calibrate import calibrate
 from lightpen.formats.files import sha256
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import HEADER, image_name, open_record, source
+from lightpen.record.reading import image_name, open_record
+from lightpen.record.recorded_source import source
 from lightpen.record.solving import solve_record
 from lightpen.record.writing import note_taken_out
 

@@ -93,7 +93,7 @@ class Wizard(QObject):
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
-        self.workbench.others_counted.connect(self._on_others_counted)
+        self.workbench.windows.counted.connect(self._on_others_counted)
         self.workbench.subject_changed.connect(self.window.set_subject)
         self.workbench.relieved.connect(self.window.drop_notice)
         self.workbench.streaming.changed.connect(self._on_streaming_changed)

@@ -1,19 +1,13 @@
 """What the pages share: what was chosen, the live images, and the swing."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from time import monotonic
-from typing import Any
 
-import numpy as np
-from PySide6.QtCore import QObject, QThreadPool, QTimer, Signal
+from PySide6.QtCore import QObject, QThreadPool, Signal
 
-from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.cameras.source import FoundDevice, Needs
-from lightpen.cameras.sources import source_named
+from lightpen.cameras.source import Needs
 from lightpen.formats.opened_files import OpenedFiles, open_files
 from lightpen.live.sources import (
     Surroundings,
@@ -21,7 +15,7 @@ from lightpen.live.sources import (
     files_of_before,
     sample_files,
 )
-from lightpen.model.assumptions import USUAL, Assumptions, with_focal_length
+from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
@@ -29,7 +23,6 @@ from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
-from lightpen.record.presence import Presence
 from lightpen.record.recordings import FilesBeside
 from lightpen.record.standing import Standings
 from lightpen.record.supervision import Supervision, read_supervision
@@ -37,28 +30,25 @@ from lightpen.sentences import Sentence
 from lightpen.swing.preparation import (
     CameraInUse,
     Preparation,
-    SecondCamera,
     SourceChoice,
     SourceKind,
 )
 from lightpen.verification.choices import VerificationChoices
 from lightpen_app.look.sentences import worded
+from lightpen_app.work.camera_search import CameraSearch
+from lightpen_app.work.file_reading import FileReading
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
+from lightpen_app.work.other_windows import OtherWindows
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.station_choices import choices_of, with_choices
+from lightpen_app.work.station_preparation import preparation_of, station_of
 from lightpen_app.work.streaming import Streaming
 from lightpen_app.work.swing_run import SwingRun
 from lightpen_app.work.verification_run import VerificationRun
 
 LONGEST_FAREWELL = 2.0  # s that a camera may hold up the end of the program
-COUNTING_MS = 5000  # from one look for other windows to the next
-# Those of a station's assumptions that it keeps by their names.
-ASSUMED = (
-    *("scale", "form_error", "center_bias"),
-    *("temperature", "warmth", "expansion"),
-)
 # What is tried out goes by these, and nothing of it is remembered.
 TRIAL = Names("Trial", "Trial", "SIM-1", "T-1", "C-1", 10.0)
 
@@ -96,27 +86,19 @@ class Workbench(QObject):
         `preparation` is different.
     subject_changed(Subject)
         `subject` is different.
-    others_counted(int)
-        So many other windows of the program use the data folder, told when it changes.
     troubled(str)
         A sentence to be read.
     swing_wanted(Path)
         What leads to a recorded swing was opened from outside the program.
     relieved(str)
         A sentence of `troubled` whose cause is gone.
-    cameras_found(tuple of FoundDevice)
-    search_failed(str)
-        The sentence why no cameras can be looked for.
     """
 
     changed = Signal()
     subject_changed = Signal(object)
-    others_counted = Signal(int)
     swing_wanted = Signal(object)
     troubled = Signal(str)
     relieved = Signal(str)
-    cameras_found = Signal(object)
-    search_failed = Signal(str)
 
     def __init__(
         self,
@@ -132,15 +114,8 @@ class Workbench(QObject):
         self._preparation = Preparation()
         self._is_started = False
         self._wants_samples = False
-        self._reading: Job | None = None
-        self._search: Job | None = None
+        self._reading = FileReading(self)
         self._unread = Station()
-        self._file_troubles: list[str] = []
-        self._presence = Presence(folder)
-        self._n_others = 0
-        self._counter: Job | None = None
-        self._counting = QTimer(self)
-        self._counting.setInterval(COUNTING_MS)
         self._subject_told: Subject | None = None
         self._verified_told: tuple[Path, ...] = ()
         self._choices = VerificationChoices()
@@ -154,6 +129,8 @@ class Workbench(QObject):
         self.library = LibraryWatch(
             folder, self.run.logbook, settings.due_rule, self._around.now, self
         )
+        self.windows = OtherWindows(folder, self)
+        self.search = CameraSearch(self.live, self)
         self._in_force_told: tuple[object, object] = (None, None)
 
         # Connections
@@ -170,7 +147,9 @@ class Workbench(QObject):
         self.library.troubled.connect(self.troubled)
         self.library.relieved.connect(self.relieved)
         self.library.changed.connect(self._tell_subject)
-        self._counting.timeout.connect(self._count_others)
+        self._reading.troubled.connect(self.troubled)
+        self._reading.relieved.connect(self.relieved)
+        self.search.camera_wanted.connect(self.open_camera)
         self.run.changed.connect(self._tell_subject)
         self.run.changed.connect(self._follow_results)
         self.changed.connect(self._tell_subject)
@@ -241,7 +220,7 @@ class Workbench(QObject):
     @property
     def is_reading(self) -> bool:
         """Whether the files of the station are being read, or sample files written."""
-        return self._reading is not None
+        return self._reading.is_under_way
 
     def start(self) -> None:
         """Take over what was chosen last, and open the camera."""
@@ -252,11 +231,10 @@ class Workbench(QObject):
         self.run.runner.open_logbook()
         self._read_supervision()
         self.library.refresh()
-        self._count_others()
-        self._counting.start()
+        self.windows.start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
-        if self._reading is None:
+        if not self.is_reading:
             self._fill_in_samples()
         self.open_camera()
 
@@ -268,26 +246,9 @@ class Workbench(QObject):
         """Take over what was chosen last at a station."""
         station = self._settings.station(name) if name else Station()
         before = self._preparation
-        self._relieve_of_files()
-        self._preparation = replace(
-            before,
-            names=Names(
-                name,
-                *(station.operator, station.pen, station.tip, station.cone),
-                station.ball_diameter or None,
-            ),
-            nominal_tip=_parse_point(station.nominal_tip),
-            source=_source(station),
-            second=_second(station),
-            camera_file=None,
-            pen_file=None,
-            mask=_parse_circles(station.mask),
-            limits=_limits(station),
-            assumptions=_assumptions(station),
-        )
-        self._preparation = replace(
-            self._preparation, limits=self._limits_for(self._preparation)
-        )
+        self._reading.relieve()
+        chosen = preparation_of(name, station, before)
+        self._preparation = replace(chosen, limits=self._limits_for(chosen))
         self._choices = self._limited(choices_of(station))
         self._open_files(station)
         self._remember_station()
@@ -315,7 +276,7 @@ class Workbench(QObject):
         before, self._preparation = self._preparation, preparation
         files = before.camera_file, before.pen_file
         if (preparation.camera_file, preparation.pen_file) != files:
-            self._relieve_of_files()
+            self._reading.relieve()
         self._remember_station()
         self._remember()
         self._follow(before)
@@ -359,8 +320,10 @@ class Workbench(QObject):
 
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
-        self._relieve_of_files()
-        self._start(lambda _: open_files(files.camera, files.pen), self._on_chosen_read)
+        self._reading.relieve()
+        self._reading.start(
+            lambda _: open_files(files.camera, files.pen), self._on_chosen_read
+        )
 
     def open_camera(self) -> None:
         """Open the source, or open it again after it failed; then follow its choice.
@@ -377,41 +340,16 @@ class Workbench(QObject):
         clock, known = self._around.clock, self._settings.cameras()
         self.live.open(cameras, CameraSettings(), clock, known)
 
-    def search_cameras(self, kind: str, producer: str) -> None:
-        """Look for the cameras of a source; `cameras_found` or `search_failed` tells.
-
-        A camera that is open is closed first: some libraries end the stream of one
-        while they look for others. Of a search before nothing is told any more.
-        """
-        source = source_named(kind)
-        if source is None:
-            return
-        if self._search is not None:
-            self._search.cancel()
-        was_open = self.live.is_open
-        self.live.close()
-        find, live = source.find, self.live
-
-        def search(_: Report) -> tuple[FoundDevice, ...]:
-            live.await_closed()
-            return find(producer)
-
-        self._search = job = Job(search, self)
-
-        # Connections
-        job.succeeded.connect(self._on_cameras_found)
-        job.failed.connect(self._on_search_failed)
-        job.ended.connect(partial(self._on_search_ended, job, opens=was_open))
-        job.start()
-
     def use_sample_files(self) -> None:
         """Choose the files that go with the simulated camera, once they are written."""
-        self._relieve_of_files()
+        self._reading.relieve()
         self._write_samples()
 
     def _write_samples(self) -> None:
         around, folder = self._around, self._folder / SIMULATED
-        self._start(lambda _: sample_files(around, folder), self._on_chosen_read)
+        self._reading.start(
+            lambda _: sample_files(around, folder), self._on_chosen_read
+        )
 
     def shut_down(self, timeout_s: float = CLOSING_TIME) -> bool:
         """Close the camera, cancel what is under way, and wait until all has ended.
@@ -423,7 +361,7 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
-        self._counting.stop()
+        self.windows.stop()
         self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
@@ -437,13 +375,13 @@ class Workbench(QObject):
             for runner in (self.run.runner, self.verification.runner)
         )
         self.streaming.shut_down()
-        self._presence.leave()
+        self.windows.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 
     def _open_files(self, station: Station) -> None:
         """Read the files of a station; what cannot be read must be chosen again."""
-        self._stop_reading()
+        self._reading.cancel()
         camera_path = Path(station.camera_file) if station.camera_file else None
         pen_path = Path(station.pen_file) if station.pen_file else None
         units = station.pen_units or None
@@ -451,49 +389,15 @@ class Workbench(QObject):
         if any(path is not None for path in (camera_path, pen_path, rig_path)):
             self._unread = station
             samples = self._folder / SIMULATED
-            self._start(
+            self._reading.start(
                 lambda _: files_of_before(
                     *(samples, camera_path, pen_path, units, rig_path)
                 ),
                 self._on_files_read,
             )
 
-    def _start(
-        self,
-        function: Callable[[Report], OpenedFiles],
-        on_succeeded: Callable[[OpenedFiles], None],
-    ) -> None:
-        self._stop_reading()
-        self._reading = job = Job(function, self)
-
-        # Connections
-        job.succeeded.connect(on_succeeded)
-        job.failed.connect(self._on_refused)
-        job.start()
-
-    def _on_refused(self, sentence: str) -> None:
-        self._reading = None
-        self._tell_of_file(sentence)
-
-    def _tell_of_file(self, sentence: str) -> None:
-        """Tell why a file is not chosen, until another is."""
-        self._file_troubles.append(sentence)
-        self.troubled.emit(sentence)
-
-    def _relieve_of_files(self) -> None:
-        """Take back why a file was not chosen: others are."""
-        while self._file_troubles:
-            self.relieved.emit(self._file_troubles.pop())
-
-    def _stop_reading(self) -> None:
-        job, self._reading = self._reading, None
-        if job is not None:
-            job.cancel()
-
     def _on_files_read(self, opened: OpenedFiles) -> None:
-        self._reading, self._unread = None, Station()
-        for trouble in opened.troubles:
-            self._tell_of_file(worded(trouble))
+        self._unread = Station()
         before = self._preparation  # files chosen meanwhile count
         self._preparation = replace(
             before,
@@ -513,9 +417,6 @@ class Workbench(QObject):
             self._write_samples()
 
     def _on_chosen_read(self, opened: OpenedFiles) -> None:
-        self._reading = None
-        for trouble in opened.troubles:
-            self._tell_of_file(worded(trouble))
         before = self._preparation
         self._preparation = replace(
             before,
@@ -554,23 +455,6 @@ class Workbench(QObject):
         if supervision.is_guarded:
             self.set_supervision(supervision)
 
-    def _count_others(self) -> None:
-        """See whether other windows use the same data folder."""
-        if self._counter is not None:  # a disk that does not answer is asked once
-            return
-        presence = self._presence
-        self._counter = job = Job(lambda _: presence.count_others(), self)
-
-        # Connections
-        job.succeeded.connect(self._on_others_counted)
-        job.start()
-
-    def _on_others_counted(self, n_others: int) -> None:
-        self._counter = None
-        if n_others != self._n_others:
-            self._n_others = n_others
-            self.others_counted.emit(n_others)
-
     def _follow_results(self) -> None:
         """See which tip is in force once a result was accepted or taken back."""
         now = self.run.status.result, self.run.status.taken_back
@@ -592,60 +476,16 @@ class Workbench(QObject):
             self._verified_told = files
             self.enter_owed()
 
-    def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:
-        self.cameras_found.emit(found)
-
-    def _on_search_failed(self, why: str) -> None:
-        self.search_failed.emit(why)
-
-    def _on_search_ended(self, job: Job, *, opens: bool) -> None:
-        if job is not self._search:
-            return
-        self._search = None
-        if opens and not self.live.is_open:
-            self.open_camera()
-
     def _remember_station(self) -> None:
         station = self._preparation.names.station
         if station not in ("", TRIAL.station):
             self._settings.set_last_station(station)
 
     def _remember(self) -> None:
-        now = self._preparation
-        names = now.names
-        if names.station in ("", TRIAL.station):
-            return
-        camera_file, pen_file = now.camera_file, now.pen_file
-        unread = self._unread  # files that are being read stay remembered
-        beside = _second_station(now.second, unread)
-        station = Station(
-            operator=names.operator,
-            pen=names.pen,
-            tip=names.tip,
-            cone=names.cone,
-            ball_diameter=names.ball_diameter or 0.0,
-            nominal_tip=_point_text(now.nominal_tip),
-            source=now.source.kind,
-            source_place=now.source.place,
-            source_producer=now.source.producer,
-            camera_file=(
-                unread.camera_file if camera_file is None else str(camera_file.path)
-            ),
-            pen_file=unread.pen_file if pen_file is None else str(pen_file.path),
-            pen_units=(unread.pen_units if pen_file is None else pen_file.units or ""),
-            mask=_circles_text(now.mask),
-            second_source=beside.second_source,
-            second_place=beside.second_place,
-            second_producer=beside.second_producer,
-            second_mask=beside.second_mask,
-            rig_file=beside.rig_file,
-            max_uncertainty=now.limits.max_uncertainty,
-            min_images=now.limits.min_images,
-            max_images=now.limits.max_images,
-            **_assumed_entries(now.assumptions),
-        )
-        kept = with_choices(station, self._choices)
-        self._settings.set_station(names.station, kept)
+        name = self._preparation.names.station
+        if name not in ("", TRIAL.station):
+            station = station_of(self._preparation, self._unread)
+            self._settings.set_station(name, with_choices(station, self._choices))
 
     def _on_settings_troubled(self, why: Sentence) -> None:
         self.troubled.emit(worded(why))
@@ -678,86 +518,3 @@ class Workbench(QObject):
             self.changed.emit()
         if now.sources[camera].source.needs is not Needs.FILES:
             self._settings.set_camera(serial, settings)
-
-
-def _limits(station: Station) -> SwingLimits:
-    """Return the limits of a station, the usual ones if its own make no sense."""
-    try:
-        return SwingLimits(
-            station.max_uncertainty, station.min_images, station.max_images
-        )
-    except ValueError:
-        return SwingLimits()
-
-
-def _assumptions(station: Station) -> Assumptions:
-    """Return what a station assumes, what is usual if that makes no sense."""
-    own = {name: getattr(station, name) for name in ASSUMED}
-    try:
-        others = replace(USUAL, temperature_c=station.temperature_c, **own)
-        return with_focal_length(others, station.focal_length)
-    except ValueError:
-        return USUAL
-
-
-def _assumed_entries(assumptions: Assumptions) -> dict[str, Any]:
-    entries = {name: getattr(assumptions, name) for name in ASSUMED}
-    return entries | {
-        "focal_length": assumptions.focal_length,
-        "temperature_c": assumptions.temperature_c,
-    }
-
-
-def _source(station: Station) -> SourceChoice:
-    if source_named(station.source) is None:  # of a later version
-        return SourceChoice()
-    return SourceChoice(station.source, station.source_place, station.source_producer)
-
-
-def _second(station: Station) -> SecondCamera | None:
-    if source_named(station.second_source) is None:  # none, or of a later version
-        return None
-    source = SourceChoice(
-        station.second_source, station.second_place, station.second_producer
-    )
-    return SecondCamera(source, mask=_parse_circles(station.second_mask))
-
-
-def _second_station(second: SecondCamera | None, unread: Station) -> Station:
-    """Return a station with nothing but what is chosen of its second camera."""
-    if second is None:
-        return Station()
-    file = second.rig_file
-    return Station(
-        second_source=second.source.kind,
-        second_place=second.source.place,
-        second_producer=second.source.producer,
-        second_mask=_circles_text(second.mask),
-        rig_file=unread.rig_file if file is None else str(file.path),
-    )
-
-
-def _point_text(point: FloatArray | None) -> str:
-    return "" if point is None else " ".join(map(repr, point.tolist()))
-
-
-def _parse_point(text: str) -> FloatArray | None:
-    point = _parse_numbers(text)
-    return point if point.shape == (3,) else None
-
-
-def _circles_text(mask: FloatArray) -> str:
-    return "; ".join(" ".join(map(repr, circle)) for circle in mask.tolist())
-
-
-def _parse_circles(text: str) -> FloatArray:
-    circles = [_parse_numbers(part) for part in text.split(";")]
-    return np.array([c for c in circles if c.shape == (3,)]).reshape(-1, 3)
-
-
-def _parse_numbers(text: str) -> FloatArray:
-    try:
-        numbers = np.array([float(word) for word in text.split()])
-    except ValueError:
-        return np.zeros(0)
-    return numbers if np.isfinite(numbers).all() else np.zeros(0)

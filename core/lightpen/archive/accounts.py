@@ -17,12 +17,11 @@ from lightpen.formats.files import read_bytes
 from lightpen.formats.files import sha256 as file_sha256
 from lightpen.record.assessment import Assessment
 from lightpen.record.folder_archive import LIMIT, WHAT, FolderArchive
+from lightpen.record.header import HEADER, copy_name
 from lightpen.record.journal import JOURNAL, journal_bytes
 from lightpen.record.names import Names
 from lightpen.record.reading import (
-    HEADER,
     Record,
-    copy_name,
     open_record,
     recorded_limits,
     recorded_names,

@@ -9,7 +9,7 @@ import socket
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -30,6 +30,7 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
+from lightpen.archive.uses import Uses
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
 from lightpen.formats.files import printable
 from lightpen.record.numbered_files import make_folder
@@ -39,6 +40,7 @@ VERSION = "1"  # of the tables, as the last of the migrations says
 VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
+LONGEST_FAREWELL_S = 2  # for those who use it when it closes
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -79,6 +81,7 @@ class Database:
     engine: Engine
     name: str
     file: Path | None = None
+    _uses: Uses = field(default_factory=Uses, init=False, repr=False, compare=False)
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
@@ -87,9 +90,9 @@ class Database:
         Raises
         ------
         ArchiveError
-            It cannot be read.
+            It cannot be read, or was closed.
         """
-        with self._beginning(self.engine) as connection:
+        with self._uses.one(), self._beginning(self.engine) as connection:
             yield connection
 
     @contextmanager
@@ -99,14 +102,18 @@ class Database:
         Raises
         ------
         ArchiveError
-            It cannot be written.
+            It cannot be written, or was closed.
         """
         engine = self.engine.execution_options(is_writing=True)
-        with self._beginning(engine) as connection:
+        with self._uses.one(), self._beginning(engine) as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it."""
+        """Let go of it, once those who use it now are done.
+
+        A connection that is still in use would stay open after the others.
+        """
+        self._uses.end(LONGEST_FAREWELL_S)
         self.engine.dispose()
 
     @contextmanager

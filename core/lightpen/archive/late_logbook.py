@@ -6,10 +6,10 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from lightpen.errors import ArchiveError
+from lightpen.archive.uses import closed
 from lightpen.record.assessment import Assessment
 from lightpen.record.solving import Solution
-from lightpen.sentences import Sentence, sentence
+from lightpen.sentences import Sentence
 
 if TYPE_CHECKING:
     from lightpen.archive.logbook import Logbook
@@ -67,9 +67,7 @@ class LateLogbook:
         """
         logbook = self._open()
         if logbook is None:
-            raise ArchiveError(
-                sentence("archive.closed", "The archive is closed: the program ends.")
-            )
+            raise closed()
         return logbook
 
     def close(self) -> None:

@@ -65,7 +65,7 @@ LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
 
 
 @dataclass(frozen=True)
-class Delivery:
+class Delivered:
     """How far a server has what was entered.
 
     Attributes
@@ -212,7 +212,7 @@ class Logbook:
         self.enter_owed()
         return result
 
-    def delivery(self) -> Delivery | None:
+    def delivery(self) -> Delivered | None:
         """Return how far the server has what was entered; None if there is no server.
 
         Raises
@@ -224,9 +224,9 @@ class Logbook:
             return None
         n_delivered, trouble = self._courier.n_delivered, self._courier.trouble
         if n_delivered is None:
-            return Delivery(None, trouble)
+            return Delivered(None, trouble)
         ends = {head.chain: head.number for head in heads(self.database)}
-        return Delivery(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
+        return Delivered(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
     def close(self) -> None:
         """Let go of the archive, and seal its file if nobody else has it open.

@@ -23,8 +23,7 @@ from lightpen.formats.files import MEGABYTE, printable, read_bytes, sha256, writ
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
-    has_checksum,
-    parse_json,
+    parse_checked,
     with_checksum,
 )
 from lightpen.sentences import sentence
@@ -94,9 +93,7 @@ def read_seal(archive: Path) -> Seal | None:
         return None
     data = read_bytes(path, sentence("file.seal", "seal"), MEGABYTE)
     try:
-        if not has_checksum(data):
-            raise DamagedError("There is no checksum.")
-        return parse_json(data, Seal)
+        return parse_checked(data, Seal)
     except DamagedError as error:
         raise FileError(
             sentence(

@@ -60,6 +60,19 @@ def parse_json(data: bytes, shape: type[T]) -> T:
     return in_shape(tree, shape)
 
 
+def parse_checked(data: bytes, shape: type[T]) -> T:
+    """Return what a text holds that has its checksum; see `parse_json`.
+
+    Raises
+    ------
+    DamagedError
+        It does not hold that, or has none.
+    """
+    if not has_checksum(data):
+        raise DamagedError("There is no checksum.")
+    return parse_json(data, shape)
+
+
 def in_shape(tree: Any, shape: type[T], *, strict: bool = True) -> T:
     """Return a value that was read as what it must be; see `parse_json`.
 

@@ -15,8 +15,7 @@ from lightpen.formats.hashes import InputFile
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,
-    has_checksum,
-    parse_json,
+    parse_checked,
     require_usual,
 )
 from lightpen.intrinsics.calibration import CameraCalibration
@@ -123,9 +122,7 @@ def read_camera_trial(content: bytes, file: Path) -> KeptTrial:
         It is damaged.
     """
     try:
-        if not has_checksum(content):
-            raise DamagedError("There is no checksum.")
-        return parse_json(content, KeptTrial)
+        return parse_checked(content, KeptTrial)
     except DamagedError as error:
         raise FileError(
             sentence(

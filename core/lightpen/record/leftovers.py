@@ -7,9 +7,10 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.formats.part_files import sweep_parts
 from lightpen.record.folder_archive import RECORDS, RESULTS
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked
-from lightpen.record.reading import HEADER, IMAGES, OPENER
+from lightpen.record.reading import IMAGES, OPENER
 
 OLDEST = 1.0  # s; after it nobody is between making a folder and locking its journal
 

@@ -8,7 +8,8 @@ from lightpen.errors import FileError
 from lightpen.formats.images import IMAGE_FOLDER
 from lightpen.formats.simulated_files import is_simulated
 from lightpen.model.origin import Origin
-from lightpen.record.reading import copy_name, is_record, open_record, recorded_origin
+from lightpen.record.header import copy_name
+from lightpen.record.reading import is_record, open_record, recorded_origin
 
 CAMERA_FILES = ("camera.yaml", "camera.yml", "camera.json", "camera.xml")
 PEN_FILES = ("leds.csv", "pen.json", "leds.json", "pen.csv")

@@ -28,7 +28,8 @@ from lightpen.formats.hashes import Inputs, RigInputs, all_hashed, hashed, kept
 from lightpen.formats.pairing import Pairing
 from lightpen.model.rig import Rig, rig_of
 from lightpen.model.rigid import rotation_from_vector
-from lightpen.record.reading import Record, RecordSource, source
+from lightpen.record.reading import Record
+from lightpen.record.recorded_source import RecordSource, source
 from lightpen.sentences import sentence
 
 TURNS = 8  # steps by which an image that is left out is turned into the fit

@@ -23,8 +23,7 @@ from lightpen.formats.files import MEGABYTE, printable, read_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,
-    has_checksum,
-    parse_json,
+    parse_checked,
     require_usual,
 )
 from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
@@ -135,9 +134,7 @@ def read_limits_change(content: bytes, file: Path) -> LimitsChange:
         It was changed since.
     """
     try:
-        if not has_checksum(content):
-            raise DamagedError("There is no checksum.")
-        return parse_json(content, LimitsChange)
+        return parse_checked(content, LimitsChange)
     except DamagedError as error:
         raise FileError(
             sentence(

@@ -25,7 +25,7 @@ from lightpen.formats.own_json import (
     Digest,
     Moment,
     Vector,
-    has_checksum,
+    parse_checked,
     parse_json,
     require_usual,
 )
@@ -294,9 +294,7 @@ def read_change(file: Path) -> LibraryChange:
     """
     text = read_bytes(file, WHAT, MEGABYTE)
     try:
-        if not has_checksum(text):
-            raise DamagedError("There is no checksum.")
-        number = parse_json(text, _Heading).format
+        number = parse_checked(text, _Heading).format
         if number > FORMAT:
             raise FileError(
                 sentence(

@@ -5,15 +5,10 @@ from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.formats.files import printable, strerror
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked
-from lightpen.record.reading import (
-    DISCARDED,
-    HEADER,
-    IMAGES,
-    Record,
-    open_record,
-)
+from lightpen.record.reading import DISCARDED, IMAGES, Record, open_record
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import Sentence, sentence
 

@@ -9,8 +9,7 @@ from lightpen.formats.files import printable
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,
-    has_checksum,
-    parse_json,
+    parse_checked,
     require_usual,
 )
 from lightpen.model.origin import Origin
@@ -96,9 +95,7 @@ def read_verification(content: bytes, file: Path) -> KeptVerification:
         It is damaged.
     """
     try:
-        if not has_checksum(content):
-            raise DamagedError("There is no checksum.")
-        return parse_json(content, KeptVerification)
+        return parse_checked(content, KeptVerification)
     except DamagedError as error:
         raise FileError(
             sentence(

@@ -23,6 +23,18 @@ from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import printable, sync_folder, why_unwritten, write_whole
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.part_files import sweep_parts
+from lightpen.record.header import (
+    FORMAT,
+    HEADER,
+    RIG_FORMAT,
+    FileCopy,
+    FileEntry,
+    Header,
+    HeaderEntries,
+    RigCopies,
+    RigEntries,
+    header_copies,
+)
 from lightpen.record.journal import (
     JOURNAL,
     CameraCounts,
@@ -39,18 +51,8 @@ from lightpen.record.journal import (
 from lightpen.record.lock import lock_journal, unlock_journal
 from lightpen.record.names import Names, folder_name
 from lightpen.record.reading import (
-    FORMAT,
-    HEADER,
     OPENER,
-    RIG_FORMAT,
-    FileCopy,
-    FileEntry,
-    Header,
-    HeaderEntries,
     Record,
-    RigCopies,
-    RigEntries,
-    header_copies,
     image_name,
     images_folder,
     open_record,

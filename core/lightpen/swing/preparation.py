@@ -25,8 +25,8 @@ from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.record.assumed import Plain, assumption_entries
+from lightpen.record.header import FileCopy, Header, RigCopies
 from lightpen.record.names import Names
-from lightpen.record.reading import FileCopy, Header, RigCopies
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.record.results import Result
 from lightpen.record.tip_library import ListedTip

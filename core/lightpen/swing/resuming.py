@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.model.pen import Pen
+from lightpen.record.header import damaged_file
 from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import (
     Record,
-    damaged_file,
     is_of_recording,
     open_record,
     recorded_limits,
-    source,
 )
+from lightpen.record.recorded_source import source
 from lightpen.record.writing import RecordWriter
 from lightpen.swing.kept_images import kept_before
 from lightpen.swing.preparation import SourceChoice

@@ -18,14 +18,8 @@ from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig, rig_of
-from lightpen.record.reading import (
-    Record,
-    RecordSource,
-    is_record,
-    open_record,
-    recorded_origin,
-    source,
-)
+from lightpen.record.reading import Record, is_record, open_record, recorded_origin
+from lightpen.record.recorded_source import RecordSource, source
 from lightpen.record.recordings import is_simulated_recording
 from lightpen.sentences import sentence
 

@@ -15,9 +15,10 @@ from lightpen.cameras.protocol import Frame
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import FileError
 from lightpen.formats.hashes import InputFile, hashed
+from lightpen.record.header import Header
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, Header, image_name
+from lightpen.record.reading import DISCARDED, image_name
 from lightpen.record.verifications import TOUCHES
 from lightpen.record.writing import OtherView, RecordWriter, make_folder
 from lightpen.verification.session import SessionState, SessionTransition

@@ -1,8 +1,11 @@
 """A database is looked at before it is written to, and said to be what it is."""
 
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from threading import Event
+from time import sleep
 
 import pytest
 from alembic.autogenerate import compare_metadata
@@ -16,6 +19,7 @@ from lightpen.archive.database import (
     MIGRATIONS,
     VERSION,
     VERSION_TABLE,
+    Database,
     look_into,
     open_file,
     open_server,
@@ -159,3 +163,35 @@ def test_tables_of_another_program_on_a_server_are_left_alone(
 
     with pytest.raises(ArchiveError, match="holds the tables of another program"):
         open_server(address)
+
+
+def test_an_archive_closes_after_those_who_use_it(tmp_path: Path) -> None:
+    database = open_file(tmp_path / "archive.sqlite")
+    is_read, may_end = Event(), Event()
+
+    def read() -> None:
+        with database.reading():
+            is_read.set()
+            may_end.wait()
+
+    with ThreadPoolExecutor() as pool:
+        reading = pool.submit(read)
+        is_read.wait()
+        closing_it = pool.submit(database.close)
+        while not _is_refused(database):
+            sleep(0.001)
+        assert not closing_it.done()
+        may_end.set()
+        reading.result()
+        closing_it.result()
+
+    # The last connection takes the journal along.
+    assert [file.name for file in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def _is_refused(database: Database) -> bool:
+    try:
+        with database.reading():
+            return False
+    except ArchiveError:
+        return True

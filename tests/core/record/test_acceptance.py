@@ -47,7 +47,7 @@ from pathlib import Path
 from lightpen.errors import FileError
 from lightpen.record.acceptance import accept
 from lightpen.record.folder_archive import FolderArchive
-from lightpen.record.reading import open_record, recorded_names
+from lightpen.record.reading import (open_record, recorded_names)
 from lightpen.record.solving import solve_record
 
 STEPS = {

@@ -20,13 +20,9 @@ from lightpen.errors import FileError
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.pen_files import PEN_FILE, write_pen
-from lightpen.record.reading import (
-    FileCopy,
-    Header,
-    open_record,
-    record_files,
-    source,
-)
+from lightpen.record.header import FileCopy, Header
+from lightpen.record.reading import open_record, record_files
+from lightpen.record.recorded_source import source
 from lightpen.record.unfinished import find_unfinished
 from lightpen.record.writing import RecordWriter, note_taken_out
 from lightpen.simulator.swings import paper_camera, paper_pen

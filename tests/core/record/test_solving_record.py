@@ -17,8 +17,9 @@ from lightpen.formats.own_json import with_checksum
 from lightpen.model.assumptions import USUAL
 from lightpen.model.limits import SwingLimits
 from lightpen.record.assumed import assumption_entries
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL
-from lightpen.record.reading import HEADER, image_name, open_record, record_files
+from lightpen.record.reading import image_name, open_record, record_files
 from lightpen.record.solving import (
     Solution,
     record_inputs,

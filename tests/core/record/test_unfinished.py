@@ -13,9 +13,10 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.opened_files import CameraFile, PenFile
+from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, HEADER, open_record
+from lightpen.record.reading import DISCARDED, open_record
 from lightpen.record.unfinished import (
     discard_damaged,
     discard_swing,

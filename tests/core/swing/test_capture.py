@@ -25,7 +25,9 @@ from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen
 from lightpen.model.limits import SwingLimits
-from lightpen.record.reading import FileCopy, Header, open_record, source
+from lightpen.record.header import FileCopy, Header
+from lightpen.record.reading import open_record
+from lightpen.record.recorded_source import source
 from lightpen.record.writing import RecordWriter
 from lightpen.sentences import sentence
 from lightpen.simulator.camera import SimulatedCamera

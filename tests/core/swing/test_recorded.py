@@ -15,7 +15,8 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
 from lightpen.messages import Code
 from lightpen.model.origin import Origin
-from lightpen.record.reading import open_record, recorded_origin, source
+from lightpen.record.reading import open_record, recorded_origin
+from lightpen.record.recorded_source import source
 from lightpen.record.solving import solve_record
 from lightpen.swing.preparation import SourceChoice, SourceKind
 from lightpen.swing.resuming import read_resumable

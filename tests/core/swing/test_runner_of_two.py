@@ -16,7 +16,8 @@ from lightpen.errors import FileError
 from lightpen.formats.decoding import decode_image
 from lightpen.formats.own_json import with_checksum
 from lightpen.formats.rig_files import read_rig
-from lightpen.record.reading import open_record, source
+from lightpen.record.reading import open_record
+from lightpen.record.recorded_source import source
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.scene_files import write_sample_files
 from lightpen.swing.preparation import Lack, SourceChoice, SourceKind

@@ -114,8 +114,8 @@ class CameraPage(Rearranged, Page):
         self._exposure.exposure_changed.connect(self._on_exposure_asked)
         self._exposure.gain_changed.connect(self._on_gain_asked)
         self._exposure.adjustment_requested.connect(self._on_adjustment_requested)
-        self._workbench.cameras_found.connect(self._on_cameras_found)
-        self._workbench.search_failed.connect(self._on_search_failed)
+        self._workbench.search.succeeded.connect(self._on_cameras_found)
+        self._workbench.search.failed.connect(self._on_search_failed)
         self._workbench.changed.connect(self._on_workbench_changed)
         self._workbench.run.changed.connect(self._remark_swing)
         self._live.image_shown.connect(self._on_image_shown)
@@ -299,7 +299,7 @@ class CameraPage(Rearranged, Page):
     def _search_for(self, panel: SourcePanel) -> None:
         self._searching.set_searching(False)
         self._searching, source = panel, panel.value()
-        self._workbench.search_cameras(source.kind, source.producer)
+        self._workbench.search.start(source.kind, source.producer)
         panel.set_searching(True)
 
     def _on_cameras_found(self, found: tuple[FoundDevice, ...]) -> None:

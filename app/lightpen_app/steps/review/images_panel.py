@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from lightpen.arrays import Image
 from lightpen.record.image_rows import ImageRow, count_left_out, worst_first
-from lightpen.record.reading import RecordSource
+from lightpen.record.recorded_source import RecordSource
 from lightpen.record.solving import Solution, load_image
 from lightpen_app.look.arrows import arrow_scale
 from lightpen_app.look.phrases import reason_text

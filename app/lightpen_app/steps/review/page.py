@@ -3,14 +3,12 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Slot
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QTimer, Slot
 from PySide6.QtWidgets import (
     QApplication,
     QBoxLayout,
-    QFileDialog,
     QHBoxLayout,
     QProgressBar,
     QTabWidget,
@@ -19,25 +17,14 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen.archive.entered import entry_of_file
-from lightpen.errors import FileError
 from lightpen.estimation.verdict import Grade, NextStep
-from lightpen.local_time import local_time
 from lightpen.record.acceptance import takes_supervisor
 from lightpen.record.assessment import Assessment
-from lightpen.record.exports import export_json, export_tables, tip_text
 from lightpen.record.next_tips import NextTip, next_tips
 from lightpen.record.results import Result
-from lightpen.record.retraced import Retraced, retrace
-from lightpen.record.statement import Entered, Statement, read_statement
-from lightpen.sentences import Sentence
 from lightpen.swing.status import Activity
-from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import accepted_phrase, grade_text, phrase
 from lightpen_app.look.sentences import worded
-from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone
-from lightpen_app.look.words import shortened
+from lightpen_app.look.theme import GRID, TextSize
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.review.late_panels import (
     make_images_panel,
@@ -48,16 +35,17 @@ from lightpen_app.steps.review.late_panels import (
 from lightpen_app.steps.review.next_tips_row import NextTipsRow
 from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
-from lightpen_app.steps.review.result_tools import Export, ResultTools
+from lightpen_app.steps.review.result_tools import ResultTools
+from lightpen_app.steps.review.state_words import remarks, review_state, step_of_file
+from lightpen_app.steps.review.taking_along import TakingAlong
 from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.reason_bar import ReasonBar
-from lightpen_app.widgets.sign_label import Remark
-from lightpen_app.widgets.state_banner import State, StateBanner
-from lightpen_app.work.job import Job, Report
+from lightpen_app.widgets.state_banner import StateBanner
+from lightpen_app.work.job import Job
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
 
@@ -68,9 +56,6 @@ if TYPE_CHECKING:
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH = 46 * GRID
 ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
-# What the sentence of a verdict has in it whose cause is the intrinsics file.
-OF_CAMERA = {"share.camera", "share.rig", "warning.camera-file-contradicted"}
-Read: TypeAlias = tuple[Statement, Retraced | None, Entered | None]
 
 
 class ReviewPage(Rearranged, Page):
@@ -88,9 +73,8 @@ class ReviewPage(Rearranged, Page):
         self._result_shown: Result | None = None
         self._wants_more = self._repeats = self._to_next_tip = False
         self._place = SavePlace(workbench)
+        self._along = TakingAlong(self._run, self._place, self._save_plots, self)
         self._search: Job | None = None
-        self._saving: Job | None = None
-        self._reading: Job | None = None
         self._on_yes: Callable[[], object] = self._repeat_swing
 
         # Widgets
@@ -151,10 +135,9 @@ class ReviewPage(Rearranged, Page):
         self._question.declined.connect(self._tabs.setFocus)
         self._images.made.connect(self._on_images_made)
         self._tabs.currentChanged.connect(self._fill_tab)
-        self._tools.folder_requested.connect(self._open_folder)
-        self._tools.copy_requested.connect(self._copy_tip)
-        self._tools.save_requested.connect(self._ask_folder)
-        self._tools.paper_requested.connect(self._read_paper)
+        self._along.follow(self._tools)
+        self._along.told.connect(self.status_changed)
+        self._along.failed.connect(self.notice_raised)
         workbench.library.changed.connect(self._show_standings)
         self._next_tips.chosen.connect(self._on_next_tip_chosen)
         for panel in self._panels:
@@ -230,7 +213,7 @@ class ReviewPage(Rearranged, Page):
             case NextStep.CAPTURE_MORE if not self._is_recording:
                 self._on_capture_more_clicked()
             case NextStep.CHECK_FILES:
-                self.step_requested.emit(_step_of_file(status.verdict.reason))
+                self.step_requested.emit(step_of_file(status.verdict.reason))
             case _:
                 self._ask_to_repeat()
 
@@ -259,9 +242,9 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
-        for job in (self._search, self._saving, self._reading):
-            if job is not None:
-                job.cancel()
+        if self._search is not None:
+            self._search.cancel()
+        self._along.shut_down()
         images = self._images.content_so_far()
         if images is not None:
             images.shut_down()
@@ -479,8 +462,8 @@ class ReviewPage(Rearranged, Page):
 
     def _refresh_words(self) -> None:
         status = self._run.status
-        self._banner.set_value(self._state())
-        self._remarks.set_value(self._warnings())
+        self._banner.set_value(review_state(status))
+        self._remarks.set_value(remarks(status, self._workbench.preparation.names))
         why_locked = self._why_locked()
         images = self._images.content_so_far()
         if images is not None:
@@ -510,51 +493,6 @@ class ReviewPage(Rearranged, Page):
             button.setVisible(not is_accepted and button.text() != main)
         self._verify.setVisible(is_accepted)
         self._take_back.setVisible(is_accepted)
-
-    def _state(self) -> State:
-        status = self._run.status
-        if status.result is not None:
-            return self._accepted_state(status.result)
-        if status.verdict is None:
-            text = self.tr("The tip shows here once the pen is swung.")
-            return State(self.tr("NO TIP YET"), text, Sign.WAIT, Tone.QUIET)
-        heading = None if status.state is None else status.state.heading
-        said = phrase(status.verdict.reason, heading)
-        sign, tone = GRADE_MARKS[status.verdict.grade]
-        word = self.tr("{0}: {1}").format(grade_text(status.verdict.grade), said.short)
-        return State(word, said.hint, sign, tone)
-
-    def _accepted_state(self, result: Result) -> State:
-        since = f"{local_time(result.accepted):%Y-%m-%d %H:%M:%S}"
-        told = accepted_phrase(result.origin)
-        text = self.tr("Since {0}. Earlier results are kept.").format(since)
-        if result.reason:
-            text = self.tr("Since {0}, to be checked; accepted with the reason: {1}")
-            text = text.format(since, result.reason)
-        sign, tone = GRADE_MARKS[Grade(result.grade)]
-        return State(told.short, " ".join(filter(None, (told.hint, text))), sign, tone)
-
-    def _warnings(self) -> tuple[Remark, ...]:
-        status = self._run.status
-        if status.assessment is None:
-            return ()
-        texts = [
-            self._other_names(),
-            *map(worded, status.assessment.doubts),
-        ]
-        return tuple(Remark(text, Sign.WARNING, Tone.WARN) for text in texts if text)
-
-    def _other_names(self) -> str:
-        """Return that the step Start names another pen or tip by now."""
-        swung, named = self._run.status.names, self._workbench.preparation.names
-        if (swung.pen, swung.tip) == (named.pen, named.tip):
-            return ""
-        text = self.tr(
-            "This swing is of tip {0}, pen {1}, whatever the step Start names now: tip "
-            "{2}, pen {3}."
-        )
-        names = (swung.tip, swung.pen, named.tip, named.pen)
-        return text.format(*map(shortened, names))
 
     def _on_progressed(self, fraction: float) -> None:
         self._progress.setValue(round(100 * fraction))
@@ -610,7 +548,7 @@ class ReviewPage(Rearranged, Page):
             operator = self._workbench.preparation.names.operator
             self._run.runner.take_back(result, operator)
 
-    # What comes next, and what is taken along
+    # What comes next
 
     def _search_next_tips(self, result: Result | None) -> None:
         """Look for the other tips of the pen whose tip was accepted."""
@@ -641,99 +579,14 @@ class ReviewPage(Rearranged, Page):
         workbench.set_preparation(replace(chosen, names=names))
         self._to_next_tip = True
 
-    def _open_folder(self) -> None:
-        folder = self._run.status.record_folder
-        if folder is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
-
-    def _copy_tip(self) -> None:
-        solution = self._run.status.solution
-        if solution is not None:
-            QApplication.clipboard().setText(tip_text(solution))
-            self.status_changed.emit(self.tr("The tip is copied: x, y, z in mm."))
-
-    def _ask_folder(self, export: Export) -> None:
-        dialog = QFileDialog(self, self.tr("Folder to save in"))
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setFileMode(QFileDialog.FileMode.Directory)
-        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
-        dialog.setDirectory(str(self._place.folder()))
-        dialog.fileSelected.connect(lambda path: self._save(export, Path(path)))
-        dialog.open()
-
-    def _save(self, export: Export, folder: Path) -> None:
-        """Save what is wanted; plots at once, as only the GUI can draw them."""
-        status, stem = self._run.status, self._place.stem()
-        solution, names = status.solution, status.names
-        if solution is None:
-            return
-        self._place.remember(folder)
-        if export in (Export.PLOTS, Export.ALL):
-            try:
-                self._save_plots(folder, stem)
-            except FileError as error:
-                self.notice_raised.emit(worded(error.sentence))
-                return
-
-        def write(_: Report) -> None:
-            if export in (Export.JSON, Export.ALL):
-                export_json(solution, folder, stem)
-            if export in (Export.CSV, Export.ALL):
-                export_tables(solution, names, folder, stem)
-
-        self._saving = job = Job(write, self)
-
-        # Connections
-        job.succeeded.connect(lambda _: self._tell_saved(folder))
-        job.failed.connect(self.notice_raised)
-        job.start()
-
-    def _read_paper(self) -> None:
-        """Show the record on paper, of the result as it is on the disk."""
-        result, archive = self._run.status.result, self._run.archive
-        if result is None:
-            return
-
-        def read(_: Report) -> Read:
-            file = archive.file_of(result)
-            statement = read_statement(file)
-            retraced = retrace(statement.calibration)
-            return statement, retraced, entry_of_file(file, statement.sha256)
-
-        self._reading = job = Job(read, self)
-
-        # Connections
-        job.succeeded.connect(self._show_paper)
-        job.failed.connect(self.notice_raised)
-        job.start()
-
-    def _show_paper(self, read: Read) -> None:
-        # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app.paper.preview import PaperWindow
-        from lightpen_app.paper.printing import paper_of
-
-        window = PaperWindow(paper_of(*read), self._place, self)
-        window.saved.connect(lambda path: self._tell_saved(path.parent))
-        window.failed.connect(self.notice_raised)
-        window.show()
-
     def _save_plots(self, folder: Path, stem: str) -> None:
         for panel in self._panels:
             self._show_solution(panel.content())
             for card in panel.content().cards():
                 card.save_beside(folder, stem)
 
-    def _tell_saved(self, folder: Path) -> None:
-        self.status_changed.emit(self.tr("Saved in {0}").format(folder))
-
     def _on_run_troubled(self) -> None:
         self._repeats = False
         images = self._images.content_so_far()
         if images is not None:
             images.forget_refused()
-
-
-def _step_of_file(reason: Sentence) -> str:
-    """Return the key of the step at which the file is opened that a reason names."""
-    codes = {part.code for part in reason.parts()}
-    return "camera" if codes & OF_CAMERA else "leds"

@@ -146,7 +146,7 @@ class StartPage(Rearranged, Page):
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         self._folder.change_requested.connect(self.data_folder_requested)
-        workbench.others_counted.connect(self._folder.set_others)
+        workbench.windows.counted.connect(self._folder.set_others)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.swing_wanted.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)

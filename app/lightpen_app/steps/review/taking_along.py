@@ -1,0 +1,152 @@
+"""Takes a tip along: its folder, its numbers, files of it, and its record on paper."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeAlias
+
+from PySide6.QtCore import QObject, Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
+
+from lightpen.archive.entered import entry_of_file
+from lightpen.errors import FileError
+from lightpen.record.exports import export_json, export_tables, tip_text
+from lightpen.record.retraced import Retraced, retrace
+from lightpen.record.statement import Entered, Statement, read_statement
+from lightpen_app.look.sentences import worded
+from lightpen_app.steps.review.result_tools import Export, ResultTools
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.save_place import SavePlace
+from lightpen_app.work.swing_run import SwingRun
+
+Read: TypeAlias = tuple[Statement, Retraced | None, Entered | None]
+SavePlots: TypeAlias = Callable[[Path, str], None]
+
+
+class TakingAlong(QObject):
+    """Does what is asked for by the tools of a result.
+
+    Parameters
+    ----------
+    run : SwingRun
+        With the tip.
+    place : SavePlace
+    save_plots : callable
+        Saves all plots in a folder, under names that begin with a stem; only the page
+        can draw them.
+    page : QWidget
+        Whose windows are opened.
+
+    Signals
+    -------
+    told(str)
+        What was done.
+    failed(str)
+        The sentence why something was not.
+    """
+
+    told = Signal(str)
+    failed = Signal(str)
+
+    def __init__(
+        self, run: SwingRun, place: SavePlace, save_plots: SavePlots, page: QWidget
+    ) -> None:
+        super().__init__(page)
+        self._run = run
+        self._place = place
+        self._save_plots = save_plots
+        self._page = page
+        self._saving: Job | None = None
+        self._reading: Job | None = None
+
+    def follow(self, tools: ResultTools) -> None:
+        """Do what these ask for."""
+        tools.folder_requested.connect(self._open_folder)
+        tools.copy_requested.connect(self._copy_tip)
+        tools.save_requested.connect(self._ask_folder)
+        tools.paper_requested.connect(self._read_paper)
+
+    def shut_down(self) -> None:
+        """Tell of nothing any more."""
+        for job in (self._saving, self._reading):
+            if job is not None:
+                job.cancel()
+
+    def _open_folder(self) -> None:
+        folder = self._run.status.record_folder
+        if folder is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
+
+    def _copy_tip(self) -> None:
+        solution = self._run.status.solution
+        if solution is not None:
+            QApplication.clipboard().setText(tip_text(solution))
+            self.told.emit(self.tr("The tip is copied: x, y, z in mm."))
+
+    def _ask_folder(self, export: Export) -> None:
+        dialog = QFileDialog(self._page, self.tr("Folder to save in"))
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setOption(QFileDialog.Option.ShowDirsOnly)
+        dialog.setDirectory(str(self._place.folder()))
+        dialog.fileSelected.connect(lambda path: self._save(export, Path(path)))
+        dialog.open()
+
+    def _save(self, export: Export, folder: Path) -> None:
+        """Save what is wanted; plots at once, as only the GUI can draw them."""
+        status, stem = self._run.status, self._place.stem()
+        solution, names = status.solution, status.names
+        if solution is None:
+            return
+        self._place.remember(folder)
+        if export in (Export.PLOTS, Export.ALL):
+            try:
+                self._save_plots(folder, stem)
+            except FileError as error:
+                self.failed.emit(worded(error.sentence))
+                return
+
+        def write(_: Report) -> None:
+            if export in (Export.JSON, Export.ALL):
+                export_json(solution, folder, stem)
+            if export in (Export.CSV, Export.ALL):
+                export_tables(solution, names, folder, stem)
+
+        self._saving = job = Job(write, self)
+
+        # Connections
+        job.succeeded.connect(lambda _: self._tell_saved(folder))
+        job.failed.connect(self.failed)
+        job.start()
+
+    def _read_paper(self) -> None:
+        """Show the record on paper, of the result as it is on the disk."""
+        result, archive = self._run.status.result, self._run.archive
+        if result is None:
+            return
+
+        def read(_: Report) -> Read:
+            file = archive.file_of(result)
+            statement = read_statement(file)
+            retraced = retrace(statement.calibration)
+            return statement, retraced, entry_of_file(file, statement.sha256)
+
+        self._reading = job = Job(read, self)
+
+        # Connections
+        job.succeeded.connect(self._show_paper)
+        job.failed.connect(self.failed)
+        job.start()
+
+    def _show_paper(self, read: Read) -> None:
+        # Printing takes long to be imported, and few swings are printed.
+        from lightpen_app.paper.preview import PaperWindow
+        from lightpen_app.paper.printing import paper_of
+
+        window = PaperWindow(paper_of(*read), self._place, self._page)
+        window.saved.connect(lambda path: self._tell_saved(path.parent))
+        window.failed.connect(self.failed)
+        window.show()
+
+    def _tell_saved(self, folder: Path) -> None:
+        self.told.emit(self.tr("Saved in {0}").format(folder))
