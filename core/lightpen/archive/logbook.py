@@ -28,13 +28,12 @@ from lightpen.archive.accounts import (
     account_of_unreadable,
 )
 from lightpen.archive.chains import (
+    EnteredPlaces,
     append,
-    entered_places,
     entry_of_result,
     heads,
     own_chain,
     records_of,
-    searchable,
 )
 from lightpen.archive.courier import Courier
 from lightpen.archive.database import Database, open_file
@@ -109,6 +108,7 @@ class Logbook:
         except ArchiveError:
             self.database.close()
             raise
+        self._entered = EnteredPlaces(self.database, self.chain)
         self._courier = Courier(self.database, self.chain, server) if server else None
 
     def enter_owed(
@@ -133,8 +133,8 @@ class Logbook:
             Nothing can be entered.
         """
         with self._lock:
-            entered = entered_places(self.database, self.chain)
-            owed, troubles = tuple(self._owed(entered)), []
+            self._entered.read()
+            owed, troubles = tuple(self._owed()), []
             for n_done, path in enumerate(owed):
                 report(n_done / len(owed))
                 try:
@@ -241,18 +241,18 @@ class Logbook:
                 self._courier.close(LONGEST_FAREWELL_S)
             close_sealed(self.database)
 
-    def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
+    def _owed(self) -> Iterator[Path]:
         """Yield the files, and then the swings, that have no entry."""
         own = (*library_files(self._data), *station_files(self._data))
         for file in (*self._results.all_files(), *own):
-            if not self._is_in(entered, file):
+            if not self._is_entered(file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):
-            if not self._is_in(entered, folder):
+            if not self._is_entered(folder):
                 yield folder
 
-    def _is_in(self, entered: frozenset[str], path: Path) -> bool:
-        return searchable(self._results.place_of(path)) in entered
+    def _is_entered(self, path: Path) -> bool:
+        return self._results.place_of(path) in self._entered
 
     def _account_of(self, path: Path) -> Account:
         if path.parent.name == LIBRARY:
