@@ -31,7 +31,8 @@ Each command first sets up whatever it needs."""
 
 ROOT = Path(__file__).resolve().parent
 PIP = "pip>=25.1"
-PARALLEL = ("--numprocesses", "auto", "--dist", "worksteal")
+# All tests of a file in one process: what they share is made once.
+PARALLEL = ("--numprocesses", "auto", "--dist", "loadfile", "--no-loadscope-reorder")
 CHECKS = (
     ("ruff", "check"),
     ("ruff", "format", "--check"),

@@ -29,7 +29,7 @@ def main(data: Path) -> int:
     from lightpen_app.look.theme import DARK, apply_theme, load_fonts
     from lightpen_app.steps.history.history_table import UNREAD, WHEN, HistoryTable
     from lightpen_app.steps.history.page import HistoryPage
-    from lightpen_app.steps.history.trend_panel import TrendPanel
+    from lightpen_app.widgets.trend_panel import TrendPanel
     from lightpen_app.work.settings import Settings
     from lightpen_app.work.workbench import Workbench
 

@@ -31,9 +31,9 @@ from benchmarks.rows import Row
 from lightpen.errors import FileError, LightpenError
 from lightpen.formats.camera_files import read_camera, write_camera
 from lightpen.formats.decoding import read_image
-from lightpen.formats.images import find_images
 from lightpen.formats.observation_files import read_centers, read_poses
 from lightpen.formats.pen_files import read_pen, read_raw_pen, write_pen
+from lightpen.formats.videos import count_frames, frame_loaders
 from lightpen.simulator.swings import paper_camera, paper_pen
 
 N_FILES = 20_000
@@ -213,7 +213,7 @@ def _video_samples(folder: Path) -> Iterator[Sample]:
 
 
 def _read_video(path: Path) -> None:
-    for load in find_images(str(path)).open():
+    for load in frame_loaders(path, count_frames(path)):
         try:
             load()
         except FileError:

@@ -16,7 +16,8 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import simulate_centers, swing_poses
 from lightpen.simulator.toucher import Artefacts, Toucher
 from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import SessionSetup, SessionState, advance
+from lightpen.verification.session import advance
+from lightpen.verification.session_state import SessionSetup, SessionState
 
 N_IMAGES = 60  # of the swing that the tip is by
 SIGMA = 0.03  # px

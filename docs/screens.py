@@ -56,8 +56,8 @@ from lightpen.swing.resuming import read_resumable
 from lightpen.swing.rules import advance
 from lightpen.swing.state import SwingSetup, SwingState, start_swing
 from lightpen.verification.choices import TaskKind, VerificationChoices
-from lightpen.verification.session import SessionSetup, SessionState
 from lightpen.verification.session import advance as advance_session
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen_app.application import Wizard, make_application
 from lightpen_app.look.languages import Language
 from lightpen_app.look.pooling import pooled

@@ -28,6 +28,7 @@ from lightpen.record.results import Result
 from lightpen.simulator.swings import (
     PAPER_CONE,
     PAPER_TIP,
+    perturbed_pen,
     simulate_centers,
     swing_poses,
 )
@@ -38,8 +39,17 @@ SIGMA = 0.01  # px
 ACCEPTED = datetime(2031, 4, 30, 12, tzinfo=UTC)
 
 
-def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
-    """Put a tip in force by a simulated swing; return the file of its result."""
+def accept_tip(
+    data: Path, preparation: Preparation, seed: int = 3, led_error: float = 0.0
+) -> Path:
+    """Put a tip in force by a simulated swing; return the file of its result.
+
+    Parameters
+    ----------
+    led_error : float
+        Standard deviation of the LEDs off their places in the file, mm; in each swing
+        of the pen the same.
+    """
     pen, rig_file = preparation.pen_file, preparation.rig_file
     assert pen is not None
     origin = preparation.origin
@@ -51,7 +61,8 @@ def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
         files = all_hashed(rig_file.camera_files)
         rig_inputs = RigInputs(hashed(rig_file.path), files)
     found = _calibrated(
-        camera_file, pen.path, seed, None if rig_file is None else rig_file.path
+        *(camera_file, pen.path, seed, led_error),
+        None if rig_file is None else rig_file.path,
     )
     inputs = Inputs(
         *(hashed(camera_file), hashed(pen.path), (), None),
@@ -79,14 +90,19 @@ def accept_tip(data: Path, preparation: Preparation, seed: int = 3) -> Path:
 
 @cache
 def _calibrated(
-    camera_file: Path, pen_file: Path, seed: int, rig_file: Path | None
+    camera_file: Path,
+    pen_file: Path,
+    seed: int,
+    led_error: float,
+    rig_file: Path | None,
 ) -> Calibration:
     rig = (
         rig_of(read_camera(camera_file)) if rig_file is None else read_rig(rig_file).rig
     )
     pen, rng = read_pen(pen_file), np.random.default_rng(seed)
-    swing = swing_poses(N_IMAGES, rng, pen=pen, camera=rig.cameras[0])
-    pixels = seen_by(rig, pen, swing.rotations, swing.translations, rng)
+    true_pen = perturbed_pen(pen, led_error, np.random.default_rng(9))
+    swing = swing_poses(N_IMAGES, rng, pen=true_pen, camera=rig.cameras[0])
+    pixels = seen_by(rig, true_pen, swing.rotations, swing.translations, rng)
     seen = [
         observe_centers(
             Centers(np.arange(1, N_IMAGES + 1), each, Path("swing.csv")), camera, pen

@@ -1,5 +1,6 @@
 """Fixtures that every test may use."""
 
+import gc
 import io
 import json
 import os
@@ -48,6 +49,17 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 def pytest_xdist_auto_num_workers() -> int:
     """Let one more process work than there are cores: some tests wait, for a camera."""
     return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes longest, so that no process is left with it at the end."""
+    items.sort(key=lambda item: _how_small(item.path))
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass by thousands of tests, which stay."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -110,7 +122,7 @@ def second_loopback(loopback: str) -> Iterator[str]:
     from tests.gige_simulator import SECOND_ADDRESS
 
     words = ("ip", "address", "{0}", f"{SECOND_ADDRESS}/8", "dev", "lo")
-    added = [word.format("add") for word in words]
+    added = [word.format("replace") for word in words]  # a killed run left it there
     if shutil.which("ip") is None or subprocess.run(added, check=False).returncode:
         if os.environ.get("LIGHTPEN_CAMERAS") == "required":
             pytest.fail("The loopback needs a second address.")
@@ -417,6 +429,12 @@ def truth() -> Callable[[Path], dict[str, Any]]:
         return fields
 
     return read
+
+
+def _how_small(file: Path) -> tuple[bool, bool]:
+    """Return a key of a test file: the whole program, its windows, then its parts."""
+    place = file.relative_to(Path(__file__).parent).parent.parts
+    return len(place) > 1, place[:1] != ("app",)
 
 
 def _record_swing(

@@ -1383,3 +1383,32 @@ def test_more_images_than_can_be_held_are_not_simulated(
     assert outcome.returncode == 2
     assert "at most 30000 images" in outcome.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "number"),
+    [
+        ("--form-error", "1e308"),
+        ("--center-bias", "1e300"),
+        ("--distance-sigma", "1e-300"),
+        ("--temperature-sigma", "1e9"),
+        ("--scale-sigma", "1e-300"),
+    ],
+)
+def test_an_uncertainty_that_nothing_has_is_refused(
+    option: str, number: str, swing: Swing, lightpen: Run
+) -> None:
+    outcome = swing.calibrate(lightpen, option, number)
+
+    assert outcome.returncode == 2
+    assert f"argument {option}: {number} " in outcome.stderr
+    assert outcome.stderr.rstrip().endswith(".")
+
+
+def test_a_nominal_tip_that_no_record_holds_is_refused(
+    swing: Swing, lightpen: Run
+) -> None:
+    outcome = swing.calibrate(lightpen, "--nominal-tip", "1e9", "0", "0")
+
+    assert outcome.returncode == 2
+    assert "1e9 is too large a number" in outcome.stderr

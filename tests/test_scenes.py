@@ -232,7 +232,7 @@ def test_images_without_any_pen_are_refused(
 def test_images_of_any_depth_give_the_tip_to_8_um(
     bits: str, scene: Scene, record: Record, truth: Truth
 ) -> None:
-    folder = scene("--bits", bits, "--images", "20", "--seed", "8")
+    folder = scene("--bits", bits, "--images", "12", "--seed", "8")
     image = cv2.imread(str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED)
     assert image is not None
     assert image.dtype == (np.uint8 if bits == "8" else np.uint16)
@@ -308,7 +308,7 @@ def test_one_image_again_and_again_is_refused(
 def test_another_layout_gives_its_tip_or_is_refused(
     pen: str, seed: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--pen", pen, "--images", "40", "--seed", seed)
+    folder = scene("--pen", pen, "--images", "24", "--seed", seed)
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
@@ -352,7 +352,7 @@ def test_the_file_of_another_pen_is_refused(
     pen: str, scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
     images = scene("--images", "40", "--seed", "8")
-    other = scene("--pen", pen, "--images", "40", "--seed", "1")
+    other = scene("--pen", pen, "--images", "24", "--seed", "1")
     assert_pen_refused(lightpen, images, other / "leds.csv", tmp_path / "some")
 
 
@@ -360,6 +360,6 @@ def test_the_file_of_another_pen_is_refused(
 def test_the_file_of_another_pen_is_refused_for_independent_images(
     pen: str, scene: Scene, lightpen: Run, shared_data: Path, tmp_path: Path
 ) -> None:
-    other = scene("--pen", pen, "--images", "40", "--seed", "1")
+    other = scene("--pen", pen, "--images", "24", "--seed", "1")
     clean = shared_data / "swing-clean"
     assert_pen_refused(lightpen, clean, other / "leds.csv", tmp_path / "some")

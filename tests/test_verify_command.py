@@ -216,6 +216,27 @@ def test_one_end_touched_twice_is_refused(
     assert "one end was touched again" in outcome.stderr
 
 
+def test_points_are_told_with_the_ball_compensated_along_the_axis(
+    shared_data: Path, lightpen: Run, files: list[str | Path], tmp_path: Path
+) -> None:
+    """No image shows where the tip came from, as each is a touch of its own."""
+    touched = ("verify", "touches", shared_data / "fixed-point", *files)
+
+    centre = lightpen(*touched, "--json", tmp_path / "centre.json")
+    surface = lightpen(
+        *(*touched, "--ball-diameter", "4"), *("--json", tmp_path / "surface.json")
+    )
+
+    assert centre.returncode == 0, centre.stderr
+    assert "Points in the camera frame, mm" in surface.stdout
+    one, other = (
+        np.array([each["point_cam_mm"] for each in read(tmp_path / name)["touches"]])
+        for name in ("centre.json", "surface.json")
+    )
+    np.testing.assert_allclose(np.linalg.norm(other - one, axis=1), 2.0, atol=1e-9)
+    assert read(tmp_path / "centre.json")["verdict"] is None
+
+
 def test_files_that_are_missing_or_would_be_lost_are_named(
     shared_data: Path, lightpen: Run, files: list[str | Path], tip: Path
 ) -> None:

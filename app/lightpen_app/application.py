@@ -20,10 +20,12 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from lightpen.cameras.clock import MachineClock, SkippingClock
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.errors import UsageError
 from lightpen.estimation.summary import calibration_text
 from lightpen.live.sources import Surroundings
 from lightpen.sentences import sentence
+from lightpen.simulator.camera import SERIAL
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
@@ -42,6 +44,8 @@ from lightpen_app.work.workbench import Workbench
 # s after which a thread that computes lets the window go on. A change of theme calls
 # thousands of methods, and by Python's 5 ms each would wait for the live images.
 SWITCH_INTERVAL = 0.0005
+
+UNSEEN_FRAME_RATE = 8.0  # 1/s; of a demo that nobody watches, enough to swing by
 
 MakePages: TypeAlias = Callable[[Workbench, Sounds], Sequence[Page]]
 
@@ -93,7 +97,8 @@ class Wizard(QObject):
         self.workbench.troubled.connect(self.window.show_notice)
         self.window.closing.connect(self.workbench.shut_down)
         self.window.attention_changed.connect(self.workbench.live.set_watched)
-        self.workbench.windows.counted.connect(self._on_others_counted)
+        self.workbench.folder_watch.counted.connect(self._on_others_counted)
+        self.workbench.folder_watch.doubted.connect(self._on_folder_doubted)
         self.workbench.subject_changed.connect(self.window.set_subject)
         self.workbench.relieved.connect(self.window.drop_notice)
         self.workbench.streaming.changed.connect(self._on_streaming_changed)
@@ -102,6 +107,11 @@ class Wizard(QObject):
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._apply_appearance)
 
         self._stream()
+
+    def _on_folder_doubted(self, trouble: str) -> None:
+        """Say where another data folder is chosen while nothing can be kept in it."""
+        folder = str(self.workbench.folder)
+        self.window.set_unwritable(folder if trouble else "", trouble)
 
     def _on_others_counted(self, n_others: int) -> None:
         """Say that other windows use the same data folder, while they do."""
@@ -212,6 +222,8 @@ def run_demo(make_pages: MakePages) -> int:
         settings = Settings(Path(folder) / "lightpen.json")
         users = Settings(settings_file()).preferences()
         settings.set_preferences(replace(users, streams=False))
+        if not is_seen:
+            settings.set_camera(SERIAL, CameraSettings(frame_rate=UNSEEN_FRAME_RATE))
         wizard = Wizard(application, make_pages, settings, Path(folder), around)
         demo = Demo(wizard.window, wizard.workbench, is_watched=is_seen)
         if not is_seen:

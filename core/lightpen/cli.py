@@ -146,14 +146,14 @@ def _parser(
         command = commands.add_parser(name, help=told)
         if name in given:
             resolve_name(f"lightpen.commands.{function}")(command)
-    add_archive(
-        commands.add_parser("archive", help="check, list, send and take up entries"),
-        usual_data_folder if desktop is None else desktop.data_folder,
-    )
-    add_tips(
-        commands.add_parser("tips", help="the library of pens, tips and cones"),
-        usual_data_folder if desktop is None else desktop.data_folder,
-    )
+    data_folder = usual_data_folder if desktop is None else desktop.data_folder
+    for name, told, add in (
+        ("archive", "check, list, send and take up entries", add_archive),
+        ("tips", "the library of pens, tips and cones", add_tips),
+    ):
+        command = commands.add_parser(name, help=told)
+        if name in given:
+            add(command, data_folder)
     return parser, commands.choices
 
 

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess
 
@@ -67,6 +68,7 @@ def environment_of(
     """Return a function that makes a locale, where the system can, and chooses it."""
     folder = tmp_path_factory.mktemp("locales")
 
+    @cache
     def environment(name: str) -> dict[str, str]:
         code = name if name == USUAL else f"{name}.UTF-8"
         if name != USUAL and shutil.which("localedef"):

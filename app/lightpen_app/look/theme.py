@@ -265,9 +265,9 @@ def set_tone(widget: QWidget, tone: Tone) -> None:
     _set_styled(widget, "tone", tone.value)
 
 
-def set_size(label: QLabel, size: TextSize) -> None:
-    """Let a label have another place of the type scale."""
-    _set_styled(label, "scale", size.name.lower())
+def set_size(widget: QWidget, size: TextSize) -> None:
+    """Let a label or a table have another place of the type scale."""
+    _set_styled(widget, "scale", size.name.lower())
 
 
 def _set_styled(widget: QWidget, name: str, value: str) -> None:

@@ -1,9 +1,10 @@
 """Names and moments as they are shown."""
 
 import re
+from collections.abc import Iterable
 from datetime import datetime
 
-from PySide6.QtCore import QDateTime, QLocale
+from PySide6.QtCore import QCoreApplication, QDateTime, QLocale
 
 LONGEST_SHOWN = 32  # characters
 LONGEST_WORD = 24  # characters; what is longer may be parted
@@ -14,6 +15,11 @@ PARTED = "  \u00b7  "  # between things told in one line
 def shortened(name: str, longest: int = LONGEST_SHOWN) -> str:
     """Return a name that fits into a line; its end is left out if it is long."""
     return name if len(name) <= longest else f"{name[: longest - 1]}\u2026"
+
+
+def listed(words: Iterable[str]) -> str:
+    """Return words one behind the other, parted by the comma of the language."""
+    return QCoreApplication.translate("words", ", ").join(words)
 
 
 def breakable(text: str) -> str:

@@ -15,6 +15,7 @@ from lightpen_app.look.quantities import (
     number_text,
 )
 from lightpen_app.look.theme import LIGHT
+from lightpen_app.look.words import listed
 from lightpen_app.paper.charts import row_of_charts
 from lightpen_app.paper.figures import (
     certainty_chart,
@@ -228,7 +229,7 @@ def _dropped(calibration: StatedCalibration) -> str:
     dropped = calibration.images.dropped
     if not dropped:
         return translate("paper", "none")
-    return ", ".join(f"{n} {reason_text(reason)}" for reason, n in dropped.items())
+    return listed(f"{n} {reason_text(reason)}" for reason, n in dropped.items())
 
 
 def _largest_misfit(calibration: StatedCalibration) -> float:

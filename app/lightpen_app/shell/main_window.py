@@ -98,6 +98,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._settings = settings
         self._now = 0
         self._notice_is_of_page = False
+        self._unwritable = self._trouble = ""  # the data folder, and why
         self._status_holds: Callable[[], bool] | None = None  # None: until another
         self._asks = True
 
@@ -192,13 +193,41 @@ class MainWindow(Rearranged, QMainWindow):
 
     def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Show a sentence until the user has read it."""
-        self._notice_is_of_page = False
-        self._notice.show_text(text, tone)
+        self._tell(text, tone)
+
+    def _tell(self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False) -> None:
+        """Show a notice, but none more on the data folder while that is told of."""
+        told, is_of_folder = self._notice.text(), self._with_way(text) != text
+        if is_of_folder and told == self._with_way(self._trouble):
+            return
+        self._notice_is_of_page = of_page
+        self._notice.show_text(self._with_way(text), tone)
 
     def drop_notice(self, text: str) -> None:
         """Take a sentence away whose cause is gone, and no other."""
-        if self._notice.text() == text:
+        if self._notice.text() in (text, self._with_way(text)):
             self._notice.clear()
+
+    def set_unwritable(self, folder: str, trouble: str) -> None:
+        """Say why nothing can be kept in the data folder, until that is empty.
+
+        Whatever is told of the folder meanwhile says where another one is chosen.
+        """
+        if trouble:
+            self._unwritable, self._trouble = folder, trouble
+            self.show_notice(trouble)
+        else:
+            self.drop_notice(self._trouble)
+            self._unwritable = self._trouble = ""
+
+    def _with_way(self, text: str) -> str:
+        """Return a sentence, of an unwritable data folder with the way to another."""
+        if not self._unwritable or self._unwritable not in text:
+            return text
+        way = self.tr(
+            "The data folder is chosen at the step Start, or in the options (F10)."
+        )
+        return f"{text} {way}"
 
     def show_crash_report(self, path: str) -> None:
         """Tell that the program met a bug of its own; path "" if none is written."""
@@ -449,8 +478,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_notice_raised(self, text: str) -> None:
         if text:
-            self._notice_is_of_page = True
-            self._notice.show_text(text)
+            self._tell(text, of_page=True)
         elif self._notice_is_of_page:
             self._notice.clear()
 

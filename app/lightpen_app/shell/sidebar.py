@@ -81,12 +81,12 @@ class Sidebar(Translated, QFrame):
         steps.setContentsMargins(0, 0, 0, 0)
         steps.addWidget(self._steps)
         steps.addStretch(1)
-        scroll = PageScroll()
-        scroll.setWidget(content)
+        self._scroll = PageScroll()
+        self._scroll.setWidget(content)
         self._layout = layout = QVBoxLayout(self)
         layout.setSpacing(GRID)
         layout.addLayout(head)
-        layout.addWidget(scroll, 1)
+        layout.addWidget(self._scroll, 1)
         layout.addLayout(foot)
 
         # Connections
@@ -94,6 +94,7 @@ class Sidebar(Translated, QFrame):
         self._operator_view.clicked.connect(self.operator_view_chosen)
         self._help.clicked.connect(self.help_chosen)
         self._options.clicked.connect(self.options_chosen)
+        self._scroll.height_changed.connect(self._reveal_present)
 
         self._value = Subject(Names(), Origin.LIVE)
         self.set_room(Room())
@@ -105,6 +106,7 @@ class Sidebar(Translated, QFrame):
     def set_steps(self, steps: Sequence[Step]) -> None:
         """Show these steps."""
         self._steps.set_steps(steps)
+        self._reveal_present()
 
     def subject(self) -> str:
         """Return what is being calibrated, in words, a line for each name."""
@@ -130,6 +132,12 @@ class Sidebar(Translated, QFrame):
             tone = Tone.ACTIVE if status.place.is_local else Tone.WARN
             remark = Remark(text, Sign.RING, tone)
         self._stream.set_value(remark)
+
+    def _reveal_present(self) -> None:
+        """Scroll to the step at which somebody is."""
+        present = self._steps.present()
+        if present is not None:
+            self._scroll.ensureWidgetVisible(present, 0, 0)
 
     def _show_subject(self) -> None:
         names = self._value.names
@@ -161,6 +169,7 @@ class Sidebar(Translated, QFrame):
         self._foot.setContentsMargins(side, 0, side, 0)
         top, bottom = (GRID, GRID) if room.is_low else (3 * GRID, 2 * GRID)
         self._layout.setContentsMargins(0, top, 0, bottom)
+        self._name.setVisible(not room.is_low)  # the title of the window tells it
         self._steps.set_narrow(narrow)
         self._retranslate()
 

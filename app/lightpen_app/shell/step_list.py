@@ -157,6 +157,11 @@ class StepList(Translated, QWidget):
         """Return the steps shown."""
         return tuple(button.value() for button in self._buttons)
 
+    def present(self) -> StepButton | None:
+        """Return the button of the step at which somebody is."""
+        found = (b for b in self._buttons if b.value().state is StepState.NOW)
+        return next(found, None)
+
     def set_narrow(self, narrow: bool) -> None:
         """Show the steps where there is little width, or where there is enough."""
         self._is_narrow = narrow

@@ -14,10 +14,9 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID
+from lightpen_app.look.theme import GRID, TextSize, set_size
 
-ROW_HEIGHT = 3 * GRID
-HEAD_HEIGHT = 3 * GRID
+ROW_HEIGHT, LARGE_ROW_HEIGHT = 3 * GRID, 4 * GRID  # px; that of the head likewise
 
 
 @dataclass(frozen=True)
@@ -58,11 +57,20 @@ class NumberTable(QTableWidget):
         across.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         across.setDefaultAlignment(_RIGHT)
         across.setHighlightSections(False)
-        across.setFixedHeight(HEAD_HEIGHT)
         down.setDefaultAlignment(_LEFT)
         down.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        down.setDefaultSectionSize(ROW_HEIGHT)
         down.setHighlightSections(False)
+        self.set_large(False)
+
+    def set_large(self, large: bool) -> None:
+        """Show the figures larger, where there is the room, or no longer."""
+        # Before the heights: none is less than the letters are high.
+        for each in (self, self.horizontalHeader(), self.verticalHeader()):
+            set_size(each, TextSize.LEAD if large else TextSize.BODY)
+        self._row_height = LARGE_ROW_HEIGHT if large else ROW_HEIGHT
+        self.horizontalHeader().setFixedHeight(self._row_height)
+        self.verticalHeader().setDefaultSectionSize(self._row_height)
+        self.updateGeometry()
 
     def value(self) -> Figures:
         """Return the figures that are shown."""
@@ -86,12 +94,18 @@ class NumberTable(QTableWidget):
 
     @override
     def sizeHint(self) -> QSize:
-        height = HEAD_HEIGHT + ROW_HEIGHT * self.rowCount() + 2
+        height = self._row_height * (1 + self.rowCount()) + 2
         return QSize(super().sizeHint().width(), height)
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(20 * GRID, self.sizeHint().height())
+        columns, heads = range(self.columnCount()), self.horizontalHeader()
+        needed = (
+            max(self.sizeHintForColumn(i), heads.sectionSizeHint(i)) for i in columns
+        )
+        width = len(columns) * max(needed, default=0)
+        width += self.verticalHeader().sizeHint().width()
+        return QSize(max(width, 20 * GRID), self.sizeHint().height())
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -18,11 +18,18 @@ else:  # a class of Qt's cannot be a base twice
 
 @dataclass(frozen=True)
 class Room:
-    """Whether a widget is short of room, in width and in height, or has plenty."""
+    """Whether a widget is short of room, in width and in height, or has plenty.
+
+    Attributes
+    ----------
+    is_vast : bool
+        Whether it has so much that it may show more than what is needed.
+    """
 
     is_narrow: bool = False
     is_low: bool = False
     is_large: bool = False
+    is_vast: bool = False
 
     @property
     def margin(self) -> int:
@@ -42,13 +49,14 @@ class Rearranged(_Base):
     ----------
     narrow_below, low_below : int
         px; with less width or height it is short of room.
-    large_from : QSize or None
-        From this on it has plenty; None where more room changes nothing.
+    large_from, vast_from : QSize or None
+        From this on it has plenty, or more than that; None where that changes nothing.
     """
 
     narrow_below = 0
     low_below = 0
     large_from: QSize | None = None
+    vast_from: QSize | None = None
     _room = Room()
 
     def _use_room(self) -> None:
@@ -59,12 +67,17 @@ class Rearranged(_Base):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         size = event.size()
-        large = self.large_from
         room = Room(
             is_narrow=size.width() < self.narrow_below,
             is_low=size.height() < self.low_below,
-            is_large=large is not None and large.boundedTo(size) == large,
+            is_large=_holds(size, self.large_from),
+            is_vast=_holds(size, self.vast_from),
         )
         if room != self._room:
             self._room = room
             self._use_room()
+
+
+def _holds(size: QSize, other: QSize | None) -> bool:
+    """Return whether another size fits into a size, if there is one."""
+    return other is not None and other.boundedTo(size) == other

@@ -35,6 +35,7 @@ class ReasonBar(AskingBar):
         self._supervisor = SupervisorFields()
         self._decline = PushButton()
         self._give = PushButton()
+        self._is_given = False
 
         # Layout
         layout = QGridLayout(self)
@@ -69,11 +70,23 @@ class ReasonBar(AskingBar):
 
     def ask(self, *, of_supervisor: bool = False) -> None:
         """Show the question and wait for what is typed, by a supervisor or anybody."""
+        self._is_given = False
         self._edit.clear()
         self._supervisor.clear()
         self._supervisor.setVisible(of_supervisor)
         self.show()
         self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
+
+    def refuse(self) -> None:
+        """Ask once more where the answer did not do; all but the password stays."""
+        if not self._is_given:
+            return
+        self._is_given = False
+        self.show()
+        if self._supervisor.isVisibleTo(self):
+            self._supervisor.clear_password()
+        else:
+            self._edit.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _reason(self) -> str:
         return self._edit.text().strip()
@@ -89,6 +102,7 @@ class ReasonBar(AskingBar):
         if self._is_whole():
             is_asked = self._supervisor.isVisibleTo(self)
             signature = self._supervisor.value() if is_asked else None
+            self._is_given = True
             self.hide()
             self.given.emit(self._reason(), signature)
 

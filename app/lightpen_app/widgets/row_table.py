@@ -1,6 +1,6 @@
 """A table of which whole rows are chosen."""
 
-from PySide6.QtCore import QAbstractItemModel
+from PySide6.QtCore import QAbstractItemModel, Qt
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from lightpen_app.look.theme import GRID
@@ -26,4 +26,14 @@ class RowTable(QTableView):
         self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
         across = self.horizontalHeader()
         across.setHighlightSections(False)
+        across.setDefaultAlignment(
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        )
         across.setStretchLastSection(True)
+
+    def show_other_words(self) -> None:
+        """Show what the model says now, in the language that is chosen."""
+        model = self.model()
+        across = Qt.Orientation.Horizontal
+        model.headerDataChanged.emit(across, 0, model.columnCount() - 1)
+        self.viewport().update()

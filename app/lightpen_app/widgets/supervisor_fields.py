@@ -1,6 +1,6 @@
 """The fields in which a supervisor signs."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 from typing_extensions import override
 
@@ -61,6 +61,11 @@ class SupervisorFields(Translated, QWidget):
         """Forget what was typed."""
         self._name.clear()
         self._password.clear()
+
+    def clear_password(self) -> None:
+        """Have the password typed again."""
+        self._password.clear()
+        self._password.setFocus(Qt.FocusReason.OtherFocusReason)
 
     @override
     def _retranslate(self) -> None:

@@ -1,7 +1,6 @@
 """Reads the files that are chosen, and tells why one is not."""
 
 from collections.abc import Callable
-from functools import partial
 
 from PySide6.QtCore import QObject, Signal
 
@@ -39,12 +38,13 @@ class FileReading(QObject):
         function: Callable[[Report], OpenedFiles],
         on_read: Callable[[OpenedFiles], None],
     ) -> None:
-        """Read files, and hand them over."""
+        """Read files, and hand them over once their troubles are told."""
         self.cancel()
         self._job = job = Job(function, self)
 
         # Connections
-        job.succeeded.connect(partial(self._on_succeeded, on_read))
+        job.succeeded.connect(self._on_succeeded)
+        job.succeeded.connect(on_read)
         job.failed.connect(self._on_failed)
         job.start()
 
@@ -59,13 +59,10 @@ class FileReading(QObject):
         while self._told:
             self.relieved.emit(self._told.pop())
 
-    def _on_succeeded(
-        self, on_read: Callable[[OpenedFiles], None], opened: OpenedFiles
-    ) -> None:
+    def _on_succeeded(self, opened: OpenedFiles) -> None:
         self._job = None
         for trouble in opened.troubles:
             self._tell(worded(trouble))
-        on_read(opened)
 
     def _on_failed(self, sentence: str) -> None:
         self._job = None

@@ -136,6 +136,7 @@ class Station:
     ring_runs: int = 1
     bar_length: float = 0.0
     bar_uncertainty: float = 0.0
+    bar_surface: str = ""
     bar_places: int = 1
     touch_images: int = 5
 

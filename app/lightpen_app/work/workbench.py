@@ -37,10 +37,10 @@ from lightpen.verification.choices import VerificationChoices
 from lightpen_app.look.sentences import worded
 from lightpen_app.work.camera_search import CameraSearch
 from lightpen_app.work.file_reading import FileReading
+from lightpen_app.work.folder_watch import FolderWatch
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.library_watch import LibraryWatch
 from lightpen_app.work.live_view import CLOSING_TIME, LiveView, Shown
-from lightpen_app.work.other_windows import OtherWindows
 from lightpen_app.work.settings import Settings, Station
 from lightpen_app.work.station_choices import choices_of, with_choices
 from lightpen_app.work.station_preparation import preparation_of, station_of
@@ -129,7 +129,7 @@ class Workbench(QObject):
         self.library = LibraryWatch(
             folder, self.run.logbook, settings.due_rule, self._around.now, self
         )
-        self.windows = OtherWindows(folder, self)
+        self.folder_watch = FolderWatch(folder, self)
         self.search = CameraSearch(self.live, self)
         self._in_force_told: tuple[object, object] = (None, None)
 
@@ -231,7 +231,7 @@ class Workbench(QObject):
         self.run.runner.open_logbook()
         self._read_supervision()
         self.library.refresh()
-        self.windows.start()
+        self.folder_watch.start()
         self.choose_station(self._settings.last_station())
         self._wants_samples = True
         if not self.is_reading:
@@ -361,7 +361,7 @@ class Workbench(QObject):
             behind: all that was acknowledged is on the disk.
         """
         deadline = monotonic() + timeout_s
-        self.windows.stop()
+        self.folder_watch.stop()
         self.library.shut_down()
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
@@ -375,7 +375,7 @@ class Workbench(QObject):
             for runner in (self.run.runner, self.verification.runner)
         )
         self.streaming.shut_down()
-        self.windows.leave()
+        self.folder_watch.leave()
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 

@@ -8,7 +8,13 @@ the steps in the folder ``migrations``.
 import socket
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import (
+    AbstractContextManager,
+    closing,
+    contextmanager,
+    nullcontext,
+    suppress,
+)
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Timer
@@ -41,6 +47,7 @@ VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
 LONGEST_FAREWELL_S = 2  # for those who use it when it closes
+MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
@@ -92,7 +99,7 @@ class Database:
         ArchiveError
             It cannot be read, or was closed.
         """
-        with self._uses.one(), self._beginning(self.engine) as connection:
+        with self._used(self.engine) as connection:
             yield connection
 
     @contextmanager
@@ -104,26 +111,28 @@ class Database:
         ArchiveError
             It cannot be written, or was closed.
         """
-        engine = self.engine.execution_options(is_writing=True)
-        with self._uses.one(), self._beginning(engine) as connection:
+        options = self.engine.execution_options(is_writing=True)
+        with self._used(options) as connection:
             yield connection
 
     def close(self) -> None:
-        """Let go of it, once those who use it now are done.
-
-        A connection that is still in use would stay open after the others.
-        """
+        """Let go of it, once those who use it now are done."""
         self._uses.end(LONGEST_FAREWELL_S)
-        self.engine.dispose()
+        self.engine.pool.dispose()
 
     @contextmanager
-    def _beginning(self, engine: Engine) -> Iterator[Connection]:
-        with _telling(self.name), engine.begin() as connection:
-            if self.file is not None:
-                yield connection
-                return
-            with _given_up_in_time(connection):
-                yield connection
+    def _used(self, engine: Engine) -> Iterator[Connection]:
+        with self._uses.one(), _telling(self.name):
+            try:
+                with engine.begin() as connection, self._in_time(connection):
+                    yield connection
+            finally:
+                if self._uses.are_over:  # who is late takes its connection along
+                    self.engine.pool.dispose()
+
+    def _in_time(self, connection: Connection) -> AbstractContextManager[None]:
+        """Give up a server that answers no more."""
+        return nullcontext() if self.file else _given_up_in_time(connection)
 
 
 def open_file(path: Path) -> Database:
@@ -145,8 +154,12 @@ def open_file(path: Path) -> Database:
 
     def connect() -> sqlite3.Connection:
         connection = _connected(str(path))
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA synchronous = FULL")
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = FULL")
+        except sqlite3.Error:
+            connection.close()
+            raise
         return connection
 
     return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
@@ -357,6 +370,8 @@ def _telling(name: str) -> Iterator[None]:
         if getattr(cause, "sqlite_errorname", "").startswith("SQLITE_BUSY"):
             raise _busy(name) from error
         raise _unusable(name, _reason(error)) from error
+    except UnicodeDecodeError as error:  # even what SQLite says of it cannot be read
+        raise _unusable(name, MALFORMED) from error
 
 
 def _reason(error: SQLAlchemyError) -> str:

@@ -16,6 +16,11 @@ class Uses:
         self._n = 0
         self._is_over = False
 
+    @property
+    def are_over(self) -> bool:
+        """Whether nobody is let in any more."""
+        return self._is_over
+
     @contextmanager
     def one(self) -> Iterator[None]:
         """Use it.

@@ -5,11 +5,19 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from ctypes import byref, c_double, c_int, c_int64, c_size_t, c_uint
 from ipaddress import ip_address
+from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from lightpen.cameras.aravis_library import SUCCESS, Aravis, AravisError, load_aravis
+from lightpen.cameras.aravis_library import (
+    ANY_SOCKET,
+    NO_PACKET_SOCKET,
+    SUCCESS,
+    Aravis,
+    AravisError,
+    load_aravis,
+)
 from lightpen.cameras.clock import Clock
 from lightpen.cameras.device_camera import Delivery, DeviceCamera
 from lightpen.cameras.device_errors import busy, lost, not_found, refused
@@ -18,6 +26,14 @@ from lightpen.cameras.source import FoundDevice, Needs, Source, SourcePlace
 from lightpen.sentences import Sentence, sentence
 
 N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
+WAITING = 1 << 24  # bytes of packets that wait to be read, or fewer where so many may
+
+# Where this program may open packet sockets, Aravis 0.8 lets in the packets of all
+# cameras until it has set the filter of one: images of another that streams already are
+# taken for the camera's own, which are thrown away as late where their numbers are
+# lower. So only the first stream has one; it is the best where the machine is loaded.
+_STARTING = Lock()
+_STREAMS: set[int] = set()
 
 
 class AravisFeatures:
@@ -170,9 +186,15 @@ class AravisDevice:
     def start(self) -> None:
         """Let images come."""
         aravis, camera = self._open_ones()
-        with self._told():
+        with _STARTING, self._told():
             payload = aravis.camera_get_payload(camera)
+            if aravis.camera_is_gv_device(camera):
+                option = NO_PACKET_SOCKET if _STREAMS else ANY_SOCKET
+                aravis.camera_gv_set_stream_options(camera, option)
             self._stream = stream = aravis.camera_create_stream(camera, None, None)
+            _STREAMS.add(stream)
+            if aravis.camera_is_gv_device(camera):
+                aravis.set_property(stream, b"socket-buffer-size", WAITING, None)
             for _ in range(N_BUFFERS):
                 aravis.stream_push_buffer(stream, aravis.buffer_new_allocate(payload))
             aravis.camera_start_acquisition(camera)
@@ -224,6 +246,7 @@ class AravisDevice:
         stream, self._stream = self._stream, None
         if self._aravis is not None and stream is not None:
             self._aravis.unref(stream)
+            _STREAMS.discard(stream)
 
     def _searched(self, aravis: Aravis) -> str:
         """Return by what Aravis opens the camera with this serial number."""

@@ -26,6 +26,7 @@ from typing import Any
 NAME = "libaravis-0.8.so.0"
 GLIB, GOBJECT = "libglib-2.0.so.0", "libgobject-2.0.so.0"
 SUCCESS = 0  # of ArvBufferStatus
+ANY_SOCKET, NO_PACKET_SOCKET = 0, 1  # of ArvGvStreamOption
 GONE = {2, 3, 4, 5, 10}  # of ArvDeviceError: lost, broken, timed out, not controlled
 
 
@@ -71,6 +72,9 @@ class Aravis:
         self.camera_get_device = plain("camera_get_device", pointer, pointer)
         self.camera_is_gv_device = plain("camera_is_gv_device", c_bool, pointer)
         self.gv_device_is_controller = plain("gv_device_is_controller", c_bool, pointer)
+        self.camera_gv_set_stream_options = plain(
+            "camera_gv_set_stream_options", None, pointer, c_int
+        )
         self.camera_get_device_serial_number = risky(
             "camera_get_device_serial_number", text, pointer
         )
@@ -141,6 +145,10 @@ class Aravis:
         self._free_error = _bound(self._glib.g_error_free, None, POINTER(_GError))
         self.free = _bound(self._glib.g_free, None, pointer)
         self.unref = _bound(self._gobject.g_object_unref, None, pointer)
+        # One property, its value, and the null that ends the list of them.
+        self.set_property = _bound(
+            *(self._gobject.g_object_set, None, pointer, text, c_int, pointer)
+        )
         self.is_a = _bound(
             *(self._gobject.g_type_check_instance_is_a, c_bool, pointer, c_size_t)
         )

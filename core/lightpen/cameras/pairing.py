@@ -1,7 +1,9 @@
 """Which frames of two cameras are of the same moment, and how far apart they are.
 
 Cameras with clocks are paired by these. Where the clocks do not agree, each is set by
-the frame that reached this machine fastest: all others were held up on the way.
+the frame that reached this machine fastest: all others were held up on the way. Nothing
+is paired before a few frames were no faster; what was paired wrongly all the same, as
+every frame so far was held up, is told as soon as one is not.
 Recordings are paired by the numbers of their images.
 """
 
@@ -14,8 +16,13 @@ from lightpen.cameras.protocol import Frame
 from lightpen.sentences import Sentence, sentence
 
 WAITING = 6  # frames of one camera that wait for the other
-WINDOW = 64  # frames by which clocks and rates are told
+LONGEST_WAITING = 16  # while the clocks are not known
+WINDOW = 64  # frames by which rates are told
+CLOCK_WINDOW = 256  # by which clocks are, that drift by less than 1 ms meanwhile
+SETTLED = 6  # frames after which a clock is known, if none was much faster
+CLOCK_SET_NS = 1_000_000_000  # by which a clock jumps that somebody set
 SAME_CLOCK_NS = 50_000_000  # apart at most; clocks of two cameras are hours apart
+MUCH_FASTER = 0.25  # of the time between two frames
 NEAR = 0.6  # of the time between two frames; more than half, as times jitter
 MIN_TIMED, N_TIMED = 8, 32  # moments of which the lag is the median
 LEAST_LAG_MS = 1.0  # a pen moves 0.1 mm meanwhile
@@ -29,7 +36,9 @@ class FramePairs:
         self._waiting: tuple[deque[Frame], deque[Frame]] = (deque(), deque())
         self._times = (_Times(), _Times())
         self._lags_ns: deque[float] = deque(maxlen=N_TIMED)
+        self._offsets_ns: deque[int] = deque(maxlen=WINDOW)  # of the last pairs
         self._n_unpaired = 0
+        self._moved_ns = 0
 
     @property
     def n_unpaired(self) -> int:
@@ -58,14 +67,19 @@ class FramePairs:
         own, other = self._times[c], self._times[1 - c]
         own.note(frame)
         period_ns = self._period_ns
-        if other.last is None or period_ns is None:
+        if other.last is None or period_ns is None or not self._is_settled:
             return
         first, second = (frame, other.last) if c == 0 else (other.last, frame)
         apart_ns = self._apart_ns(first, second)
         self._lags_ns.append((apart_ns + period_ns / 2) % period_ns - period_ns / 2)
 
-    def add(self, c: int, frame: Frame, n_images: int | None = None) -> Frame | None:
-        """Take a frame of camera 0 or 1.
+    def add(self, c: int, frame: Frame) -> None:
+        """Take a frame of camera 0 or 1."""
+        self.note(c, frame)
+        self._waiting[c].append(frame)
+
+    def take(self, n_images: int | None = None) -> Frame | None:
+        """Return the next moment that is complete; None where none is.
 
         Parameters
         ----------
@@ -75,33 +89,70 @@ class FramePairs:
         Returns
         -------
         Frame or None
-            The first camera's of a moment that is complete now, with the other's.
+            The first camera's, with the other's.
         """
-        self.note(c, frame)
-        own = self._waiting[c]
-        own.append(frame)
+        is_known = n_images is not None or self._is_settled
         first, second = self._waiting
-        while first and second:
+        while is_known and first and second:
             apart = self._apart(first[0], second[0], n_images)
             if apart is None:  # not known yet
                 break
             if abs(apart) <= NEAR:
+                self._check_offset()
                 return replace(first.popleft(), others=(second.popleft(),))
             self._drop(0 if apart > 0 else 1)
-        if len(own) > WAITING:
-            self._drop(c)
+        for c, own in enumerate(self._waiting):
+            while len(own) > (WAITING if is_known else LONGEST_WAITING):
+                self._drop(c)
         return None
+
+    def moved_ms(self) -> float | None:
+        """Return, once, by how much the clocks of the last pairs were mistaken.
+
+        Returns
+        -------
+        float or None
+            None where they were right, but for half the time between two frames.
+        """
+        moved_ns, self._moved_ns = self._moved_ns, 0
+        return moved_ns * 1e-6 if moved_ns else None
 
     def forget(self) -> None:
         """Let go of frames that wait; they count for nothing."""
         for each in self._waiting:
             each.clear()
+        self._offsets_ns.clear()
 
     @property
     def _period_ns(self) -> float | None:
         """Time between two frames of the faster camera; None until it is known."""
         known = [each.period_ns for each in self._times if each.period_ns is not None]
         return min(known, default=None)
+
+    @property
+    def _is_settled(self) -> bool:
+        """Whether the clocks of both cameras are known."""
+        return all(each.is_settled for each in self._times)
+
+    @property
+    def _offset_ns(self) -> int:
+        """What is to be added to times of the second camera; 0 of one clock."""
+        one, other = self._times
+        if not one.has_clock or not other.has_clock:
+            return 0
+        offset_ns = other.offset_ns - one.offset_ns
+        return offset_ns if abs(offset_ns) >= SAME_CLOCK_NS else 0
+
+    def _check_offset(self) -> None:
+        """Notice that the last pairs were made by another offset than the next."""
+        offset_ns, period_ns = self._offset_ns, self._period_ns
+        moved_ns = abs(offset_ns - self._offsets_ns[0]) if self._offsets_ns else 0
+        if period_ns is not None and moved_ns > period_ns / 2:
+            self._offsets_ns.clear()
+            self._lags_ns.clear()
+            if moved_ns < CLOCK_SET_NS:
+                self._moved_ns = moved_ns
+        self._offsets_ns.append(offset_ns)
 
     def _drop(self, c: int) -> None:
         self._waiting[c].popleft()
@@ -116,13 +167,9 @@ class FramePairs:
         return None if period_ns is None else self._apart_ns(first, second) / period_ns
 
     def _apart_ns(self, first: Frame, second: Frame) -> float:
-        one, other = self._times
         if first.device_ts_ns is None or second.device_ts_ns is None:
             return float(second.host_ts_ns - first.host_ts_ns)
-        offset = other.offset_ns - one.offset_ns
-        if abs(offset) < SAME_CLOCK_NS:
-            offset = 0
-        return float(second.device_ts_ns - first.device_ts_ns + offset)
+        return float(second.device_ts_ns - first.device_ts_ns + self._offset_ns)
 
 
 class _Times:
@@ -130,8 +177,9 @@ class _Times:
 
     def __init__(self) -> None:
         self._last: Frame | None = None
-        self._offsets_ns: deque[int] = deque(maxlen=WINDOW)
+        self._offsets_ns: deque[int] = deque(maxlen=CLOCK_WINDOW)
         self._gaps_ns: deque[float] = deque(maxlen=WINDOW)
+        self._n_no_faster = 0
 
     @property
     def last(self) -> Frame | None:
@@ -139,9 +187,20 @@ class _Times:
         return self._last
 
     @property
+    def has_clock(self) -> bool:
+        """Whether frames tell when they were taken."""
+        return bool(self._offsets_ns)
+
+    @property
     def offset_ns(self) -> int:
         """What the clock of this machine is ahead of the camera's, at most."""
         return min(self._offsets_ns)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the last frames say no more of the clock than those before."""
+        has_no_clock = self._last is not None and self._last.device_ts_ns is None
+        return has_no_clock or self._n_no_faster >= SETTLED
 
     @property
     def period_ns(self) -> float | None:
@@ -151,19 +210,52 @@ class _Times:
     def note(self, frame: Frame) -> None:
         """Take the times of a frame."""
         last, self._last = self._last, frame
-        if last is not None and _time_ns(frame) < _time_ns(last):
-            self._offsets_ns.clear()  # the clock began anew, as after a power failure
+        if last is not None and _is_set(last, frame):  # as after a power failure
+            self._offsets_ns.clear()
+            self._n_no_faster = 0
         if frame.device_ts_ns is not None:
-            self._offsets_ns.append(frame.host_ts_ns - frame.device_ts_ns)
+            self._note_offset(frame.host_ts_ns - frame.device_ts_ns)
         if last is None or frame.seq <= last.seq:
             return
         gap = _time_ns(frame) - _time_ns(last)
         if gap > 0:  # else it was set back
             self._gaps_ns.append(gap / (frame.seq - last.seq))
 
+    def _note_offset(self, offset_ns: int) -> None:
+        period_ns = self.period_ns
+        is_faster = (
+            not self._offsets_ns
+            or period_ns is None
+            or self.offset_ns - offset_ns > MUCH_FASTER * period_ns
+        )
+        if not self.is_settled:
+            self._n_no_faster = 0 if is_faster else self._n_no_faster + 1
+        self._offsets_ns.append(offset_ns)
+
+
+def _is_set(last: Frame, frame: Frame) -> bool:
+    """Return whether the clock of a camera was set between two frames."""
+    if last.device_ts_ns is None or frame.device_ts_ns is None:
+        return False
+    by_camera = frame.device_ts_ns - last.device_ts_ns
+    by_machine = frame.host_ts_ns - last.host_ts_ns
+    return by_camera < 0 or abs(by_camera - by_machine) > CLOCK_SET_NS
+
 
 def _time_ns(frame: Frame) -> int:
     return frame.host_ts_ns if frame.device_ts_ns is None else frame.device_ts_ns
+
+
+def held_up(moved_ms: float) -> Sentence:
+    """Return that pairs were made of frames that were not of one moment."""
+    return sentence(
+        "pairing.held-up",
+        "All images of one camera had been held up on their way, so that the last "
+        "pairs are of moments {moved:.0f} ms apart. From now on they are paired "
+        "rightly. Images that do not fit are left out of the result: look at them in "
+        "Review, or begin the swing again.",
+        moved=moved_ms,
+    )
 
 
 def not_synchronised(lag_ms: float | None, px_per_mm: float | None) -> Sentence | None:

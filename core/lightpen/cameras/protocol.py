@@ -46,6 +46,10 @@ class FramesSkipped(CameraFailure):
     """Good images were thrown away because nobody took them in time. Not fatal."""
 
 
+class FramesHeldUp(CameraFailure):
+    """Frames of two cameras were paired that are of different moments. Not fatal."""
+
+
 class DeviceLost(CameraFailure):
     """The device no longer answers; only closing and opening it can help."""
 

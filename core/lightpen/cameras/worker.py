@@ -330,7 +330,8 @@ class CameraWorker:
         except FrameIncomplete as error:
             self._hear()
             self._count()
-            self._on_event(Troubled(error))
+            if not self._camera.caps.has_link:  # else it is told of many: see `_count`
+                self._on_event(Troubled(error))
         else:
             self._hear()
             self._change(Connection.STREAMING)
@@ -424,13 +425,17 @@ class CameraWorker:
         """Open the camera, waiting a little for another program to let go of it."""
         self._change(Connection.OPENING)
         limit_ns = self._clock.now_ns() + round(LONGEST_BUSY * 1e9)
+        is_told = False
         while True:
             try:
                 self._connect()
                 return
-            except DeviceBusy:
+            except DeviceBusy as error:
                 if self._clock.now_ns() >= limit_ns:
                     raise
+                if not is_told:
+                    is_told = True
+                    self._on_event(Troubled(error))
             if self._clock.wait(BUSY_PAUSE, self._stopping):
                 return
 
@@ -460,9 +465,9 @@ class CameraWorker:
         try:
             self._start(known)
         except ConfigError as error:  # it is not what it was when they were kept
-            self._on_event(Troubled(error))
             self._settings = CameraSettings()
             self._start(self._settings)
+            self._on_event(Troubled(error))  # when images come, which take back others
 
     def _start(self, settings: CameraSettings) -> None:
         """Set up the open camera and let its images come."""

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from lightpen.formats.pen_content import UNITS
 
+# Of any number, whatever it counts: beyond, its square may be none.
+SMALLEST, LARGEST = 1e-9, 1e6
+
 
 def whole_number(text: str) -> int:
     """Return a whole number of 0 or more."""
@@ -23,6 +26,8 @@ def finite(text: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         raise argparse.ArgumentTypeError(f"{text} is not a number.")
+    if abs(number) > LARGEST:
+        raise argparse.ArgumentTypeError(f"{text} is too large a number.")
     return number
 
 
@@ -31,6 +36,8 @@ def above_zero(text: str) -> float:
     number = finite(text)
     if number <= 0:
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0.")
+    if number < SMALLEST:
+        raise argparse.ArgumentTypeError(f"{text} is too small a number.")
     return number
 
 

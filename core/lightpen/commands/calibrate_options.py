@@ -4,7 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from lightpen.commands.arguments import above_zero, add_pen_options, finite, number_from
+from lightpen.commands.arguments import add_pen_options, finite, number_from
 from lightpen.errors import UsageError
 from lightpen.estimation.priors import Separation
 from lightpen.estimation.report import METHODS
@@ -17,7 +17,7 @@ from lightpen.model.assumptions import (
 )
 from lightpen.sentences import sentence
 
-LARGEST_SHARE = 0.1
+SMALLEST_SHARE, LARGEST_SHARE = 1e-9, 0.1
 
 
 def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
@@ -75,21 +75,21 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--temperature-sigma",
-        type=above_zero,
+        type=number_from(0.001, 50.0, "uncertainty", "K"),
         metavar="K",
         help="its standard uncertainty (0.5), or without --temperature how much warmer "
         "than at its measurement the pen may be (1.5)",
     )
     parser.add_argument(
         "--form-error",
-        type=above_zero,
+        type=number_from(1e-7, 1.0, "uncertainty", "mm"),
         metavar="MM",
         help="standard uncertainty of where the ball sits, as ball and cone are not "
         "quite round (0.0002)",
     )
     parser.add_argument(
         "--center-bias",
-        type=above_zero,
+        type=number_from(1e-6, 10.0, "uncertainty", "px"),
         metavar="PX",
         help="standard uncertainty of LED centres that does not average out (0.003)",
     )
@@ -100,11 +100,14 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
         "the camera must not have moved",
     )
     parser.add_argument(
-        "--distance", type=above_zero, metavar="MM", help="of the two cones"
+        "--distance",
+        type=number_from(0.1, 10_000.0, "distance", "mm"),
+        metavar="MM",
+        help="of the two cones",
     )
     parser.add_argument(
         "--distance-sigma",
-        type=above_zero,
+        type=number_from(1e-6, 100.0, "uncertainty", "mm"),
         metavar="MM",
         help="its standard uncertainty",
     )
@@ -118,9 +121,9 @@ def add_calibrate_options(parser: argparse.ArgumentParser) -> None:
 def _share(text: str) -> float:
     """Return a part of one, which may be given in per cent."""
     number = finite(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
-    if not 0 < number <= LARGEST_SHARE:
+    if not SMALLEST_SHARE <= number <= LARGEST_SHARE:
         raise argparse.ArgumentTypeError(
-            f"{text} is not a share above 0 and up to {LARGEST_SHARE:.0%}."
+            f"{text} is not a share from {SMALLEST_SHARE:g} to {LARGEST_SHARE:.0%}."
         )
     return number
 

@@ -127,14 +127,14 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--flatness",
-        type=above_zero,
+        type=number_from(1e-6, 10.0, "uncertainty", "mm"),
         default=USUAL.flatness,
         metavar="MM",
         help=f"standard uncertainty of how flat the board is ({USUAL.flatness:g})",
     )
     parser.add_argument(
         "--squareness",
-        type=above_zero,
+        type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.squareness,
         metavar="SHARE",
         help="of the ratio of its lengths along rows and columns "
@@ -142,7 +142,7 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--scale-sigma",
-        type=above_zero,
+        type=number_from(1e-9, 0.1, "share", "of 1"),
         default=USUAL.scale,
         metavar="SHARE",
         help=f"of all its lengths together ({USUAL.scale:g})",

@@ -55,6 +55,7 @@ from lightpen.verification.records import (
     fixed_point_entries,
     length_entries,
     rejected_entries,
+    touch_entries,
     verification_record,
 )
 from lightpen.verification.sources import TouchRun, instrument_of, touch_run
@@ -64,9 +65,10 @@ from lightpen.verification.texts import (
     drift_text,
     fixed_point_text,
     length_text,
+    touches_text,
 )
 from lightpen.verification.tip_in_force import cone_before
-from lightpen.verification.touch import NO_DRIFT, Touch
+from lightpen.verification.touch import NO_DRIFT, Touch, on_surface
 from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
 
 
@@ -82,6 +84,11 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         kinds.add_parser("articulation", help="one point, in the form of ISO 10360-12")
     )
     _add_drift(kinds.add_parser("drift", help="whether the camera moved meanwhile"))
+    _add_touches(
+        kinds.add_parser(
+            "touches", help="points, each with its uncertainty; no verdict"
+        )
+    )
     add_verify_pen(kinds.add_parser("pen", help="the LEDs over several swings"))
 
 
@@ -119,6 +126,13 @@ def _add_length(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_length)
     _add_runs(parser, "both ends of the length at one place")
     _add_certified(parser, "--length")
+    parser.add_argument(
+        "--ball-diameter",
+        type=above_zero,
+        metavar="MM",
+        help="of the probe, where it touched faces and not cones",
+    )
+    parser.add_argument("--faces", choices=("inner", "outer"), default="outer")
     _add_drift_share(parser)
     _add_common(parser, "length")
 
@@ -135,6 +149,25 @@ def _add_drift(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_drift)
     _add_runs(parser, "one visit of a cone that stands still, in order of time")
     _add_common(parser, "drift")
+
+
+def _add_touches(parser: argparse.ArgumentParser) -> None:
+    parser.set_defaults(run=_touches)
+    _add_runs(parser, "points that were touched")
+    parser.add_argument(
+        "--ball-diameter",
+        type=above_zero,
+        metavar="MM",
+        help="of the probe, to give the surface that it touched, not its centre",
+    )
+    parser.add_argument(
+        "--along",
+        choices=("approach", "axis"),
+        default="approach",
+        help="where the surface lies from the centre: the way that the tip came, where "
+        "the images show it and else along the axis of the pen; or always the axis",
+    )
+    _add_common(parser)
 
 
 def _add_runs(parser: argparse.ArgumentParser, what: str) -> None:
@@ -273,12 +306,14 @@ def _circle(options: argparse.Namespace) -> None:
 @printing
 def _length(options: argparse.Namespace) -> None:
     measured = _measure(options, [(run,) for run in options.runs])
+    outwards = 1.0 if options.faces == "inner" else -1.0
     found = measure_length(
         measured.touches,
         measured.instrument,
         options.length,
         _limits(options),
         certified_uncertainty=options.certified_uncertainty,
+        ball_offset=outwards * (options.ball_diameter or 0.0) / 2,
         drift=measured.drift,
     )
     _tell(
@@ -303,6 +338,22 @@ def _drift(options: argparse.Namespace) -> None:
     measured = _measure(options, [(run,) for run in options.runs])
     found = measure_drift(measured.touches, measured.instrument, _limits(options))
     _tell(*(options, measured, drift_text, found, "drift"), drift_entries(found))
+
+
+@printing
+def _touches(options: argparse.Namespace) -> None:
+    measured = _measure(options, [(run,) for run in options.runs])
+    touches = [touch for run in measured.runs for touch in run.touches]
+    if options.ball_diameter is not None:
+        if options.along == "axis":
+            touches = [replace(touch, approach_cam=None) for touch in touches]
+        radius = options.ball_diameter / 2
+        touches = [on_surface(touch, radius) for touch in touches]
+    rejected = [each for run in measured.runs for each in run.rejected]
+    print(shown(touches_text(touches, measured.instrument, rejected)))
+    if options.json is not None:
+        entries = [touch_entries(touch, measured.instrument) for touch in touches]
+        _write(options, measured, "touches", {"touches": entries}, None)
 
 
 def _measure(
@@ -379,9 +430,18 @@ def _tell(
             "The calibration was written by a version that kept no checksum: whether "
             "it was changed since is not known."
         )
-    if options.json is None:
-        return
-    assessment: Conformity = found.assessment
+    if options.json is not None:
+        _write(options, measured, kind, entries, found.assessment)
+
+
+def _write(
+    options: argparse.Namespace,
+    measured: _Measured,
+    kind: str,
+    entries: Mapping[str, Any],
+    assessment: Conformity | None,
+) -> None:
+    rejected = [each for run in measured.runs for each in run.rejected]
     limits = asdict(_limits(options))
     record = verification_record(
         kind,

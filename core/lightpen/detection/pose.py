@@ -40,6 +40,7 @@ WORSE = 1.5  # times the common noise; a blurred or dim image has more of it
 MEDIAN_LENGTH = 1.1774  # of a 2-D normal vector, standard deviations
 MAX_LESSENED = 0.9  # of a weight, by its fall; keeps the normal matrix regular
 RIDGE = 1e-12
+DIAGONAL = np.arange(6)
 TINY = 1e-300
 NOISE_FLOOR = 1e-6  # px; keeps exact data from dividing by zero
 
@@ -403,10 +404,12 @@ def _descend(
         else:
             H, g = normal_equations(J, residuals, seen)
         step = np.einsum("nij,nj->ni", _inverse(H), g)
-        size = np.maximum(
-            np.linalg.norm(step[:, :3], axis=1),
-            np.linalg.norm(step[:, 3:], axis=1) / np.linalg.norm(t, axis=1),
+        turn, move = step[:, :3], step[:, 3:]
+        squares = np.maximum(
+            np.einsum("ni,ni->n", turn, turn),
+            np.einsum("ni,ni->n", move, move) / np.einsum("ni,ni->n", t, t),
         )
+        size = np.sqrt(squares)
         step *= np.minimum(1, MAX_STEP / np.maximum(size, NOISE_FLOOR))[:, None]
         R = rotation_from_vector(step[:, :3]) @ R
         t = t + step[:, 3:]
@@ -435,9 +438,11 @@ def _inverse(H: FloatArray) -> FloatArray:
     A trace of ridge keeps an image of wrong LEDs, which may fix no pose at all, from
     stopping the others.
     """
-    scale = np.sqrt(np.maximum(np.diagonal(H, axis1=1, axis2=2), RIDGE))
+    scale = np.sqrt(np.maximum(H[:, DIAGONAL, DIAGONAL], RIDGE))
     scales = scale[:, :, None] * scale[:, None, :]
-    inverse: FloatArray = np.linalg.inv(H / scales + RIDGE * np.eye(6)) / scales
+    scaled = H / scales
+    scaled[:, DIAGONAL, DIAGONAL] += RIDGE
+    inverse: FloatArray = np.linalg.inv(scaled) / scales
     return inverse
 
 

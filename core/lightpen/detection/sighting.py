@@ -66,6 +66,8 @@ class Sighting:
         Which spot is which LED.
     others : tuple of Sighting
         In the images that the other cameras of a rig took at this moment.
+    posed_by : int
+        Which camera of the rig the pose is by, from 0.
     """
 
     pixels: FloatArray
@@ -78,6 +80,7 @@ class Sighting:
     spots: Spots | None = None
     labels: Labels | None = None
     others: tuple["Sighting", ...] = ()
+    posed_by: int = 0
 
     @property
     def rig_pixels(self) -> FloatArray:
@@ -91,13 +94,14 @@ class Sighting:
 
     @property
     def n_leds(self) -> int:
-        """Number of LEDs fit for use."""
-        return _n_seen(self.pixels)
+        """Number of LEDs fit for use, by the camera that the pose is by."""
+        return _n_seen(self.rig_pixels[self.posed_by])
 
     @property
     def is_blurred(self) -> bool:
         """Whether most of the spots are smeared, as a fast hand smears them."""
-        return self.spots is not None and self.spots.are_blurred
+        spots = (self, *self.others)[self.posed_by].spots
+        return spots is not None and spots.are_blurred
 
     @property
     def areas(self) -> FloatArray:

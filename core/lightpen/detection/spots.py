@@ -246,13 +246,11 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
     thinned = _thinned(image, stride)
     step = max(min(thinned.shape) // NOISE_SAMPLES, 1)
     few: MatLike = np.ascontiguousarray(thinned[::step, ::step])
-    values = np.sort(few, axis=None)
-    background = int(values[int(BACKGROUND_QUANTILE * values.size)])
+    background = _quantile(few, BACKGROUND_QUANTILE)
 
     beside: MatLike = np.ascontiguousarray(image[:: step * stride, 1 :: step * stride])
     n = min(few.shape[1], beside.shape[1])
-    differences = np.sort(cv2.absdiff(few[:, :n], beside[:, :n]), axis=None)
-    difference = int(differences[int(NOISE_QUANTILE * differences.size)])
+    difference = _quantile(cv2.absdiff(few[:, :n], beside[:, :n]), NOISE_QUANTILE)
     noise = max(difference / NOISE_OF_DIFFERENCE, MIN_NOISE)
 
     if mask is not None and len(mask):
@@ -261,6 +259,12 @@ def _survey(image: Image, mask: FloatArray | None, stride: int) -> _Scene:
             center = (round(x), round(y))
             cv2.circle(thinned, center, ceil(radius), background, cv2.FILLED)
     return _Scene(image, thinned, stride, background, noise, float(thinned.max()))
+
+
+def _quantile(values: MatLike, share: float) -> int:
+    """Return the value that is larger than that share of all."""
+    rank = int(share * values.size)
+    return int(np.partition(values, rank, axis=None)[rank])
 
 
 def _has_smears(scene: _Scene) -> bool:

@@ -6,6 +6,7 @@ from a prior mean has the covariance of the prior less that of the posterior.
 """
 
 from dataclasses import dataclass, replace
+from math import floor, log10
 
 import numpy as np
 
@@ -70,6 +71,7 @@ class Contradiction:
     def sentence(self) -> Sentence:
         """It in words, with what to do."""
         unit = f" {self.unit}" if self.unit else ""
+        wanted = _known_digits(self.wanted, self.wanted_uncertainty)
         if self.of_pen:
             return sentence(
                 "warning.pen-file-contradicted",
@@ -78,7 +80,7 @@ class Contradiction:
                 "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this pen, or "
                 "measure the pen again.",
                 what=self.what,
-                wanted=self.wanted,
+                wanted=wanted,
                 wanted_u=self.wanted_uncertainty,
                 stated=self.stated,
                 stated_u=self.stated_uncertainty,
@@ -92,7 +94,7 @@ class Contradiction:
                 "\u00b1 {stated_u:.2g}{unit}. Check that the file is of this camera, "
                 "lens and focus, or calibrate the camera again.",
                 what=self.what,
-                wanted=self.wanted,
+                wanted=wanted,
                 wanted_u=self.wanted_uncertainty,
                 stated=self.stated,
                 stated_u=self.stated_uncertainty,
@@ -107,7 +109,7 @@ class Contradiction:
                 "this camera, lens and focus, or calibrate the camera again.",
                 camera=self.camera,
                 what=self.what,
-                wanted=self.wanted,
+                wanted=wanted,
                 wanted_u=self.wanted_uncertainty,
                 stated=self.stated,
                 stated_u=self.stated_uncertainty,
@@ -121,7 +123,7 @@ class Contradiction:
             "since, or calibrate the rig again.",
             camera=self.camera,
             what=self.what,
-            wanted=self.wanted,
+            wanted=wanted,
             wanted_u=self.wanted_uncertainty,
             stated=self.stated,
             stated_u=self.stated_uncertainty,
@@ -220,6 +222,11 @@ def _of_camera(
     name = rig.names[c] if rig.names else ""
     named = [replace(each, camera=name) for each in denied]
     return named, replace(priors, cameras=tuple(cameras))
+
+
+def _known_digits(value: float, uncertainty: float) -> float:
+    """Return a value down to the second digit of its uncertainty."""
+    return round(value, 1 - floor(log10(uncertainty)))
 
 
 def _denied(

@@ -44,7 +44,9 @@ def join_poses(
     n_cameras = np.bincount(np.concatenate(posed), minlength=n_moments)
     information = np.zeros((n_moments, 6, 6))
     for c, (at, each) in enumerate(zip(posed, poses, strict=True)):
-        R, t, covariances = _in_rig(rig, c, each)
+        R, t, covariances = in_rig(
+            rig, c, each.rotations, each.translations, each.covariances
+        )
         new = np.isnan(translations[at, 0])
         rotations[at[new]], translations[at[new]] = R[new], t[new]
         shared = np.flatnonzero(n_cameras[at] > 1)
@@ -61,17 +63,29 @@ def join_poses(
     return RigPoses(rotations, translations)
 
 
-def _in_rig(
-    rig: Rig, c: int, poses: Poses
+def in_rig(
+    rig: Rig,
+    c: int,
+    rotations: FloatArray,
+    translations: FloatArray,
+    covariances: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return rotations, translations and covariances of poses by the c-th camera."""
+    """Return poses by the c-th camera as rig_from_pen.
+
+    Parameters
+    ----------
+    rotations, translations : (N, 3, 3) and (N, 3) array
+        cam_from_pen, mm.
+    covariances : (N, 6, 6) array
+        Of (theta, dt), rad and mm.
+    """
     if c == 0:
-        return poses.rotations, poses.translations, poses.covariances
+        return rotations, translations, covariances
     back = rig.rotations[c].T
     turned = np.zeros((6, 6))
     turned[:3, :3] = turned[3:, 3:] = back
     return (
-        back @ poses.rotations,
-        (poses.translations - rig.translations[c]) @ back.T,
-        turned @ poses.covariances @ turned.T,
+        back @ rotations,
+        (translations - rig.translations[c]) @ back.T,
+        turned @ covariances @ turned.T,
     )

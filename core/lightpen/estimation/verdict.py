@@ -48,8 +48,8 @@ _ADVICE = {
     ),
     ShareName.SCALE: sentence(
         "share.scale",
-        "the scale of the LED file. State its uncertainty in the file, and measure "
-        "where the pen is used",
+        "the scale of the LED file. Have the LEDs measured by a better length, and "
+        "state how well, or swing in two cones at a known distance",
     ),
     ShareName.FORM: sentence(
         "share.form",

@@ -22,6 +22,7 @@ from lightpen.formats.files import opened
 from lightpen.formats.image_headers import (
     PNG_SIGNATURE,
     ImageHeader,
+    animated_image,
     cut_off_image,
     damaged_image,
     read_image_header,
@@ -32,6 +33,9 @@ IMAGE_FILE = sentence("file.image", "image")
 MAX_FILE_SIZE = 150_000_000  # bytes; the largest image, of 16 bits, not compressed
 MAX_MEMORY = 250_000_000  # bytes that all images take while they are decoded
 PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by the colour type
+MAX_PNG_CHUNKS = (
+    30_000  # the largest image in chunks of 8 kB, as libpng writes, has 18,000
+)
 PNG_RESERVE = 2**16  # bytes of compressed data beyond what an image can come to
 MAX_SCANS = 64  # of a JPEG, each of which takes as long as the image; 10 are usual
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # of malloc.h
@@ -200,9 +204,8 @@ def _check_png(data: bytes, name: str) -> None:
     It would also unpack what comes after the image, however much that is.
     """
     position = len(PNG_SIGNATURE)
-    kind = b""
     left = _most_png_data(data)
-    while kind != b"IEND":
+    for _ in range(MAX_PNG_CHUNKS):
         head = data[position : position + 8]
         if len(head) < 8:
             raise cut_off_image(name)
@@ -220,18 +223,15 @@ def _check_png(data: bytes, name: str) -> None:
                 )
             )
         if kind == b"acTL":
-            raise FileError(
-                sentence(
-                    "image.animated",
-                    "{name} is an animation. Save its images one by one.",
-                    name=name,
-                )
-            )
+            raise animated_image(name)
         if kind == b"IDAT":
             left -= length
         if left < 0:
             raise damaged_image(name)
+        if kind == b"IEND":
+            return
         position += 12 + length
+    raise damaged_image(name)
 
 
 def _most_png_data(data: bytes) -> int:

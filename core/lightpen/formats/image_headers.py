@@ -24,11 +24,14 @@ _PNM_HEAD = re.compile(
 _PNM_HEAD_LENGTH = 4096  # bytes, with comments
 _BMP_HEAD_OF_OS2 = 12  # bytes
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
-_JPEG_PROGRESSIVE = 0xC2
+_JPEG_PROGRESSIVE = frozenset({0xC2, 0xCA})
+_JPEG_SCAN = 0xDA
 _JPEG_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD9)})
-_JPEG_MARKERS = 1000  # before the frame; a colour profile takes 255
+_JPEG_MARKERS = 1000  # before the pixels; a colour profile takes 255
 _TIFF_VALUES = {1: "B", 3: "H", 4: "I"}  # by the type of an entry
+_TIFF_TAGS = frozenset({256, 257, 258, 259, 277, 278, 322, 323})  # that are looked at
 _TIFF_ENTRIES = 500
+_WEBP_ANIMATED = 0x02  # of the flags
 _TIFF_LOSSLESS = frozenset({1, 5, 8, 32773, 32946})  # none, LZW, deflate, PackBits
 
 
@@ -127,6 +130,17 @@ def cut_off_image(name: str | Sentence) -> FileError:
     )
 
 
+def animated_image(name: str | Sentence) -> FileError:
+    """Return the error of an image that moves."""
+    return FileError(
+        sentence(
+            "image.animated",
+            "{name} is an animation. Save its images one by one.",
+            name=name,
+        )
+    )
+
+
 def _reader(start: bytes, name: _Name) -> _Reader:
     if start.startswith(PNG_SIGNATURE):
         return _png
@@ -164,29 +178,49 @@ def _png(stream: BinaryIO, name: _Name) -> ImageHeader:
 
 def _jpeg(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(2)
+    frame, channels, pixels = 0, 0, (0, 0)
     for _ in range(_JPEG_MARKERS):
+        marker, length = _jpeg_segment(stream, name)
+        if marker == _JPEG_SCAN:
+            break
+        if marker in _JPEG_FRAMES:
+            depth, height, width, channels = struct.unpack(
+                ">BHHB", _exactly(stream, 6, name)
+            )
+            if frame or depth != 8 or channels not in (1, 3, 4):
+                raise damaged_image(name)
+            frame, pixels, length = marker, (width, height), length - 6
+        stream.seek(length, 1)
+    else:
+        raise damaged_image(name)
+    (n_scanned,) = _exactly(stream, 1, name)
+    if not frame:
+        raise damaged_image(name)
+    width, height = pixels
+    # Of several scans it keeps the coefficients, two bytes each.
+    has_scans = frame in _JPEG_PROGRESSIVE or n_scanned < channels
+    return ImageHeader(
+        width,
+        height,
+        width * height * (1 if channels == 1 else 3),
+        2 * channels * width * height if has_scans else 0,
+    )
+
+
+def _jpeg_segment(stream: BinaryIO, name: _Name) -> tuple[int, int]:
+    """Return the marker that comes next, and how many bytes follow its length."""
+    while True:
         if _exactly(stream, 1, name) != b"\xff":
             raise damaged_image(name)
         (marker,) = _exactly(stream, 1, name)
         while marker == 0xFF:  # fill bytes
             (marker,) = _exactly(stream, 1, name)
-        if marker in _JPEG_WITHOUT_LENGTH:
-            continue
-        (length,) = struct.unpack(">H", _exactly(stream, 2, name))
-        if length < 2:
-            raise damaged_image(name)
-        if marker in _JPEG_FRAMES:
+        if marker not in _JPEG_WITHOUT_LENGTH:
             break
-        stream.seek(length - 2, 1)
-    else:
+    (length,) = struct.unpack(">H", _exactly(stream, 2, name))
+    if length < 2:
         raise damaged_image(name)
-    depth, height, width, channels = struct.unpack(">BHHB", _exactly(stream, 6, name))
-    if depth != 8 or channels not in (1, 3, 4):
-        raise damaged_image(name)
-    pixels = width * height
-    # It keeps the coefficients of all scans, two bytes each.
-    working = 2 * channels * pixels if marker == _JPEG_PROGRESSIVE else 0
-    return ImageHeader(width, height, pixels * (1 if channels == 1 else 3), working)
+    return marker, length - 2
 
 
 def _bmp(stream: BinaryIO, name: _Name) -> ImageHeader:
@@ -214,8 +248,11 @@ def _tiff(stream: BinaryIO, name: _Name) -> ImageHeader:
     values: dict[int, int] = {}
     for i in range(count):
         tag, kind, n_values = struct.unpack_from(order + "HHI", entries, 12 * i)
-        if kind not in _TIFF_VALUES or tag in values:
+        if tag not in _TIFF_TAGS:
             continue
+        # The decoder takes the first of a tag, and also types that none is written in.
+        if kind not in _TIFF_VALUES or n_values == 0 or tag in values:
+            raise damaged_image(name)
         layout = order + _TIFF_VALUES[kind]
         if n_values * struct.calcsize(layout) <= 4:
             (values[tag],) = struct.unpack_from(layout, entries, 12 * i + 8)
@@ -263,6 +300,8 @@ def _webp(stream: BinaryIO, name: _Name) -> ImageHeader:
     stream.seek(20)
     head = _exactly(stream, 10, name)
     if kind == b"VP8X":
+        if head[0] & _WEBP_ANIMATED:
+            raise animated_image(name)
         width = int.from_bytes(head[4:7], "little") + 1
         height = int.from_bytes(head[7:10], "little") + 1
     elif kind == b"VP8L":

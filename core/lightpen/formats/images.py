@@ -14,7 +14,7 @@ from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import keep_freed_memory, read_image
 from lightpen.formats.files import printable, unreadable
-from lightpen.formats.videos import count_frames, frame_loaders
+from lightpen.formats.video_process import count_frames, frame_loaders
 from lightpen.sentences import sentence
 
 SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")

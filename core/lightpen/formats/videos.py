@@ -1,4 +1,4 @@
-"""The frames of a video, counted and decoded one after the other."""
+"""The frames of a video, counted and decoded one after the other, in this process."""
 
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -1,7 +1,7 @@
 """From images to views of a board, and why it is not seen where it is not."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -110,6 +110,57 @@ def observe_board_of_rig(
     return ObservedBoard(views.chosen(is_seen), unseen)
 
 
+def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence | None:
+    """Return what images show in place of the board; None if that is not known.
+
+    Parameters
+    ----------
+    images : callable
+        Gives them anew, one at a time: they may be large.
+    """
+    if _is_found((image[:, ::-1].copy() for image in images()), board):
+        return sentence(
+            "intrinsics.mirrored",
+            "The images show the board {board} mirrored. Switch off the mirroring of "
+            "the camera, or print the board anew.",
+            board=board.name,
+        )
+    if board.kind in OTHER_LAYOUT:
+        other = replace(board, kind=OTHER_LAYOUT[board.kind])
+        if _is_found(images(), other):
+            return sentence(
+                "intrinsics.other-layout",
+                "No image shows the board {board}, but they show {other}: OpenCV laid "
+                "it out otherwise until 4.6. Give that board.",
+                board=board.name,
+                other=other.name,
+            )
+    across = replace(board, columns=board.rows, rows=board.columns)
+    if across != board and _is_found(images(), across):
+        return sentence(
+            "intrinsics.across",
+            "No image shows the board {board}, but they show {other}: columns and rows "
+            "are the other way round. Give that board.",
+            board=board.name,
+            other=across.name,
+        )
+    if board.kind is BoardKind.CHESSBOARD:
+        for image in images():
+            count = count_corners(image)
+            if count is not None:
+                return sentence(
+                    "intrinsics.other-count",
+                    "No image shows a chessboard of {columns} x {rows} inner corners, "
+                    "but one of {seen_columns} x {seen_rows}. Count its inner corners "
+                    "again.",
+                    columns=board.columns,
+                    rows=board.rows,
+                    seen_columns=count[0],
+                    seen_rows=count[1],
+                )
+    return None
+
+
 def _look(load: Callable[[], Image], board: Board) -> _Look:
     image = load()
     return _Look((image.shape[1], image.shape[0]), find_points(image, board))
@@ -133,49 +184,12 @@ def _other_size(first_name: str, first: _Look, name: str, other: _Look) -> FileE
 
 
 def _why_unseen(source: ImageSource, board: Board) -> Sentence:
-    """Return what the images show in place of the board."""
-    images = [load() for load in islice(source.open(), EXAMINED)]
-    if _is_found([image[:, ::-1].copy() for image in images], board):
-        return sentence(
-            "intrinsics.mirrored",
-            "The images show the board {board} mirrored. Switch off the mirroring of "
-            "the camera, or print the board anew.",
-            board=board.name,
-        )
-    if board.kind in OTHER_LAYOUT:
-        other = replace(board, kind=OTHER_LAYOUT[board.kind])
-        if _is_found(images, other):
-            return sentence(
-                "intrinsics.other-layout",
-                "No image shows the board {board}, but they show {other}: OpenCV laid "
-                "it out otherwise until 4.6. Give that board.",
-                board=board.name,
-                other=other.name,
-            )
-    across = replace(board, columns=board.rows, rows=board.columns)
-    if across != board and _is_found(images, across):
-        return sentence(
-            "intrinsics.across",
-            "No image shows the board {board}, but they show {other}: columns and rows "
-            "are the other way round. Give that board.",
-            board=board.name,
-            other=across.name,
-        )
-    if board.kind is BoardKind.CHESSBOARD:
-        for image in images:
-            count = count_corners(image)
-            if count is not None:
-                return sentence(
-                    "intrinsics.other-count",
-                    "No image shows a chessboard of {columns} x {rows} inner corners, "
-                    "but one of {seen_columns} x {seen_rows}. Count its inner corners "
-                    "again.",
-                    columns=board.columns,
-                    rows=board.rows,
-                    seen_columns=count[0],
-                    seen_rows=count[1],
-                )
-    return sentence(
+    """Return what the images show in place of the board, as far as that is known."""
+
+    def images() -> Iterator[Image]:
+        return (load() for load in islice(source.open(), EXAMINED))
+
+    return why_unseen(images, board) or sentence(
         "intrinsics.unseen",
         "None of the {n_images} images shows the board {board}. The whole board must "
         "be in the image, sharp, with a bright rim round it; check its kind and count.",
@@ -184,5 +198,5 @@ def _why_unseen(source: ImageSource, board: Board) -> Sentence:
     )
 
 
-def _is_found(images: Sequence[Image], board: Board) -> bool:
+def _is_found(images: Iterable[Image], board: Board) -> bool:
     return any(find_points(image, board) is not None for image in images)

@@ -22,7 +22,7 @@ from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.start import BoardPoses, start_poses
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
-from lightpen.model.rig import Rig
+from lightpen.model.rig import Rig, of_camera
 from lightpen.model.rigid import vector_from_rotation
 from lightpen.sentences import Sentence, sentence
 
@@ -209,7 +209,7 @@ def calibrate_pair(
         left_out=tuple(name for name in names_of_all if name not in views.names),
         correlation=correlation,
         lag=lag,
-        remarks=_remarks(fitted, alone, both, lag, names[1]),
+        remarks=_remarks(fitted, alone, both, lag, names),
     )
 
 
@@ -355,11 +355,15 @@ def _remarks(
     alone: tuple[CameraCalibration, ...],
     both: BoolArray,
     lag: PairLag | None,
-    name: str,
+    names: tuple[str, str],
 ) -> tuple[Sentence, ...]:
-    remarks = [remark for each in alone for remark in each.remarks]
+    remarks = [
+        of_camera(name, remark)
+        for name, each in zip(names, alone, strict=False)
+        for remark in each.remarks
+    ]
     if lag is not None and lag.is_significant:
-        return (*remarks, lag.told(name))
+        return (*remarks, lag.told(names[1]))
     usual = max((each.adjustment.rms for each in alone), default=fitted.rms)
     rms = np.nanmax(fitted.view_rms[both], axis=1)
     n_apart = int(np.sum(rms > APART * usual))

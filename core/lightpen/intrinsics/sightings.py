@@ -15,6 +15,7 @@ References
 """
 
 from itertools import product
+from threading import Lock
 from typing import Any
 
 import cv2
@@ -43,6 +44,7 @@ QUICK = (
 )
 THOROUGH = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
 WAYS = (THOROUGH, THOROUGH | cv2.CALIB_CB_ACCURACY, 0)  # each finds some of its own
+_THOROUGHLY = Lock()  # one at a time, as each takes some 200 MB
 EVENED = 0.1  # of the longer side: what is darker over more than that is uneven light
 
 
@@ -143,7 +145,8 @@ def _chessboard(
     if quick:
         return None
     for flags in WAYS:
-        found, points = cv2.findChessboardCornersSB(small, corners, flags=flags)
+        with _THOROUGHLY:
+            found, points = cv2.findChessboardCornersSB(small, corners, flags=flags)
         if found:
             return _whole(points, scale)
     if scale == 1.0 or grey.size > SEARCHED_WHOLE:
@@ -151,7 +154,8 @@ def _chessboard(
         found, points = cv2.findChessboardCorners(small, corners, flags=flags)
         is_found = found and _is_even(points, corners)
         return _whole(points, scale) if is_found else None
-    found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
+    with _THOROUGHLY:
+        found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
     return _whole(points, 1.0) if found else None
 
 
@@ -231,7 +235,11 @@ def _refined(image: Image, points: FloatArray, board: Board) -> FloatArray:
         return refined
     start = points[inside].astype(np.float32)[:, None]
     moved = cv2.cornerSubPix(
-        image.astype(np.float32), start.copy(), (half, half), (-1, -1), REFINING
+        image if image.dtype == np.uint8 else image.astype(np.float32),
+        start.copy(),
+        (half, half),
+        (-1, -1),
+        REFINING,
     )
     refined[inside] = moved[:, 0]
     return refined

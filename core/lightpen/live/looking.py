@@ -3,7 +3,8 @@
 One thread looks at the images. While nothing is captured it takes the newest and passes
 over those that came meanwhile; during a swing or a verification it takes them all, in
 order, of two cameras those of one moment together. Where nothing moves it looks twice a
-second, and where nobody looks on, not at all.
+second, in the midst of a swing or a verification after a while only; where nobody looks
+on, not at all.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,12 +15,13 @@ from threading import Event, Thread
 from typing import Protocol
 
 from lightpen.cameras.clock import Clock
-from lightpen.cameras.pairing import FramePairs
+from lightpen.cameras.pairing import FramePairs, held_up
 from lightpen.cameras.protocol import (
     CameraSettings,
     DeviceLost,
     EndOfImages,
     Frame,
+    FramesHeldUp,
     FrameTimeout,
     ImageCamera,
     Stats,
@@ -29,6 +31,7 @@ from lightpen.cameras.worker import (
     CameraWorker,
     Failed,
     FrameReady,
+    Troubled,
     WorkerEvent,
 )
 from lightpen.detection.aim import Aim
@@ -45,6 +48,9 @@ from lightpen.verification.runner import VerificationRunner
 LONGEST_WAIT = 0.1  # s, after which a swing that began is noticed at the latest
 UNHURRIED = 0.5  # s from image to image while nothing moves
 LIVELY_NS = 2_000_000_000  # after the last move, for which every image is looked at
+# The same while something is captured: who holds still for it has ended by then.
+PATIENT_NS = 10_000_000_000
+IN_THE_MIDST = (Phase.CAPTURING, Phase.PAUSED)  # a pen at rest leads to nothing more
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +137,7 @@ class Live:
         self._scene = Spots.none()
         self._moved_ns: int | None = None
         self._seen_ns = 0
+        self._stage: object = None
         self._measures = False
         self._ready = Event()
         self._stopping = Event()
@@ -190,6 +197,7 @@ class Live:
         try:
             while not self._stopping.is_set():
                 captured = self._captured()
+                self._notice_stage()
                 rest = self._rest()
                 is_paired = self._measures and len(self._workers) > 1
                 for worker in self._workers:  # two that rest rarely meet a moment
@@ -242,25 +250,42 @@ class Live:
         """Return how long the camera may rest after each image, s; None for good."""
         if self._stream is not None and self._stream.is_heard:
             return 0.0
-        if self._verified() is not None:
-            return 0.0
-        status = self._runner.status
-        waits = status.state is None or status.state.phase is Phase.WAIT
-        if status.is_capturing and not (waits or status.is_paused_by_user):
-            return 0.0
         if self._moved_ns is None:  # the first image tells of what size they are
             return 0.0
+        still_ns = self._seen_ns - self._moved_ns
+        status = self._runner.status
+        waits = status.state is None or status.state.phase is Phase.WAIT
+        is_swung = status.is_capturing and not (waits or status.is_paused_by_user)
+        if self._verified() is None and is_swung:
+            assert status.setup is not None
+            assert status.state is not None
+            is_begun = status.state.phase in IN_THE_MIDST
+            if status.setup.is_recording or not is_begun:
+                return 0.0
+        if self._verified() is not None or is_swung:
+            return 0.0 if still_ns < PATIENT_NS else UNHURRIED
         if not self._is_watched:
             return None
-        is_lively = self._seen_ns - self._moved_ns < LIVELY_NS
-        return 0.0 if is_lively else UNHURRIED
+        return 0.0 if still_ns < LIVELY_NS else UNHURRIED
+
+    def _notice_stage(self) -> None:
+        """Count a new phase or task as a move: what rests may be of use in it."""
+        status = self._runner.status
+        verified = None if self._verifier is None else self._verifier.status
+        stage = (
+            None if status.state is None else status.state.phase,
+            verified is not None and verified.is_touching and verified.task,
+        )
+        if stage != self._stage:
+            self._stage = stage
+            self.hurry()
 
     def _notice(self, image: LiveImage) -> None:
-        """Remember when anything was seen to move last."""
+        """Remember when anything was seen to move last, however slowly."""
         self._seen_ns = image.frame.host_ts_ns
         if self._moved_ns is None or have_moved(self._scene, image.spots):
             self._moved_ns = self._seen_ns
-        self._scene = image.spots
+            self._scene = image.spots
 
     def _tell_others(self, image: LiveImage) -> None:
         """Stream what an image shows."""
@@ -330,13 +355,24 @@ class Live:
             self._refuse_recordings()
             return None
         n_images = counts.pop() if len(counts) == 1 else None
+        moment = self._pairs.take(n_images)
+        if moment is None:
+            self._add_next()
+            moment = self._pairs.take(n_images)
+        moved_ms = self._pairs.moved_ms()
+        if moved_ms is not None:
+            self._listener.on_camera(Troubled(FramesHeldUp(held_up(moved_ms))), 1)
+        return moment
+
+    def _add_next(self) -> None:
+        """Take the next frame of the camera whose turn it is."""
         wanted = self._pairs.wanted
         try:
             frame = self._workers[wanted].next_frame(LONGEST_WAIT)
         except FrameTimeout:  # what the other has sent goes on, and finds no partner
             wanted = 1 - wanted
             frame = self._workers[wanted].next_frame(0.0)
-        return self._pairs.add(wanted, frame, n_images)
+        self._pairs.add(wanted, frame)
 
     def _refuse_recordings(self) -> None:
         """Tell once that two recordings are not of the same moments."""
@@ -368,7 +404,8 @@ class Live:
         if wanted is not self._wanted:
             self._wanted = wanted
             self._last.clear()
-        aim = wanted.aims[c]
+        aims = wanted.aims
+        aim = aims[c] if c < len(aims) else Aim()  # of cameras that come or go
         camera, pen, mask = aim.camera, aim.pen, aim.mask
         if camera is None or pen is None or not camera.fits(frame.image):
             try:

@@ -23,6 +23,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.model.camera import Camera, PointMap
 
+IDENTITY = np.eye(2)
+
 
 class Ellipses(NamedTuple):
     """Filled ellipses in an image.
@@ -107,19 +109,35 @@ def disc_images(
     Ellipses
         In px.
     """
-    centers = conic_centers(centers_cam, normals_cam, radius)
+    conics = conic_images(centers_cam, normals_cam, radius)
+    pixels = camera.pixels_with_jacobian(conics.centers)
+    J = pixels.jacobian
+    return Ellipses(pixels.points, J @ conics.shapes @ np.swapaxes(J, -1, -2))
+
+
+def conic_images(
+    centers_cam: FloatArray, normals_cam: FloatArray, radius: float
+) -> Ellipses:
+    """Return centre and shape of the conics that discs are in the normalised plane.
+
+    Parameters
+    ----------
+    centers_cam, normals_cam : (..., 3) array
+        Centres, mm, and unit normals of the discs in the camera frame.
+    radius : float
+        Radius of the discs, mm.
+    """
     X, n = centers_cam, normals_cam
     r2 = radius**2
     scale = X[..., 2] ** 2 - r2 * (1 - n[..., 2] ** 2)
+    centers = conic_centers(centers_cam, normals_cam, radius)
     # C* = scale [[S - c c^T, -c], [-c^T, -1]], (x - c)^T S^-1 (x - c) = 1 on the rim.
     upper = (
-        r2 * (np.eye(2) - n[..., :2, None] * n[..., None, :2])
+        r2 * (IDENTITY - n[..., :2, None] * n[..., None, :2])
         - X[..., :2, None] * X[..., None, :2]
     )
     rim = upper / scale[..., None, None] + centers[..., :, None] * centers[..., None, :]
-    pixels = camera.pixels_with_jacobian(centers)
-    J = pixels.jacobian
-    return Ellipses(pixels.points, 0.25 * J @ rim @ np.swapaxes(J, -1, -2))
+    return Ellipses(centers, 0.25 * rim)
 
 
 def centers_from_centroids(
@@ -174,12 +192,11 @@ def _centroid_offsets(
     undistorted = camera.unproject_with_jacobian(centers)
     J = undistorted.jacobian
     normalised_shapes = J @ shapes @ np.swapaxes(J, -1, -2)
-    roots = np.sqrt(2) * np.linalg.cholesky(normalised_shapes)
-    steps = np.stack(
-        [roots[..., 0], -roots[..., 0], roots[..., 1], -roots[..., 1]], axis=-2
-    )
+    roots = np.sqrt(2) * np.swapaxes(np.linalg.cholesky(normalised_shapes), -1, -2)
+    steps = np.concatenate([roots, -roots], axis=-2)
     there = camera.pixels_with_jacobian(undistorted.points[..., None, :] + steps)
-    areas = np.linalg.det(there.jacobian)
+    J = there.jacobian
+    areas = J[..., 0, 0] * J[..., 1, 1] - J[..., 0, 1] * J[..., 1, 0]
     means = np.einsum("...k,...ki->...i", areas, there.points)
     offsets: FloatArray = means / areas.sum(axis=-1)[..., None] - centers
     return offsets

@@ -5,6 +5,15 @@ import numpy as np
 from lightpen.arrays import FloatArray
 
 IDENTITY = np.eye(3)
+# Of the rotations about x, y and z, row by row.
+GENERATORS = np.array(
+    [
+        [0, 0, 0, 0, 0, -1, 0, 1, 0],
+        [0, 0, 1, 0, 0, 0, -1, 0, 0],
+        [0, -1, 0, 1, 0, 0, 0, 0, 0],
+    ],
+    dtype=np.float64,
+)
 TINY = 1e-200  # rad^2; added to no angle that differs from 0
 
 
@@ -90,11 +99,7 @@ def rotation_from_quaternion(quaternion: FloatArray) -> FloatArray:
 
 def skew(vectors: FloatArray) -> FloatArray:
     """Return the matrices K with ``K @ p = v x p``, shape (..., 3, 3)."""
-    K = np.zeros((*vectors.shape, 3))
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
-    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
-    return K
+    return np.asarray((vectors @ GENERATORS).reshape(*vectors.shape, 3))
 
 
 def nearest_rotation(matrices: FloatArray) -> FloatArray:

@@ -114,6 +114,21 @@ class FolderArchive:
         ]
         return tuple(filter(None, dict.fromkeys(found)))
 
+    def files_of_pen(self, pen: str, *, is_simulated: bool = False) -> tuple[Path, ...]:
+        """Return the results of a pen that are not taken back, the newest first.
+
+        Raises
+        ------
+        FileError
+            The archive cannot be read at all.
+        """
+        return tuple(
+            file
+            for root in self._roots(is_simulated)
+            for file, heading in self._standing(root, passes_over_damage=True)
+            if heading.pen == pen and self._is_simulated(heading) is is_simulated
+        )
+
     def supervision(self) -> Supervision:
         """Return what supervisors have laid down."""
         return read_supervision(self._data)

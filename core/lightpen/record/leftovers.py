@@ -6,11 +6,12 @@ from pathlib import Path
 
 from lightpen.errors import FileError
 from lightpen.formats.part_files import sweep_parts
-from lightpen.record.folder_archive import RECORDS, RESULTS
+from lightpen.record.folder_archive import RECORDS, RESULTS, SIMULATED
 from lightpen.record.header import HEADER
 from lightpen.record.journal import JOURNAL, last_verdict
 from lightpen.record.lock import is_locked
 from lightpen.record.reading import IMAGES, OPENER
+from lightpen.record.verifications import UNDER_WAY, VERIFICATIONS
 
 OLDEST = 1.0  # s; after it nobody is between making a folder and locking its journal
 
@@ -21,6 +22,8 @@ def sweep_leftovers(data: Path) -> None:
     What a running program is writing is left alone, and so is all that it cannot be.
     """
     sweep_parts(data / RESULTS)
+    for root in (data, data / SIMULATED):
+        sweep_parts(root / VERIFICATIONS / UNDER_WAY)
     with suppress(OSError):  # the search for interrupted swings tells it
         for folder in list((data / RECORDS).iterdir()):
             with suppress(OSError, FileError):

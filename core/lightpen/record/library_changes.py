@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from msgspec import structs, to_builtins
 
-from lightpen.errors import NameTakenError, UsageError
+from lightpen.errors import FileError, NameTakenError, UsageError
 from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import MEGABYTE, create_whole, printable, read_bytes
 from lightpen.formats.image_headers import read_image_header
@@ -141,6 +141,40 @@ def known_item(library: Library, kind: ItemKind, name: str) -> AnyItem:
     return found
 
 
+def read_picture(file: Path) -> bytes:
+    """Return the content of a file that holds a picture.
+
+    Raises
+    ------
+    FileError
+        It cannot be read, or is no picture.
+    """
+    content = read_bytes(file, PICTURE, LARGEST_PICTURE)
+    read_image_header(BytesIO(content), printable(str(file)))
+    return content
+
+
+def read_kept_picture(data: Path, picture: Picture) -> bytes:
+    """Return the content of a picture in the data folder.
+
+    Raises
+    ------
+    FileError
+        As of `read_picture`, or it is not the one that was kept.
+    """
+    file = data / picture.place
+    content = read_picture(file)
+    if sha256(content).hexdigest() != picture.sha256:
+        raise FileError(
+            sentence(
+                "library.other-picture",
+                "The picture {path} is not the one that was kept. Keep it again.",
+                path=printable(str(file)),
+            )
+        )
+    return content
+
+
 def keep_picture(data: Path, file: Path) -> Picture:
     """Copy a picture into the data folder, by its hash, and return where it is.
 
@@ -149,8 +183,7 @@ def keep_picture(data: Path, file: Path) -> Picture:
     FileError
         It cannot be read, is no picture, or cannot be kept.
     """
-    content = read_bytes(file, PICTURE, LARGEST_PICTURE)
-    read_image_header(BytesIO(content), printable(str(file)))
+    content = read_picture(file)
     digest = sha256(content).hexdigest()
     kept = data / LIBRARY / PICTURES / f"{digest[:16]}{file.suffix.lower()}"
     make_folder(kept.parent)

@@ -247,7 +247,8 @@ def require_supervisor(supervision: Supervision, signature: Signature) -> None:
         raise AcceptanceError(
             sentence(
                 "supervisor.no-password",
-                "There is no supervisor's password yet. Lay one down with the limits.",
+                "There is no supervisor's password yet. Type one at Start, where all "
+                "limits of the station are.",
             )
         )
     try:

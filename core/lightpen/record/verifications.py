@@ -20,6 +20,7 @@ from lightpen.sentences import sentence
 
 VERIFICATIONS = "verifications"
 TOUCHES = "touches"  # in that folder: the images of live touches, run by run
+UNDER_WAY = "under way"  # likewise: what is not concluded yet
 CONCLUSION = "conclusion"
 
 

@@ -13,7 +13,7 @@ from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.camera_files import write_camera
 from lightpen.formats.decoding import encode_png
-from lightpen.formats.files import strerror, write_whole
+from lightpen.formats.files import why_unwritten, write_whole
 from lightpen.formats.pen_files import write_pen
 from lightpen.formats.rig_files import write_rig
 from lightpen.formats.simulated_files import mark_simulated
@@ -288,10 +288,9 @@ def _no_folder(folder: Path, error: OSError) -> FileError:
     return FileError(
         sentence(
             "scene.no-folder",
-            "The folder {folder} cannot be made or read: {reason}. Choose another "
-            "folder.",
+            "The folder {folder} cannot be made or read: {reason}",
             folder=str(folder),
-            reason=strerror(error),
+            reason=why_unwritten(error),
         )
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.simulator.hand import Doing, Operator
 from lightpen.verification.choices import TaskKind
-from lightpen.verification.session import SessionSetup, SessionState
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touching import TouchPhase
 
 LEANT, LEANT_FAR = 0.2, 0.4  # rad
@@ -68,12 +68,14 @@ class Toucher:
 
     def follow(self, setup: SessionSetup, state: SessionState) -> None:
         """Do what a state of the verification asks for; a lifted tip is put back."""
-        wanted = _Wanted(state.task(setup), len(state.runs), len(state.touches))
+        n_runs = len(state.runs) + len(state.visits)
+        wanted = _Wanted(state.task(setup), n_runs, len(state.touches))
         is_lifted = self._operator.doing in (Doing.LIFTED, Doing.ABSENT)
         if wanted == self._wanted and not (is_lifted and wanted.task is not None):
             return
         is_taken = state.touching.phase is TouchPhase.TAKEN
-        if is_lifted and is_taken and wanted.task is TaskKind.ARTICULATION:
+        again = wanted.task in (TaskKind.ARTICULATION, TaskKind.DRIFT)
+        if is_lifted and is_taken and again:
             return  # it has to move on first
         before, self._wanted = self._wanted, wanted
         step, artefacts = wanted.step, self._artefacts
@@ -83,18 +85,19 @@ class Toucher:
             tilt = (LEANT, LEANT_FAR)[step % 2]
             direction = 2 * pi * step / setup.choices.n_touches
             self._operator.lean_towards(tilt, direction, 0.0)
-        elif wanted.task is TaskKind.ARTICULATION:
+        elif again:
             if is_taken:
                 self._operator.lift()
             else:
                 self._operator.seat()
-                tilt = LEANT_FAR if wanted.run else 0.0
-                self._operator.lean_towards(tilt, pi / 2 * wanted.run, 0.0)
+                n_postures = len(state.runs)
+                tilt = LEANT_FAR if n_postures else 0.0
+                self._operator.lean_towards(tilt, pi / 2 * n_postures, 0.0)
         elif wanted.task is TaskKind.CIRCLE:
             self._operator.touch(artefacts.on_ring(step))
         elif wanted.task is TaskKind.LENGTH:
             ends = artefacts.bar_start, artefacts.bar_end
-            lower = BAR_STEP * wanted.run * DOWNWARDS
+            lower = BAR_STEP * len(state.runs) * DOWNWARDS
             self._operator.touch(ends[step % 2] + lower)
         else:
             self._operator.leave()

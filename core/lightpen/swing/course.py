@@ -38,6 +38,7 @@ from lightpen.record.writing import OtherView, RecordWriter, make_folder, note_t
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
 from lightpen.swing.capture import Rule, capture_image
+from lightpen.swing.moment import seen_by_rig
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.recorded import pass_over, read_image
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
@@ -50,7 +51,7 @@ from lightpen.swing.rules import (
     resume,
     stillness,
 )
-from lightpen.swing.serial_queue import Act, Report, Start, Task
+from lightpen.swing.serial_queue import Act, OneTask, Report, Start, Task
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
 from lightpen.swing.tally import Tally
@@ -101,7 +102,7 @@ class SwingCourse:
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
-        self._task: Task | None = None
+        self._task = OneTask(start, self.cancel, listener.on_progress)
         self._stopped_at: SwingStatus | None = None  # by a bug
 
     @property
@@ -114,7 +115,7 @@ class SwingCourse:
 
         Images are not taken until something else has changed: they may all have it.
         """
-        if self._task is None:  # it may have ended by this bug
+        if not self._task.is_there:  # it may have ended by this bug
             self._status = replace(self._status, activity=Activity.NONE)
         try:
             self.pause()
@@ -227,7 +228,7 @@ class SwingCourse:
             return  # it goes on already
         names = recorded_names(record)
         writer = RecordWriter.resume(record)
-        self._drop_task()
+        self._task.drop()
         self._close_record()
         self._writer, self._record = writer, record
         self._n_others = 0
@@ -259,6 +260,8 @@ class SwingCourse:
         status, choices = self._status, self._attendance.choices
         if status is self._stopped_at:
             return
+        if sighting is not None and setup is not None:
+            sighting = seen_by_rig(setup.rig, setup.pen, sighting)
         if status.state is None:
             if self._attendance.is_due and choices is not None:
                 self.begin(choices)
@@ -365,7 +368,7 @@ class SwingCourse:
 
     def abandon(self) -> None:
         """Leave the swing as it is on the disk."""
-        self._drop_task()
+        self._task.drop()
         self._close_record()
         self._publish(SwingStatus(setup=self._status.setup))
 
@@ -409,14 +412,12 @@ class SwingCourse:
         )
 
     def _on_read(self, swing: Resumable) -> None:
-        self._task = None
         try:
             self._enter(swing)
         except LightpenError as error:
             self._on_unread(error.sentence)
 
     def _on_unread(self, why: Sentence) -> None:
-        self._task = None
         self._tell_trouble(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
@@ -430,7 +431,7 @@ class SwingCourse:
     def solve(self) -> None:
         """Have the tip computed."""
         status, folder = self._status, self._status.record_folder
-        if folder is None or self._task is not None:
+        if folder is None or self._task.is_there:
             return
         if not status.is_capturing and status.result is None:
             self._compute(lambda report: solve_record(open_record(folder), report))
@@ -454,7 +455,7 @@ class SwingCourse:
         if status.solution is None or status.result is not None or status.is_reading:
             return
         self._wanted = taken_out
-        if self._task is None:
+        if not self._task.is_there:
             self._solve_again(status.solution)
 
     def _solve_again(self, solution: Solution) -> None:
@@ -479,27 +480,20 @@ class SwingCourse:
         then: Callable[[T], None],
         otherwise: Callable[[Sentence], None],
     ) -> None:
-        self._task = self._start_task(
-            *(work, then, otherwise, self.cancel, self._listener.on_progress)
-        )
+        self._task.begin(work, then, otherwise)
         self._publish(replace(self._status, activity=activity))
-
-    def _drop_task(self) -> None:
-        task, self._task = self._task, None
-        if task is not None:
-            task.cancel()
 
     def cancel(self) -> None:
         """Stop computing and reading."""
-        if self._task is None:
+        if not self._task.is_there:
             return
-        self._drop_task()
+        self._task.drop()
         if self._status.solution is not None:
             self._wanted = self._status.solution.taken_out
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _on_solved(self, solved: "_Solved") -> None:
-        self._task, solution = None, solved.solution
+        solution = solved.solution
         status = self._status
         before, folder, state = status.solution, status.record_folder, status.state
         assert folder is not None
@@ -528,7 +522,6 @@ class SwingCourse:
             self._solve_again(solution)
 
     def _on_unsolved(self, why: Sentence) -> None:
-        self._task = None
         solution = self._status.solution
         if solution is None:
             status = replace(self._status, activity=Activity.NONE)
@@ -564,7 +557,7 @@ class SwingCourse:
 
     def _store(self, reason: str, signature: Signature | None) -> None:
         status, solution = self._status, self._status.solution
-        if solution is None or self._task is not None or status.result is not None:
+        if solution is None or self._task.is_there or status.result is not None:
             return
         self._publish(replace(status, activity=Activity.ACCEPTING))
         try:

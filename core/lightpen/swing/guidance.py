@@ -37,7 +37,7 @@ class Outlook:
     Attributes
     ----------
     rig : Rig
-        All cameras. The first must see the pen, the others tell what they see.
+        All cameras. One of them must see enough of the pen.
     tip_pen, cone_cam : (3,) array
         mm.
     information : (6, 6) array
@@ -161,9 +161,13 @@ def _candidates(pen: Pen) -> tuple[list[Posture], FloatArray, IntArray]:
 
 
 def _is_seen(outlook: Outlook, rotations: FloatArray) -> BoolArray:
-    """Return in which postures the first camera shows enough LEDs."""
-    n_seen = _usable_leds(outlook, rotations, 0).sum(axis=1)
-    return np.asarray(n_seen >= certain_leds(outlook.pen))
+    """Return in which postures a camera shows enough LEDs."""
+    least = certain_leds(outlook.pen)
+    each = [
+        _usable_leds(outlook, rotations, c).sum(axis=1) >= least
+        for c in range(outlook.rig.n_cameras)
+    ]
+    return np.asarray(np.any(each, axis=0))
 
 
 def _worth(outlook: Outlook, present: FloatArray, rotations: FloatArray) -> FloatArray:

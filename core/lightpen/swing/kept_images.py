@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
-from lightpen.detection.pose import fit_poses
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import CalibrationError
 from lightpen.estimation.joint import ContactModel, JointFit, fit_contact
@@ -15,6 +14,7 @@ from lightpen.model.assumptions import USUAL, Assumptions
 from lightpen.model.coverage import MIN_SPREAD, posture_spread
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
+from lightpen.swing.moment import fit_moments
 from lightpen.swing.seat import Seat, fit_seat, tip_distances
 
 MIN_JOINT = 8  # images of the first joint fit
@@ -129,19 +129,19 @@ def kept_before(
     pixels : (N, C, L, 2) array
         px; NaN where an LED was not seen.
     rotations, translations : (N, 3, 3) and (N, 3) array
-        cam_from_pen of the first camera, mm.
+        rig_from_pen, mm.
     """
     if not len(numbers):
         return none_kept(rig.n_cameras, pen.n_leds, assumed)
-    poses = fit_poses(rig.cameras[0], pen, pixels[:, 0], rotations, translations)
+    poses = fit_moments(rig, pen, pixels, rotations, translations)
     kept = KeptImages(
         numbers=numbers,
         times=np.full(len(numbers), -np.inf),
         pixels=pixels,
         rotations=poses.rotations,
         translations=poses.translations,
-        cofactors=poses.covariances / poses.sigma**2,
-        sigmas=np.full(len(numbers), poses.sigma),
+        cofactors=poses.cofactors,
+        sigmas=poses.sigmas,
         assumed=assumed,
     )
     return _refit(rig, pen, kept, poses.rotations)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lightpen.model.pen import Pen
+from lightpen.model.rig import Rig
 from lightpen.record.header import damaged_file
 from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import (
@@ -69,7 +70,7 @@ def read_resumable(folder: Path) -> Resumable:
     """
     record = open_record(folder)
     setup = recorded_setup(record)
-    if not _shows(record, setup.pen, setup.rig.n_cameras):
+    if not _shows(record, setup.pen, setup.rig):
         raise damaged_file(folder / JOURNAL)
     if record.more is not None:
         min_images, max_images = record.more
@@ -96,18 +97,20 @@ def read_for_more(folder: Path) -> Resumable:
     return replace(swing, record=open_record(folder), setup=setup)
 
 
-def _shows(record: Record, pen: Pen, n_cameras: int) -> bool:
-    """Return whether the journal can be of this pen before so many cameras.
+def _shows(record: Record, pen: Pen, rig: Rig) -> bool:
+    """Return whether the journal can be of this pen before these cameras.
 
     Lines of format 1 have no checksum that would tell.
     """
     for image in record.images:
         R, t = image.rotation, image.translation
-        if image.rig_pixels.shape[:2] != (n_cameras, pen.n_leds):
+        if image.rig_pixels.shape[:2] != (rig.n_cameras, pen.n_leds):
             return False
         if not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=ROUNDING):
             return False
-        if (pen.leds @ R[2] + t[2]).min() <= 0:
+        leds_rig = pen.leds @ R.T + t
+        depths = leds_rig @ rig.rotations[:, 2].T + rig.translations[:, 2]
+        if depths.min(axis=0).max() <= 0:  # behind all of them
             return False
     return True
 

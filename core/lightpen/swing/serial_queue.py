@@ -193,3 +193,57 @@ class Start(Protocol):
         on_progress: Report,
     ) -> Task:
         """Return the task; one of the three callables is called in its turn."""
+
+
+class OneTask:
+    """At most one computation beside a queue; its owner is told what came of it.
+
+    Parameters
+    ----------
+    start : Start
+        Of the queue.
+    on_bug : callable
+        Done when the computation ended by a bug; it is then still there.
+    on_progress : callable
+        Takes the fraction done, 0 to 1, on the thread of the computation.
+    """
+
+    def __init__(self, start: Start, on_bug: Act, on_progress: Report) -> None:
+        self._start = start
+        self._on_bug = on_bug
+        self._on_progress = on_progress
+        self._task: Task | None = None
+
+    @property
+    def is_there(self) -> bool:
+        """Whether something is computed whose outcome is awaited."""
+        return self._task is not None
+
+    def begin(
+        self,
+        work: Callable[[Report], T],
+        then: Callable[[T], None],
+        otherwise: Callable[[Sentence], None],
+    ) -> None:
+        """Have something computed, as `SerialQueue.start` has it.
+
+        When the outcome is told, it is there no more.
+        """
+
+        def succeed(outcome: T) -> None:
+            self._task = None
+            then(outcome)
+
+        def fail(why: Sentence) -> None:
+            self._task = None
+            otherwise(why)
+
+        self._task = self._start(
+            *(work, succeed, fail, self._on_bug, self._on_progress)
+        )
+
+    def drop(self) -> None:
+        """Cancel what is computed; its outcome is not told any more."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()

@@ -16,17 +16,18 @@ class TaskKind(StrEnum):
     CIRCLE = "circle"
     LENGTH = "length"
     ARTICULATION = "articulation"
+    DRIFT = "drift"  # of a cone that stands still, before, between and after the others
 
 
 WHOLE = TaskKind.FIXED_POINT, TaskKind.CIRCLE, TaskKind.LENGTH  # the paper's three
 
 
 class Surface(StrEnum):
-    """What of a ring the ball touches."""
+    """What of a ring, or of the ends of a length, the ball touches."""
 
-    GROOVE = "groove"  # in which the centre of the ball runs
-    BORE = "bore"
-    BOSS = "boss"
+    GROOVE = "groove"  # in which the centre of the ball runs, or cones
+    BORE = "bore"  # or inner faces
+    BOSS = "boss"  # or outer faces
 
 
 class Wanting(StrEnum):
@@ -50,8 +51,8 @@ WANTING = {
     ),
     Wanting.BALL: sentence(
         "verification.no-ball",
-        "The diameter of the ball is not known, which a ring touched in its bore or "
-        "from outside needs. Enter it where the tip is named.",
+        "The diameter of the ball is not known, which a ring or a length touched at "
+        "its faces needs. Enter it where the tip is named.",
     ),
     Wanting.LENGTH: sentence(
         "verification.no-length",
@@ -76,6 +77,8 @@ class VerificationChoices:
         Round the ring.
     length, length_uncertainty : float
         As those of the radius.
+    length_surface : Surface
+        What the ball touches at its ends.
     n_places : int
         At which the length is touched.
     n_frames : int
@@ -90,6 +93,7 @@ class VerificationChoices:
     n_runs: int = 1
     length: float = 0.0
     length_uncertainty: float = 0.0
+    length_surface: Surface = Surface.GROOVE
     n_places: int = 1
     n_frames: int = FAST
     limits: VerificationLimits = field(default_factory=VerificationLimits)
@@ -97,17 +101,25 @@ class VerificationChoices:
     def wanting(self, ball_diameter: float | None) -> tuple[Wanting, ...]:
         """Return what is missing, with a ball of this diameter, mm."""
         wants_ring = TaskKind.CIRCLE in self.kinds
-        is_offset = wants_ring and self.surface is not Surface.GROOVE
+        wants_length = TaskKind.LENGTH in self.kinds
+        touched = (wants_ring, self.surface), (wants_length, self.length_surface)
+        is_offset = any(
+            wanted and surface is not Surface.GROOVE for wanted, surface in touched
+        )
         wanting = {
             Wanting.TASK: not self.kinds,
             Wanting.RADIUS: wants_ring and not self.radius,
             Wanting.BALL: is_offset and not ball_diameter,
-            Wanting.LENGTH: TaskKind.LENGTH in self.kinds and not self.length,
+            Wanting.LENGTH: wants_length and not self.length,
         }
         return tuple(each for each, is_wanting in wanting.items() if is_wanting)
 
 
 def ball_offset(surface: Surface, ball_diameter: float | None) -> float:
-    """Return what is to be added to the radius of a circle of tip centres, mm."""
+    """Return by how much a surface lies farther out than the tip's centre, mm.
+
+    That is to be added to the radius of a circle of tip centres, and to each end of a
+    length.
+    """
     sign = {Surface.GROOVE: 0.0, Surface.BORE: 1.0, Surface.BOSS: -1.0}[surface]
     return sign * (ball_diameter or 0.0) / 2

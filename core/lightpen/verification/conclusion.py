@@ -14,11 +14,12 @@ from typing import Any
 
 from lightpen.estimation.report import plain
 from lightpen.formats.hashes import InputFile
+from lightpen.model.origin import Origin
+from lightpen.record.names import Names
 from lightpen.record.outcome import TrialOutcome
 from lightpen.record.verifications import CONCLUSION
 from lightpen.verification.assessment import Conformity
 from lightpen.verification.keeping import file_entry
-from lightpen.verification.tip_in_force import TipInForce
 
 
 @dataclass(frozen=True)
@@ -46,16 +47,22 @@ class Conclusion:
 
 
 def conclusion_record(
-    tip: TipInForce, conclusion: Conclusion, files: tuple[InputFile, ...]
+    names: Names,
+    origin: Origin,
+    tip_file: InputFile,
+    conclusion: Conclusion,
+    files: tuple[InputFile, ...],
 ) -> dict[str, Any]:
     """Return the record of a conclusion.
 
     Parameters
     ----------
+    tip_file : InputFile
+        The result that was verified.
     files : tuple of InputFile
         All records of the session.
     """
-    names, found = tip.names, conclusion.found
+    found = conclusion.found
     return {
         "program": {"name": "lightpen", "version": version("lightpen")},
         "created": conclusion.at.isoformat(timespec="seconds"),
@@ -66,12 +73,12 @@ def conclusion_record(
         "operator": names.operator,
         "pen": names.pen,
         "tip": names.tip,
-        "origin": tip.origin,
+        "origin": origin,
         "verdict": None
         if found is None
         else {"grade": found.grade.value, **plain(found.reason)},
         "supervisor": conclusion.supervisor,
         "reason": conclusion.reason,
-        "inputs": {"tip": file_entry(tip.tip_file)},
+        "inputs": {"tip": file_entry(tip_file)},
         "records": [file_entry(file) for file in files],
     }

@@ -4,46 +4,55 @@ Nothing here knows threads: one who owns a course makes all calls in turn, and h
 takes long done elsewhere.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
+
+from msgspec.structs import replace as with_entries
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
-from lightpen.detection.fixed_lamps import masked_lights
 from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, FileError, LightpenError
 from lightpen.estimation.verdict import Grade
-from lightpen.formats.hashes import all_hashed
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.outcome import TrialOutcome
 from lightpen.record.supervision import Signature, require_supervisor
+from lightpen.record.verifications import TOUCHES
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.serial_queue import Report, Start, Task
+from lightpen.swing.serial_queue import OneTask, Report, Start
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
-from lightpen.verification.conclusion import Conclusion, conclusion_record
+from lightpen.verification.conclusion import Conclusion
+from lightpen.verification.going_on import GoneOn, go_on_with
 from lightpen.verification.keeping import (
     TouchedImages,
-    keep_verification,
     task_record,
     verifications_folder,
 )
 from lightpen.verification.recorded_runs import Done, read_runs
 from lightpen.verification.session import (
-    SessionSetup,
-    SessionState,
     SessionTransition,
     advance,
     end_task,
     rules_of,
+    setup_of,
     touched_anew,
     with_found,
+)
+from lightpen.verification.session_records import (
+    KeptRecord,
+    SessionRecords,
+    concluding,
+)
+from lightpen.verification.session_state import (
+    SessionSetup,
+    SessionState,
     without_touches,
 )
 from lightpen.verification.status import (
@@ -62,26 +71,41 @@ from lightpen.verification.touch_images import (
     is_held_on,
     new_record,
 )
-from lightpen.verification.touching import TouchHappening, TouchPhase, TouchRules
-from lightpen.verification.witness import LampImages, LampWitness, witnessed
+from lightpen.verification.touching import TouchHappening, TouchPhase, read_rules
+from lightpen.verification.under_way import (
+    InterruptedVerification,
+    ReadImages,
+    UnderWay,
+    UnderWayFile,
+    under_way_path,
+)
+from lightpen.verification.witness import LampWatch, LampWitness
 
+ANOTHER = sentence(
+    "verification.another-under-way",
+    "Another verification is under way. Finish it or start over, then go on with the "
+    "interrupted one.",
+)
+NOT_READY = sentence(
+    "verification.not-ready",
+    "A name, the images of the camera or a file is missing. Choose what the steps say, "
+    "and go on with the verification then.",
+)
 BUG = sentence(
     "verification.bug",
     "The program made a mistake of its own, and the verification is paused. What was "
     "found so far is kept; go on, or start it over.",
 )
-N_RECENT = 10  # images before a hold is noticed, of which the first belong to it
-ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
-class _Kept:
-    """A record that waits to be written; those of its session are written before."""
+class _TaskDone:
+    """A task that is done, and the images of its touches."""
 
-    record_of: Callable[[tuple[Path, ...]], Mapping[str, Any]]
-    is_simulated: bool
+    task: TaskKind
+    images: TouchedImages
 
 
 class VerificationCourse:
@@ -109,16 +133,19 @@ class VerificationCourse:
         self._data = data
         self._listener = listener
         self._now = now
-        self._start_task = start
         self._status = VerificationStatus()
         self._preparation: Preparation | None = None
         self._choices = VerificationChoices()
-        self._unwritten: tuple[_Kept, ...] = ()
+        self._records = SessionRecords(data)
+        self._unkept_tasks: tuple[_TaskDone, ...] = ()  # whose drift is not known yet
+        self._read_images: tuple[ReadImages, ...] = ()
         self._trouble: Sentence | None = None
-        self._task: Task | None = None
-        self._lamps: tuple[LampImages, ...] = ()  # of each camera
+        self._task = OneTask(start, self.recover, listener.on_progress)
+        self._lamps = LampWatch()
         self._images = TouchImages(self._new_record)
+        self._file: UnderWayFile | None = None  # of the verification under way
         self._unkept: Sentence | None = None  # why images are not kept now
+        self._unnoted: Sentence | None = None  # why it could not be gone on with
 
     @property
     def status(self) -> VerificationStatus:
@@ -127,7 +154,7 @@ class VerificationCourse:
 
     def recover(self) -> None:
         """Carry on after a bug, paused: the next image may have it again."""
-        self._drop_task()
+        self._task.drop()
         status = replace(self._status, reading=Reading.NOTHING, is_paused=True)
         refusal = BUG if status.tip is None else status.refusal
         self._publish(replace(status, refusal=refusal))
@@ -166,7 +193,7 @@ class VerificationCourse:
 
     def start_over(self) -> None:
         """Forget all touches, and read the tip in force anew; what is kept stays."""
-        self._drop_task()
+        self._task.drop()
         self._relieve()
         self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here))
@@ -176,9 +203,8 @@ class VerificationCourse:
         """Do one task again; what it found before is kept."""
         status, state = self._status, self._status.state
         if state is not None:
-            self._images.forget()
-            state = touched_anew(state, task)
-            self._publish(replace(status, state=state, accepted_by=""))
+            self._publish(replace(status, accepted_by=""))
+            self._touch_again(touched_anew(state, task))
 
     def accept(self, reason: str, signature: Signature | None) -> None:
         """Accept the tip though something was found against it, or say why not."""
@@ -191,7 +217,8 @@ class VerificationCourse:
         self._write()  # what is accepted is named by its files
         status = self._status
         tip, found, began = status.tip, status.assessment, status.began
-        is_open = status.is_done and not (status.accepted_by or self._unwritten)
+        is_written = not self._records.are_waiting
+        is_open = status.is_done and is_written and not status.accepted_by
         if not is_open or tip is None or found is None or began is None or not reason:
             return
         supervision = self._archive.supervision()
@@ -211,10 +238,10 @@ class VerificationCourse:
         conclusion = Conclusion(
             *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
-        file = self._write_next(_conclusion(tip, conclusion))
+        self._records.write_now(concluding(tip, conclusion, None))
         self._relieve()
         accepted_by = supervisor or tip.names.operator
-        kept = (*status.files, file)
+        kept = self._records.files
         self._publish(replace(status, files=kept, accepted_by=accepted_by))
 
     def end_task(self) -> None:
@@ -242,20 +269,88 @@ class VerificationCourse:
             image is a touch.
         """
         tip, setup = self._status.tip, self._status.setup
-        if self._task is not None or tip is None or setup is None:
+        if self._task.is_there or tip is None or setup is None:
             return
-        rules = TouchRules(setup.choices.n_frames) if is_still else ONE_IMAGE
+        rules = read_rules(is_still, setup.choices.n_frames)
         work = partial(read_runs, task, place, tip, setup, rules)
-        self._start(Reading.IMAGES, work, self._on_runs_read, self._on_runs_unread)
+        images = ReadImages(task, place, is_still)
+        self._start(
+            *(Reading.IMAGES, work),
+            *(partial(self._on_runs_read, images), self._on_runs_unread),
+        )
+
+    def go_on(self, interrupted: InterruptedVerification) -> None:
+        """Go on with an interrupted verification, or say why it cannot be."""
+        preparation, under_way = self._preparation, interrupted.under_way
+        status = self._status
+        if preparation is None or under_way is None or self._task.is_there:
+            return
+        if status.began is not None and not status.is_done:
+            self._tell_trouble(ANOTHER)
+            return
+        if preparation.lacks():
+            self._tell_trouble(NOT_READY)
+            return
+        chosen = replace(under_way.choices, limits=self._choices.limits)
+        again = with_entries(under_way, choices=chosen)
+        work = partial(go_on_with, self._archive, self._data, preparation, again)
+        self._start(
+            *(Reading.IMAGES, work),
+            *(partial(self._on_gone_on, interrupted.path), self._on_runs_unread),
+        )
+
+    def _on_gone_on(self, path: Path, before: GoneOn) -> None:
+        under_way, file = before.under_way, UnderWayFile(path)
+        self._give_up()
+        try:
+            file.hold()
+            folder = self._root(before.tip) / TOUCHES
+            self._images.take_over(under_way.runs, folder)
+        except FileError as error:
+            file.let_go()
+            self._on_runs_unread(error.sentence)
+            return
+        self._relieve()
+        self._choices, self._file = before.setup.choices, file
+        self._records.begin(before.files)
+        self._read_images, self._lamps = under_way.read, LampWatch()
+        self._unkept_tasks = self._unkept_of(before)
+        self._publish(
+            VerificationStatus(
+                tip=before.tip,
+                setup=before.setup,
+                state=before.state,
+                aim=before.tip.aim,
+                began=under_way.began,
+                files=before.files,
+                is_here=self._status.is_here,
+                refusal=self._why_not(before.tip),
+            )
+        )
+        self._keep_witnessed()
+        self._conclude_done()
+        self._publish(self._status)
+
+    def _unkept_of(self, before: GoneOn) -> tuple[_TaskDone, ...]:
+        """Return the tasks that were done and not written yet."""
+        found = [kind for kind in TaskKind if before.state.found(kind) is not None]
+        return tuple(
+            _TaskDone(
+                kind,
+                TouchedImages(before.tip.origin, records=self._images.records(kind)),
+            )
+            for kind in found
+            if kind in before.unwritten
+        )
 
     def cancel(self) -> None:
         """Stop reading."""
-        self._drop_task()
+        self._task.drop()
         self._publish(replace(self._status, reading=Reading.NOTHING))
 
     def shut_down(self) -> None:
         """Write what is not written yet."""
-        self._drop_task()
+        self._task.drop()
         self._give_up()
         self._write()
 
@@ -271,9 +366,9 @@ class VerificationCourse:
         assert state is not None
         if status.began is None:
             self._status = replace(status, began=self._now())
-            self._lamps = (LampImages(),) * len(aim.aims)
+            self._lamps = LampWatch()
         if state.touching.phase is TouchPhase.HOLDING:
-            self._note_lamps(frame, sighting, aim)
+            self._lamps = self._lamps.with_frame(frame, sighting, aim)
         together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
         try:
             name = self._name(frame, together, setup, state)
@@ -287,19 +382,6 @@ class VerificationCourse:
             self._relieve()
         self._unkept = None
         self._become(transition)
-
-    def _note_lamps(self, frame: Frame, sighting: Sighting, aim: Aim) -> None:
-        views = zip(
-            *(self._lamps, (frame, *frame.others), (sighting, *sighting.others)),
-            aim.aims,
-            strict=False,
-        )
-        self._lamps = tuple(
-            lamps.with_image(seen, masked_lights(own.image, of.mask, own.full_scale))
-            if seen.has_pose
-            else lamps
-            for lamps, own, seen, of in views
-        )
 
     def _with_drift(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
         """Return it with how far the camera has moved, where that is asked for next."""
@@ -321,7 +403,7 @@ class VerificationCourse:
             return str(frame.seq)
         if not is_held_on(rules_of(setup, task), state):
             return str(frame.seq)
-        return self._images.keep(frame, seen)
+        return self._images.keep(frame, seen, task)
 
     def _new_record(self) -> NewRecord:
         """Make a record for the images of the run at hand."""
@@ -336,10 +418,7 @@ class VerificationCourse:
                 "tip_sha256": tip.tip_file.sha256,
             }
         )
-        root = verifications_folder(
-            self._data, is_simulated=tip.origin is Origin.SIMULATED
-        )
-        return new_record(root, tip.names, header)
+        return new_record(self._root(tip), tip.names, header)
 
     def _become(self, transition: SessionTransition) -> None:
         before, state = self._status.state, transition.state
@@ -353,23 +432,34 @@ class VerificationCourse:
             assert tip is not None
             assert found is not None
             witness = self._witness(tip)
-            records = self._images.next_task()
+            records = self._images.records(finished)
             images = TouchedImages(tip.origin, witness=witness, records=records)
             self._status = replace(self._status, witness=witness)
-            self._keep(Done(finished, found, tip, images))
+            done = _TaskDone(finished, images)
+            self._unkept_tasks = (*self._unkept_tasks, done)
             happened.append(_ending(self._status))
+        self._keep_witnessed()
+        if finished is not None:
             self._conclude_done()
         self._publish(self._status, *happened)
 
     def _witness(self, tip: TipInForce) -> LampWitness | None:
-        """Return what lamps tell of the camera that moved farthest."""
-        limits, cameras = self._choices.limits, tip.instrument.rig.cameras
-        told = [
-            witnessed(lamps, camera.fx, limits)
-            for lamps, camera in zip(self._lamps, cameras, strict=False)
-        ]
-        known = [each for each in told if each is not None]
-        return max(known, key=lambda each: each.moved, default=None)
+        """Return what lamps tell of the camera."""
+        cameras = tip.instrument.rig.cameras
+        return self._lamps.witness(cameras, self._choices.limits)
+
+    def _touch_again(self, state: SessionState) -> None:
+        """Go on with another state, in which something is to be touched again."""
+        kinds = [kind for kind in TaskKind if state.found(kind) is not None]
+        if state.visits:
+            kinds.append(TaskKind.DRIFT)
+        self._images.forget_but(kinds)
+        self._unkept_tasks = tuple(
+            done for done in self._unkept_tasks if done.task in kinds
+        )
+        read = (images for images in self._read_images if images.task in kinds)
+        self._read_images = tuple(read)
+        self._publish(replace(self._status, state=state))
 
     # The tip
 
@@ -390,16 +480,23 @@ class VerificationCourse:
         setup = replace(setup, choices=choices)
         if state.task(setup) is not task:
             state = without_touches(state)
-        if state is not before:
-            self._images.forget()
+        if state.task(setup) is not None and state.drift is not None:
+            state = replace(state, drift=None)  # it was not of what comes now
+        if not state.is_witnessed(setup):
+            state = replace(state, unwitnessed=())
         refusal = self._why_not(status.tip)
-        self._publish(replace(status, setup=setup, state=state, refusal=refusal))
+        self._status = replace(status, setup=setup, refusal=refusal)
+        if state is before:
+            self._publish(self._status)
+        else:
+            self._touch_again(state)
+        self._keep_witnessed()
 
     def _read_tip(self) -> None:
         preparation = self._preparation
         if preparation is None or preparation.lacks():
             return
-        self._drop_task()
+        self._task.drop()
         archive = self._archive
         self._start(
             *(Reading.TIP, lambda _: read_tip_in_force(archive, preparation)),
@@ -407,20 +504,12 @@ class VerificationCourse:
         )
 
     def _on_tip_read(self, tip: TipInForce) -> None:
-        self._task = None
         status = replace(self._status, reading=Reading.NOTHING)
         if status.tip is None or not tip.is_like(status.tip):
             self._give_up()
-            setup = SessionSetup(
-                tip.instrument,
-                self._choices,
-                tip.names.ball_diameter,
-                tip.nominal_tip,
-                tip.cone_cam,
-            )
             status = VerificationStatus(
                 tip=tip,
-                setup=setup,
+                setup=setup_of(tip, self._choices),
                 state=SessionState(),
                 aim=tip.aim,
                 is_here=status.is_here,
@@ -428,7 +517,6 @@ class VerificationCourse:
         self._publish(replace(status, refusal=self._why_not(tip)))
 
     def _on_no_tip(self, why: Sentence) -> None:
-        self._task = None
         self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here, refusal=why))
 
@@ -441,21 +529,19 @@ class VerificationCourse:
 
     # Recorded images
 
-    def _on_runs_read(self, done: Done) -> None:
-        self._task = None
+    def _on_runs_read(self, images: ReadImages, done: Done) -> None:
         status = replace(self._status, reading=Reading.NOTHING)
         if status.state is None:
             return
         self._relieve()
-        self._images.forget()
-        state = with_found(status.state, done.found)
-        self._status = replace(status, state=state, began=status.began or self._now())
+        self._status = replace(status, began=status.began or self._now())
+        self._touch_again(with_found(status.state, done.found))
+        self._read_images = (*self._read_images, images)
         self._keep(done)
         self._conclude_done()
         self._publish(self._status, _ending(self._status))
 
     def _on_runs_unread(self, why: Sentence) -> None:
-        self._task = None
         self._tell_trouble(why)
         self._publish(replace(self._status, reading=Reading.NOTHING))
 
@@ -466,17 +552,23 @@ class VerificationCourse:
         then: Callable[[T], None],
         otherwise: Callable[[Sentence], None],
     ) -> None:
-        self._task = self._start_task(
-            *(work, then, otherwise, self.recover, self._listener.on_progress)
-        )
+        self._task.begin(work, then, otherwise)
         self._publish(replace(self._status, reading=reading))
 
-    def _drop_task(self) -> None:
-        task, self._task = self._task, None
-        if task is not None:
-            task.cancel()
-
     # Records
+
+    def _keep_witnessed(self) -> None:
+        """Keep what tasks have found, unless a witness will tell more of them."""
+        tip, state = self._status.tip, self._status.state
+        if tip is None or state is None:
+            return
+        waiting = {task for task, _ in state.unwitnessed}
+        done = self._unkept_tasks
+        self._unkept_tasks = tuple(each for each in done if each.task in waiting)
+        for each in done:
+            found = state.found(each.task)
+            if each.task not in waiting and found is not None:
+                self._keep(Done(each.task, found, tip, each.images))
 
     def _keep(self, done: Done) -> None:
         """Keep what a task has found, now or as soon as it can be written."""
@@ -487,8 +579,8 @@ class VerificationCourse:
             *(self._status.began or self._now(), done.images),
         )
         origins = done.tip.origin, done.images.origin
-        kept = _Kept(lambda _: record, Origin.SIMULATED in origins)
-        self._unwritten = (*self._unwritten, kept)
+        is_simulated = Origin.SIMULATED in origins
+        self._records.add(KeptRecord(lambda _: record, is_simulated, done.task))
         self._write()
 
     def _conclude_done(self) -> None:
@@ -500,9 +592,16 @@ class VerificationCourse:
 
     def _give_up(self) -> None:
         """Conclude what was begun and is not done."""
-        self._images.forget()
-        if self._status.began is not None and not self._status.is_done:
+        status = self._status
+        self._images.forget_but(())
+        if status.state is not None:
+            state = replace(status.state, unwitnessed=())
+            self._status = replace(status, state=state)
+            self._keep_witnessed()
+        if status.began is not None and not status.is_done:
             self._conclude(TrialOutcome.ABANDONED)
+        self._records.begin()
+        self._unkept_tasks, self._read_images, self._file = (), (), None
 
     def _conclude(self, outcome: TrialOutcome) -> None:
         """Say what became of the verification, with all records of it."""
@@ -510,29 +609,67 @@ class VerificationCourse:
         if status.tip is None or status.began is None:
             return
         conclusion = Conclusion(outcome, status.began, self._now(), status.assessment)
-        self._unwritten = (*self._unwritten, _conclusion(status.tip, conclusion))
+        self._records.add(concluding(status.tip, conclusion, self._file))
         self._write()
 
     def _write(self) -> None:
         """Write what waits for it, or tell why it cannot be."""
+        if not self._records.are_waiting:
+            return
         try:
-            while self._unwritten:
-                file = self._write_next(self._unwritten[0])
-                self._unwritten = self._unwritten[1:]
-                files = (*self._status.files, file)
-                self._status = replace(self._status, files=files)
-                self._relieve()
+            self._records.write()
+            self._relieve()
         except LightpenError as error:
             self._tell_trouble(error.sentence)
+        self._status = replace(self._status, files=self._records.files)
 
-    def _write_next(self, kept: _Kept) -> Path:
-        """Write a record of the session, whose other records are written."""
-        record = kept.record_of(self._status.files)
-        return keep_verification(self._data, record, is_simulated=kept.is_simulated)
+    def _note_under_way(self) -> None:
+        """Put on the disk what it takes to go on, should the program be killed."""
+        status, tip, runs = self._status, self._status.tip, self._images.runs
+        has_some = bool(runs or self._read_images)
+        if tip is None or status.began is None or status.is_done or not has_some:
+            return
+        root = self._root(tip)
+        if self._file is None:
+            path = under_way_path(root, tip.names, status.began)
+            self._file = UnderWayFile(path)
+        try:
+            self._file.note(
+                UnderWay(
+                    began=status.began,
+                    names=tip.names,
+                    origin=tip.origin,
+                    tip_file=tip.tip_file.path.name,
+                    tip_sha256=tip.tip_file.sha256,
+                    pen_sha256=tip.pen_file.sha256,
+                    seen_by=tip.viewers.hashes,
+                    choices=self._choices,
+                    runs=runs,
+                    read=self._read_images,
+                    files=tuple(file.name for file in self._records.files),
+                    unwritten=(
+                        *(done.task for done in self._unkept_tasks),
+                        *self._records.waiting,
+                    ),
+                )
+            )
+        except FileError as error:
+            if self._trouble is None:  # what stands in its way may be told already
+                self._unnoted = error.sentence
+                self._tell_trouble(error.sentence)
+            return
+        if self._unnoted is not None and self._unnoted is self._trouble:
+            self._relieve()
+        self._unnoted = None
+
+    def _root(self, tip: TipInForce) -> Path:
+        is_simulated = tip.origin is Origin.SIMULATED
+        return verifications_folder(self._data, is_simulated=is_simulated)
 
     def _publish(self, status: VerificationStatus, *events: SessionHappening) -> None:
         """Become this status, and tell of it."""
         self._status = status
+        self._note_under_way()
         self._listener.on_verification(status, events)
 
     def _tell_trouble(self, trouble: Sentence) -> None:
@@ -543,14 +680,6 @@ class VerificationCourse:
         trouble, self._trouble = self._trouble, None
         if trouble is not None:
             self._listener.on_relief(trouble)
-
-
-def _conclusion(tip: TipInForce, conclusion: Conclusion) -> _Kept:
-    """Return the record of a conclusion, to be written when its session is."""
-    return _Kept(
-        lambda files: conclusion_record(tip, conclusion, all_hashed(files)),
-        tip.origin is Origin.SIMULATED,
-    )
 
 
 def _verifies_like(one: Preparation, other: Preparation) -> bool:
@@ -565,8 +694,13 @@ def _asks_otherwise(
         {
             TaskKind.FIXED_POINT: (),
             TaskKind.CIRCLE: (of.radius, of.radius_uncertainty, of.surface),
-            TaskKind.LENGTH: (of.length, of.length_uncertainty),
+            TaskKind.LENGTH: (
+                of.length,
+                of.length_uncertainty,
+                of.length_surface,
+            ),
             TaskKind.ARTICULATION: (),
+            TaskKind.DRIFT: (),
         }[kind]
         for of in (one, other)
     ]

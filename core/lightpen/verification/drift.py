@@ -26,11 +26,18 @@ from lightpen.verification.assessment import (
     VERIFY_AGAIN,
     Conformity,
     accepted,
+    check,
     refused,
 )
 from lightpen.verification.touch import Touch, mean_point
 
 MIN_VISITS = 2
+ALONG = 3.0  # times the limit, that U may be along the view, as of a fixed point
+TOUCH_LONGER = sentence(
+    "drift.touch-longer",
+    "Next: hold the pen alike at each visit, take more images of a touch, or bring the "
+    "camera nearer.",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +117,7 @@ def _assessment(
     worst = int(np.argmax(lengths))
     axis = int(np.argmax(np.abs(moves[worst])))
     distance, uncertainty = float(lengths[worst]), float(uncertainties[worst, axis])
-    if distance > limits.drift:
+    if distance > max(limits.drift, uncertainty):
         return refused(
             sentence(
                 "drift.moved",
@@ -125,6 +132,21 @@ def _assessment(
                 limit=limits.drift,
             ),
             VERIFY_AGAIN,
+        )
+    across, along = uncertainties[:, :2].max(), uncertainties[:, 2].max()
+    largest = float(max(across, along / ALONG))
+    if max(largest, distance) > limits.drift:
+        return check(
+            sentence(
+                "drift.uncertain",
+                "The witness stays within {distance:.4f} mm, but U of it is "
+                "{uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move "
+                "of that size would not show.",
+                distance=distance,
+                uncertainty=float(uncertainties.max()),
+                limit=limits.drift,
+            ),
+            TOUCH_LONGER,
         )
     return accepted(
         sentence(

@@ -4,13 +4,9 @@ from lightpen.sentences import Sentence, sentence
 from lightpen.verification.articulation import N_POSTURES, N_TOUCHES
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.circle import MIN_ANGLE
-from lightpen.verification.session import (
-    ALIKE,
-    RING_TOUCHES,
-    SessionSetup,
-    SessionState,
-    covered,
-)
+from lightpen.verification.counting import ALIKE
+from lightpen.verification.session import RING_TOUCHES, VISIT_TOUCHES, covered
+from lightpen.verification.session_state import SessionSetup, SessionState, n_visits
 from lightpen.verification.touching import TouchPhase
 
 _KNOWN = {
@@ -28,6 +24,7 @@ _KNOWN = {
         "This end was touched before. Touch the other one.",
     ),
     TaskKind.ARTICULATION: ALIKE,
+    TaskKind.DRIFT: ALIKE,
 }
 
 
@@ -68,6 +65,17 @@ def instruction(setup: SessionSetup, state: SessionState) -> Sentence:
             posture=len(state.runs) + 1,
             n_postures=N_POSTURES,
         )
+    if task is TaskKind.DRIFT:
+        return sentence(
+            "session.touch-witness",
+            "Has the camera moved? Touch the cone {needed} times with the pen upright, "
+            "and lift the tip in between: {n_touches} of {needed}. Visit {visit} of "
+            "{n_visits}.",
+            needed=VISIT_TOUCHES,
+            n_touches=n_touches,
+            visit=len(state.visits) + 1,
+            n_visits=max(n_visits(choices), len(state.visits) + 1),
+        )
     return sentence(
         "session.touch-ends",
         "Touch one end of the length, then the other, and hold still on each: "
@@ -89,4 +97,6 @@ def fraction_done(setup: SessionSetup, state: SessionState) -> float:
             return (len(state.runs) + n_touches / 2) / choices.n_places
         case TaskKind.ARTICULATION:
             return (len(state.runs) + n_touches / N_TOUCHES) / N_POSTURES
+        case TaskKind.DRIFT:
+            return min(n_touches / VISIT_TOUCHES, 1.0)
     return 1.0

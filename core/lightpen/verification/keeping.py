@@ -19,17 +19,19 @@ from lightpen.record.verifications import VERIFICATIONS
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.circle import Circle
+from lightpen.verification.drift import Drift
 from lightpen.verification.fixed_point import FixedPoint
 from lightpen.verification.places import Viewers
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
+    drift_entries,
     fixed_point_entries,
     length_entries,
     rejected_entries,
     verification_record,
 )
-from lightpen.verification.session import Found
+from lightpen.verification.session_state import Found
 from lightpen.verification.tip_in_force import TipInForce
 from lightpen.verification.touch import RejectedFrame
 from lightpen.verification.touch_images import TouchRecord
@@ -40,6 +42,7 @@ LIMITS = {
     TaskKind.CIRCLE: ("radius", "form"),
     TaskKind.LENGTH: ("length",),
     TaskKind.ARTICULATION: ("location",),
+    TaskKind.DRIFT: ("drift",),
 }
 
 
@@ -147,6 +150,8 @@ def _entries(found: Found, tip: TipInForce) -> dict[str, Any]:
         return circle_entries(found, tip.instrument)
     if isinstance(found, Articulation):
         return articulation_entries(found)
+    if isinstance(found, Drift):
+        return drift_entries(found)
     return length_entries(found, tip.instrument)
 
 

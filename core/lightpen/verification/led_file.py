@@ -12,7 +12,7 @@ References
    298-372, section 6.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,6 +110,7 @@ def improve_pen(
     camera: Camera,
     pen: Pen,
     scale: Scale | None = None,
+    report: Callable[[float], None] = lambda fraction: None,
 ) -> ImprovedPen:
     """Improve the LEDs of a pen by several swings; the last one has to confirm it.
 
@@ -117,6 +118,8 @@ def improve_pen(
     ----------
     scale : Scale, optional
         Of the pen by certified lengths.
+    report : callable, optional
+        Called with the fraction done, 0 to 1; what it raises ends the work.
 
     Raises
     ------
@@ -139,8 +142,11 @@ def improve_pen(
         )
     _require_unchanged(calibrations, pen)
     *pooled, held_out = calibrations
-    improved = _pooled([calibrate_again(c, camera, pen) for c in pooled], pen, scale)
-    confirming = calibrate_again(held_out, camera, pen)
+    again = []
+    for n, calibration in enumerate(calibrations, start=1):
+        again.append(calibrate_again(calibration, camera, pen))
+        report(n / len(calibrations))
+    improved, confirming = _pooled(again[:-1], pen, scale), again[-1]
     before, after = (_fit_held(confirming, each) for each in (pen, improved))
     if not _is_better(before, after):
         raise CalibrationError(

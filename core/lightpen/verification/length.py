@@ -6,6 +6,7 @@ length shows it. So the lengths, with all that is known of them, tell the scale 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from lightpen.verification.assessment import (
     check,
     refused,
 )
-from lightpen.verification.touch import NO_DRIFT, Touch
+from lightpen.verification.touch import NO_DRIFT, Touch, on_surface
+
+Ends: TypeAlias = tuple[tuple[Touch, ...], tuple[Touch, ...]]
 
 MIN_APART = 0.1  # of the certified length, between two ends
 MAX_WIDE = 0.1  # of the distance of the ends, that touches of one end may scatter
@@ -45,7 +48,7 @@ class LengthRun:
     """
 
     name: str
-    ends: tuple[tuple[Touch, ...], tuple[Touch, ...]]
+    ends: Ends
     measured: float
     uncertainty: float
     along_view: float
@@ -101,6 +104,7 @@ def measure_length(
     limits: VerificationLimits,
     *,
     certified_uncertainty: float = 0.0,
+    ball_offset: float = 0.0,
     drift: FloatArray = NO_DRIFT,
 ) -> Length:
     """Measure a length at one or several places.
@@ -111,6 +115,9 @@ def measure_length(
         Name and touches of each place: both ends, each once or more.
     certified, certified_uncertainty : float
         The length and U (k = 2) of it, mm.
+    ball_offset : float
+        By which each end lies farther out than the centre of the ball that touched it,
+        mm: its radius between inner faces, less than 0 on outer ones, 0 in cones.
     drift : (3,) array
         Standard uncertainty of a point by a camera that moved meanwhile, mm.
 
@@ -121,7 +128,7 @@ def measure_length(
     """
     measured, rows, noises = [], [], []
     for name, touches in runs:
-        ends = _two_ends(name, touches, certified)
+        ends = _on_faces(_two_ends(name, touches, certified), ball_offset)
         middles = [np.mean([t.point_cam for t in end], axis=0) for end in ends]
         span = middles[1] - middles[0]
         length = float(np.linalg.norm(span))
@@ -163,9 +170,7 @@ def measure_length(
     )
 
 
-def _two_ends(
-    name: str, touches: Sequence[Touch], certified: float
-) -> tuple[tuple[Touch, ...], tuple[Touch, ...]]:
+def _two_ends(name: str, touches: Sequence[Touch], certified: float) -> Ends:
     """Part the touches by the widest gap along the line that they lie on."""
     if len(touches) < 2:
         raise CalibrationError(
@@ -212,6 +217,17 @@ def _two_ends(
             )
     first, second = (tuple(touches[int(i)] for i in sorted(end)) for end in ends)
     return first, second
+
+
+def _on_faces(ends: Ends, ball_offset: float) -> Ends:
+    """Return both ends moved from the centres of the ball to what it touched."""
+    one, other = (np.mean([t.point_cam for t in end], axis=0) for end in ends)
+    outwards = (other - one) / np.linalg.norm(other - one)
+    first, second = ends
+    return (
+        tuple(on_surface(touch, ball_offset, -outwards) for touch in first),
+        tuple(on_surface(touch, ball_offset, outwards) for touch in second),
+    )
 
 
 def _scale(

@@ -7,7 +7,8 @@ from lightpen.swing.serial_queue import Report
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.keeping import TouchedImages
 from lightpen.verification.places import runs_at, touch_place
-from lightpen.verification.session import Found, SessionSetup, measure
+from lightpen.verification.session import measure
+from lightpen.verification.session_state import Found, SessionSetup
 from lightpen.verification.sources import touch_run
 from lightpen.verification.tip_in_force import TipInForce, tip_at
 from lightpen.verification.touching import TouchRules

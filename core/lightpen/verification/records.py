@@ -22,7 +22,7 @@ from lightpen.verification.touch import RejectedFrame, Touch
 def verification_record(
     kind: str,
     entries: Mapping[str, Any],
-    assessment: Conformity,
+    assessment: Conformity | None,
     limits: Mapping[str, float],
     inputs: Mapping[str, Any],
 ) -> dict[str, Any]:
@@ -34,6 +34,8 @@ def verification_record(
         What was verified.
     entries : mapping
         What was found.
+    assessment : Conformity or None
+        None of what is measured and not judged.
     limits : mapping of str to float
         That it was judged by, mm.
     inputs : mapping
@@ -44,7 +46,9 @@ def verification_record(
         "created": local_now().isoformat(timespec="seconds"),
         "verification": kind,
         "coverage_factor": COVERAGE_FACTOR,
-        "verdict": {
+        "verdict": None
+        if assessment is None
+        else {
             "grade": assessment.grade.value,
             **plain(assessment.reason),
             "next_step": assessment.next_step,

@@ -22,6 +22,7 @@ from lightpen.swing.serial_queue import SerialQueue
 from lightpen.verification.choices import TaskKind, VerificationChoices
 from lightpen.verification.course import VerificationCourse
 from lightpen.verification.status import VerificationListener, VerificationStatus
+from lightpen.verification.under_way import InterruptedVerification
 
 
 class VerificationRunner:
@@ -102,6 +103,10 @@ class VerificationRunner:
     def read(self, task: TaskKind, place: str, *, is_still: bool) -> None:
         """Do a task with recorded images; see `VerificationCourse.read`."""
         self._queue.ask(partial(self._course.read, task, place, is_still=is_still))
+
+    def go_on(self, interrupted: InterruptedVerification) -> None:
+        """Go on with an interrupted verification; its names and files are chosen."""
+        self._queue.ask(partial(self._course.go_on, interrupted))
 
     def cancel(self) -> None:
         """Stop reading."""

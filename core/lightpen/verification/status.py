@@ -10,7 +10,7 @@ from lightpen.detection.aim import Aim
 from lightpen.sentences import Sentence
 from lightpen.verification.assessment import Conformity, worst
 from lightpen.verification.choices import TaskKind
-from lightpen.verification.session import SessionSetup, SessionState
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.tip_in_force import TipInForce
 from lightpen.verification.witness import LampWitness
 

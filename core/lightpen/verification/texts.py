@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from lightpen.arrays import FloatArray
+from lightpen.estimation.instrument import Instrument
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.verification.articulation import Articulation
 from lightpen.verification.assessment import Conformity
 from lightpen.verification.circle import Circle
@@ -23,7 +25,7 @@ from lightpen.verification.repeatability import (
     Capability,
     Repeatability,
 )
-from lightpen.verification.touch import RejectedFrame
+from lightpen.verification.touch import RejectedFrame, Touch
 
 MOST_COLUMNS = 10  # runs beside each other
 MOST_NAMED = 5  # images
@@ -128,6 +130,26 @@ def length_text(found: Length, rejected: Sequence[RejectedFrame]) -> str:
         *_left_out(rejected),
     ]
     return "\n".join([*lines, "", *_verdict(found.assessment)])
+
+
+def touches_text(
+    touches: Sequence[Touch],
+    instrument: Instrument,
+    rejected: Sequence[RejectedFrame],
+) -> str:
+    """Return points with their uncertainty as text."""
+    lines = [
+        "Points in the camera frame, mm",
+        f"{'Touch':<{TITLE}}"
+        + "".join(f"{each:>{COLUMN}}" for each in (*"uvw", "U u", "U v", "U w")),
+    ]
+    for touch in touches:
+        spread = np.sqrt(np.diag(touch.covariance(instrument)))
+        values = (*touch.point_cam, *(COVERAGE_FACTOR * spread))
+        cells = "".join(f"{x:{COLUMN}.4f}" for x in values)
+        lines.append(f"{touch.label[:TITLE]:<{TITLE}}{cells}")
+    lines.append("U has k = 2.")
+    return "\n".join([*lines, *_left_out(rejected)])
 
 
 def articulation_text(found: Articulation, rejected: Sequence[RejectedFrame]) -> str:

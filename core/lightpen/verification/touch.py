@@ -198,7 +198,7 @@ def on_surface(
     Parameters
     ----------
     ball_radius : float
-        mm.
+        mm; less than 0 against the direction.
     direction_cam : (3,) array, optional
         Unit vector from the ball to the surface; if not given, the approach, or along
         the axis of the stylus where none is known.

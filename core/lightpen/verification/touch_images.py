@@ -6,10 +6,12 @@ out. So a run can be given to whatever takes recorded images, and what a crash l
 whole.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.sighting import Sighting
@@ -18,11 +20,14 @@ from lightpen.formats.hashes import InputFile, hashed
 from lightpen.record.header import Header
 from lightpen.record.journal import JOURNAL
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, image_name
+from lightpen.record.reading import DISCARDED, Record, image_name, open_record
 from lightpen.record.verifications import TOUCHES
 from lightpen.record.writing import OtherView, RecordWriter, make_folder
-from lightpen.verification.session import SessionState, SessionTransition
+from lightpen.verification.choices import TaskKind
+from lightpen.verification.session import SessionTransition
+from lightpen.verification.session_state import SessionState, n_done
 from lightpen.verification.touching import TouchHappening, TouchPhase, TouchRules
+from lightpen.verification.under_way import CountingRun
 
 CONCLUDED = "concluded"
 NOT_COUNTED = "not counted"
@@ -62,17 +67,23 @@ class TouchImages:
     def __init__(self, begin: Callable[[], NewRecord]) -> None:
         self._begin = begin
         self._writer: RecordWriter | None = None
+        self._open: CountingRun | None = None
         self._folder: Path | None = None
         self._numbers: dict[str, int] = {}  # of images that count, by name
         self._touch = 1  # that the next image is of
-        self._records: tuple[TouchRecord, ...] = ()
+        self._runs: tuple[CountingRun, ...] = ()
+        self._records: dict[str, TouchRecord] = {}
 
     @property
-    def records(self) -> tuple[TouchRecord, ...]:
-        """The runs of the task at hand that are done."""
-        return self._records
+    def runs(self) -> tuple[CountingRun, ...]:
+        """The runs that count, in the order of time, the one at hand included."""
+        return self._runs if self._open is None else (*self._runs, self._open)
 
-    def keep(self, frame: Frame, seen: Sighting) -> str:
+    def records(self, task: TaskKind) -> tuple[TouchRecord, ...]:
+        """Return the runs of a task that are done."""
+        return tuple(self._records[r.folder] for r in self._runs if r.task is task)
+
+    def keep(self, frame: Frame, seen: Sighting, task: TaskKind) -> str:
         """Put an image on the disk, and return its name in the record.
 
         Raises
@@ -83,7 +94,7 @@ class TouchImages:
         if self._writer is None:
             new = self._begin()
             self._writer = RecordWriter.create(new.folder, new.header, is_swing=False)
-            self._folder = new.folder
+            self._folder, self._open = new.folder, CountingRun(task, new.folder.name)
         others = frame.others[: len(seen.others)]
         number = self._writer.append(
             *(frame.image, seen.pixels, seen.rotation, seen.translation),
@@ -95,7 +106,7 @@ class TouchImages:
             ],
             touch=self._touch,
         )
-        name = Path(image_name(number)).name
+        name = touch_image_name(number)
         self._numbers[name] = number
         return name
 
@@ -108,9 +119,7 @@ class TouchImages:
             It cannot be written.
         """
         state = transition.state
-        has_ended = transition.finished is not None or len(state.runs) > len(
-            before.runs
-        )
+        has_ended = transition.finished is not None or n_done(state) > n_done(before)
         counting = before if has_ended else state
         touching = counting.touching
         names = {frame.name for still in touching.taken for frame in still.frames}
@@ -124,18 +133,46 @@ class TouchImages:
             self._touch += 1
         self._take_out([name for name in self._numbers if name not in names])
         if has_ended:
-            self._end(CONCLUDED)
+            self._end(is_last=transition.finished is not None)
 
-    def forget(self) -> None:
-        """Close the run at hand as one that was given up, and begin another task."""
+    def forget_but(self, kinds: Collection[TaskKind]) -> None:
+        """Close the run at hand as one that was given up; those of some tasks count."""
         with suppress(FileError):  # it stays as one that was interrupted
-            self._end(DISCARDED)
-        self._records = ()
+            self._close(DISCARDED)
+        self._open = None
+        self._runs = tuple(run for run in self._runs if run.task in kinds)
 
-    def next_task(self) -> tuple[TouchRecord, ...]:
-        """Return the runs of the task that is done; those of another follow."""
-        records, self._records = self._records, ()
-        return records
+    def take_over(self, runs: Sequence[CountingRun], folder: Path) -> None:
+        """Go on after runs that were interrupted; one that is not done goes on.
+
+        Parameters
+        ----------
+        folder : Path
+            Of the records of all touches.
+
+        Raises
+        ------
+        FileError
+            A record cannot be read, or be written to.
+        """
+        self.forget_but(())
+        done = []
+        for run in runs:
+            record = open_record(folder / run.folder)
+            if record.verdict == CONCLUDED:
+                done.append(run)
+                self._records[run.folder] = _touch_record(folder / run.folder)
+            else:
+                self._resume(run, record)
+        self._runs = tuple(done)
+
+    def _resume(self, run: CountingRun, record: Record) -> None:
+        self._writer = RecordWriter.resume(record)
+        self._open, self._folder = run, record.folder
+        self._numbers = {touch_image_name(i.number): i.number for i in record.images}
+        for number in record.taken_out:
+            self._numbers.pop(touch_image_name(number), None)
+        self._touch = 1 + max((image.touch for image in record.images), default=0)
 
     def _take_out(self, names: list[str]) -> None:
         if names and self._writer is not None:
@@ -143,16 +180,33 @@ class TouchImages:
             for name in names:
                 del self._numbers[name]
 
-    def _end(self, verdict: str) -> None:
-        writer, folder = self._writer, self._folder
+    def _end(self, *, is_last: bool) -> None:
+        """Close the run at hand as one that is done."""
+        run, folder = self._open, self._folder
+        self._close(CONCLUDED)
+        self._open = None
+        if run is not None and folder is not None:
+            self._records[run.folder] = _touch_record(folder)
+            self._runs = (*self._runs, replace(run, is_last=is_last))
+        elif is_last and self._runs:  # ended between two runs
+            *others, last = self._runs
+            self._runs = (*others, replace(last, is_last=True))
+
+    def _close(self, verdict: str) -> None:
+        writer = self._writer
         self._writer, self._numbers, self._touch = None, {}, 1
-        if writer is None or folder is None:
-            return
-        with writer:
-            writer.conclude(verdict)
-        if verdict is CONCLUDED:
-            record = TouchRecord(folder, hashed(folder / JOURNAL))
-            self._records = (*self._records, record)
+        if writer is not None:
+            with writer:
+                writer.conclude(verdict)
+
+
+def touch_image_name(number: int) -> str:
+    """Return the name of an image in the record of touches, from 1."""
+    return Path(image_name(number)).name
+
+
+def _touch_record(folder: Path) -> TouchRecord:
+    return TouchRecord(folder, hashed(folder / JOURNAL))
 
 
 def is_held_on(rules: TouchRules, state: SessionState) -> bool:

@@ -74,6 +74,9 @@ class TouchRules:
             raise ValueError(f"Nothing can be touched by {self}.")
 
 
+ONE_IMAGE = TouchRules(n_frames=1, n_settling=0)
+
+
 @dataclass(frozen=True, eq=False)
 class SeenTip:
     """The tip by one image: place (3,), mm, and its covariance by noise, (3, 3)."""
@@ -176,6 +179,30 @@ def take_all(
     for name, sighting in images:
         state = advance(instrument, rules, state, name, sighting).state
     return state
+
+
+def read_rules(is_still: bool, n_frames: int) -> TouchRules:
+    """Return how touches are taken from recorded images.
+
+    Parameters
+    ----------
+    is_still : bool
+        Whether the pen is held still through the images of a touch; else each image is
+        a touch.
+    """
+    return TouchRules(n_frames) if is_still else ONE_IMAGE
+
+
+def taken_again(
+    instrument: Instrument, rules: TouchRules, state: TouchState, still: StillFrames
+) -> TouchState:
+    """Return the touches with one more that was taken before, if it counts as new."""
+    frame = still.frames[0]
+    tip_cam = frame.rotation @ instrument.tip_pen + frame.translation
+    place = SeenTip(frame, tip_cam, np.zeros((3, 3)))
+    if not _is_new(rules, state, place):
+        return state
+    return replace(state, taken=(*state.taken, still), places=(*state.places, place))
 
 
 def touch_frame(name: str, sighting: Sighting) -> TouchFrame:

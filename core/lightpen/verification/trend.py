@@ -8,6 +8,7 @@ from lightpen.archive.database import Database
 from lightpen.archive.entries import IN_FORCE_BY, Written
 from lightpen.archive.history import TipState, lines
 from lightpen.archive.queries import Wanted
+from lightpen.arrays import FloatArray
 from lightpen.estimation.verdict import Change, change_since
 from lightpen.model.limits import VerificationLimits
 from lightpen.verification.repeatability import (
@@ -115,13 +116,23 @@ def compare(one: Written, other: Written) -> Comparison:
 
 
 def repeatability_of(
-    entries: tuple[Written, ...], limits: VerificationLimits
+    entries: tuple[Written, ...],
+    limits: VerificationLimits,
+    tolerance: float | None = None,
+    reference: FloatArray | None = None,
 ) -> Repeatability | None:
-    """Return how well tips repeat; None if they are fewer than two, or of several."""
+    """Return how well tips repeat; None if they are fewer than two, or of several.
+
+    Parameters
+    ----------
+    tolerance, reference
+        Of a study of the capability, as `measure_repeatability` takes them.
+    """
     if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
         return None
     in_order = sorted(entries, key=lambda each: each.entry.since)
-    return measure_repeatability([tip_of(each) for each in in_order], limits)
+    tips = [tip_of(each) for each in in_order]
+    return measure_repeatability(tips, limits, tolerance=tolerance, reference=reference)
 
 
 def _subject(entry: Written) -> tuple[str, str, bool]:

@@ -7,15 +7,19 @@ first block to any other is told beside what the noise of their centres makes of
 and counts in U of what was touched.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from lightpen.arrays import FloatArray
-from lightpen.detection.fixed_lamps import fixed_lamps
+from lightpen.cameras.protocol import Frame
+from lightpen.detection.aim import Aim
+from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
 from lightpen.detection.sighting import Sighting
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.model.camera import Camera
 from lightpen.model.limits import VerificationLimits
 from lightpen.sentences import sentence
 from lightpen.verification.assessment import (
@@ -45,6 +49,48 @@ class LampImages:
     def with_image(self, sighting: Sighting, masked: FloatArray) -> "LampImages":
         """Return them with one more image."""
         return LampImages((*self.sightings, sighting), (*self.masked, masked))
+
+
+@dataclass(frozen=True, eq=False)
+class LampWatch:
+    """What the images of each camera show of lamps.
+
+    Attributes
+    ----------
+    cameras : tuple of LampImages
+    """
+
+    cameras: tuple[LampImages, ...] = ()
+
+    def with_frame(self, frame: Frame, sighting: Sighting, aim: Aim) -> "LampWatch":
+        """Return it with one more image of each camera that sees the pen."""
+        known = self.cameras or (LampImages(),) * len(aim.aims)
+        views = zip(
+            *(known, (frame, *frame.others), (sighting, *sighting.others)),
+            aim.aims,
+            strict=False,
+        )
+        return LampWatch(
+            tuple(
+                lamps.with_image(
+                    seen, masked_lights(own.image, of.mask, own.full_scale)
+                )
+                if seen.has_pose
+                else lamps
+                for lamps, own, seen, of in views
+            )
+        )
+
+    def witness(
+        self, cameras: Sequence[Camera], limits: VerificationLimits
+    ) -> "LampWitness | None":
+        """Return what lamps tell of the camera that moved farthest."""
+        told = [
+            witnessed(lamps, camera.fx, limits)
+            for lamps, camera in zip(self.cameras, cameras, strict=False)
+        ]
+        known = [each for each in told if each is not None]
+        return max(known, key=lambda each: each.moved, default=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ from lightpen_app.look.theme import Appearance
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.shell.placement import fitted_place
+from lightpen_app.shell.step_list import StepButton
 from lightpen_app.shell.step_states import StepState
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.widgets.fitted_text import FittedText
@@ -587,6 +588,41 @@ def test_a_notice_goes_with_its_cause_and_no_other_does(shell: Shell) -> None:
     shell.window.drop_notice("The disk is full.")
 
     assert any("/data/crash-1.txt" in each for each in shell.window.words())
+
+
+def test_what_is_told_of_an_unwritable_data_folder_says_where_another_is_chosen(
+    shell: Shell,
+) -> None:
+    def told() -> str:
+        return shell.window.words()[0]
+
+    way = "The data folder is chosen at the step Start, or in the options (F10)."
+    shell.window.set_unwritable("/data", "Nothing can be kept in /data.")
+    assert told() == f"Nothing can be kept in /data. {way}"
+    shell.window.show_notice("The archive /data/a is not there.")
+    assert told() == f"Nothing can be kept in /data. {way}"
+    shell.window.show_notice("The camera is lost.")
+    assert told() == "The camera is lost."
+    shell.window.show_notice("The archive /data/a is not there.")
+    assert told() == f"The archive /data/a is not there. {way}"
+
+    shell.window.set_unwritable("", "")
+    shell.window.show_notice("The archive /data/a is not there.")
+    assert told() == "The archive /data/a is not there."
+
+
+def test_the_present_step_is_always_in_view(qtbot: QtBot, settings: Settings) -> None:
+    names = "Start", "Camera", "LEDs", "Swing", "Review", "Verify", "History"
+    pages = [Leaf(name) for name in names]
+    window = MainWindow(pages, settings, Preferences())
+    qtbot.addWidget(window)
+    window.resize(940, 500)
+    window.show()
+    for i in (6, 0, 5):
+        window.go_to(i)
+        buttons = window.findChildren(StepButton)
+        (present,) = (b for b in buttons if b.value().title == names[i])
+        assert present.visibleRegion().boundingRect().height() == present.height()
 
 
 def test_a_notice_moves_nothing_on_the_page(shell: Shell) -> None:

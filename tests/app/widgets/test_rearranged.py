@@ -10,7 +10,7 @@ from lightpen_app.widgets.rearranged import Rearranged, Room
 
 class Arranged(Rearranged, QWidget):
     narrow_below, low_below = 300, 200
-    large_from = QSize(600, 500)
+    large_from, vast_from = QSize(600, 500), QSize(1200, 900)
 
     def __init__(self) -> None:
         super().__init__()
@@ -41,7 +41,11 @@ def test_plenty_of_room_is_told_where_there_is_plenty_both_ways(qtbot: QtBot) ->
     qtbot.addWidget(widget)
     widget.resize(300, 200)
     widget.show()
-    for size in ((900, 499), (600, 500), (599, 900)):
+    for size in ((900, 499), (600, 500), (1200, 900), (599, 900)):
         widget.resize(*size)
 
-    assert widget.arranged_for == [Room(is_large=True), Room()]
+    assert widget.arranged_for == [
+        Room(is_large=True),
+        Room(is_large=True, is_vast=True),
+        Room(),
+    ]

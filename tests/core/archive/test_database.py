@@ -195,3 +195,33 @@ def _is_refused(database: Database) -> bool:
             return False
     except ArchiveError:
         return True
+
+
+def test_what_is_read_while_the_archive_is_closed_is_let_go_of_after(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    database = open_file(file)
+    with database.reading() as connection:
+        used = connection.connection.dbapi_connection
+        database.close()
+        connection.exec_driver_sql("SELECT 1")
+
+    assert isinstance(used, sqlite3.Connection)
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        used.execute("SELECT 1")
+    assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+def test_an_archive_of_which_sqlite_speaks_in_no_text_is_told_to_be_damaged(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    open_file(file).close()
+    data = file.read_bytes()
+    damaged = data.replace(b"tablearchive_entries", b"table\x8brchive_entries")
+    file.write_bytes(damaged.replace(b"CREATE TABLE archive_entries", b"?" * 28))
+
+    for opening in (open_file, look_into):
+        with pytest.raises(ArchiveError, match="disk image is malformed"):
+            opening(file)

@@ -12,7 +12,7 @@ from threading import Event
 
 import numpy as np
 import pytest
-from tests.gige_simulator import ADDRESS, GigeSimulator
+from tests.gige_simulator import ADDRESS, SECOND_ADDRESS, GigeSimulator
 
 from lightpen.arrays import Image
 from lightpen.cameras.aravis import AravisDevice
@@ -42,6 +42,14 @@ def camera() -> DeviceCamera:
     return DeviceCamera(AravisDevice(ADDRESS))
 
 
+def n_packet_sockets() -> int:
+    """Return how many sockets of this process may take the packets of others."""
+    lines = Path("/proc/net/packet").read_text().splitlines()[1:]
+    names = {f"socket:[{line.split()[-1]}]" for line in lines}
+    files = [each for each in Path("/proc/self/fd").iterdir() if each.is_socket()]
+    return sum(str(each.readlink()) in names for each in files)
+
+
 @pytest.mark.parametrize(
     ("pixel_format", "kind", "highest"),
     [("Mono8", "u1", 255), ("Mono16", "<u2", 65535)],
@@ -63,6 +71,31 @@ def test_images_come_as_they_were_sent(
     np.testing.assert_array_equal(frame.image, scene)
     assert frame.full_scale == highest
     assert seen.serial == "LP01"  # though it was looked for by its address
+
+
+def test_a_second_stream_has_no_socket_that_lets_in_the_images_of_the_first(
+    gige: GigeSimulator, second_loopback: str
+) -> None:
+    other = GigeSimulator("LP02", second_loopback)
+    cameras = [DeviceCamera(AravisDevice(place)) for place in (ADDRESS, SECOND_ADDRESS)]
+    n_sockets = []
+    for seen in cameras:
+        seen.open()
+        seen.configure(CameraSettings(region=Region(0, 0, 160, 120)))
+        seen.start()
+        seen.read(TIMEOUT)
+        n_sockets.append(n_packet_sockets())
+    cameras[0].stop()  # and starts anew beside the second one
+    cameras[0].start()
+    cameras[0].read(TIMEOUT)
+    n_sockets.append(n_packet_sockets())
+    for seen in cameras:
+        seen.close()
+    other.unplug()
+
+    first, second, anew = n_sockets
+    assert second == first
+    assert anew == 0
 
 
 def test_the_exposure_reaches_the_camera(gige: GigeSimulator) -> None:

@@ -1,12 +1,18 @@
 """Frames of two cameras are paired by their moments; none is lost without a word."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from lightpen.cameras.pairing import WAITING, FramePairs, not_synchronised
+from lightpen.cameras.pairing import (
+    LONGEST_WAITING,
+    WAITING,
+    FramePairs,
+    held_up,
+    not_synchronised,
+)
 from lightpen.cameras.protocol import Frame, sealed
 
 PERIOD_MS = 50.0
@@ -21,12 +27,17 @@ def frames(
     jitter_ms: float = 0.0,
     period_ms: float = PERIOD_MS,
     without: Sequence[int] = (),
+    held_up_ms: Mapping[int, float] | None = None,
 ) -> Iterator[Frame]:
-    """Yield what a camera sends, whose clock is ahead of the machine's, or is none."""
+    """Yield what a camera sends, whose clock is ahead of the machine's, or is none.
+
+    Some frames are held up on their way, by their numbers.
+    """
     rng = np.random.default_rng(3)
     for seq in range(N_FRAMES):
         taken = 1000.0 + seq * period_ms + late_ms
         there = taken + 12.0 + jitter_ms * rng.exponential()
+        there += (held_up_ms or {}).get(seq, 0.0)
         device = None if ahead_ms is None else round((taken + ahead_ms) * 1e6)
         if seq not in without:
             yield Frame(IMAGE, seq, round(there * 1e6), device)
@@ -39,8 +50,8 @@ def paired(
     pairs, found = FramePairs(), []
     came = [(frame, 0) for frame in first] + [(frame, 1) for frame in second]
     for frame, c in sorted(came, key=lambda each: each[0].host_ts_ns):
-        moment = pairs.add(c, frame, n_images)
-        if moment is not None:
+        pairs.add(c, frame)
+        while (moment := pairs.take(n_images)) is not None:
             found.append((moment.seq, moment.others[0].seq))
     return pairs, found
 
@@ -80,6 +91,47 @@ def test_a_camera_whose_clock_began_anew_is_paired_by_the_new_one() -> None:
     assert found == [(i, i) for i in range(N_FRAMES)]
 
 
+def test_frames_that_come_all_at_once_at_first_are_paired_rightly() -> None:
+    at_once = {seq: PERIOD_MS * (8 - seq) for seq in range(8)}
+    second = frames(ahead_ms=3.6e6, held_up_ms=at_once)
+    pairs, found = paired(frames(), second)
+    assert found == [(i, i) for i in range(N_FRAMES)]
+    assert pairs.moved_ms() is None
+
+
+@pytest.mark.parametrize("ahead_ms", [0.0, 3.6e6])
+def test_a_camera_held_up_for_long_is_told_and_paired_rightly_afterwards(
+    ahead_ms: float,
+) -> None:
+    n_held_up = 20
+    late = dict.fromkeys(range(n_held_up), 1.5 * PERIOD_MS)
+    second = frames(ahead_ms=ahead_ms, held_up_ms=late)
+    pairs, found = paired(frames(), second)
+    assert [each for each in found if each[0] > n_held_up] == [
+        (i, i) for i in range(n_held_up + 1, N_FRAMES)
+    ]
+    moved_ms = pairs.moved_ms()
+    assert moved_ms is not None
+    assert moved_ms == pytest.approx(1.5 * PERIOD_MS)
+    assert pairs.moved_ms() is None  # told once
+    assert pairs.lag_ms == pytest.approx(0.0, abs=0.1)
+    assert "75 ms apart" in str(held_up(moved_ms))
+
+
+def test_clocks_that_drift_apart_are_not_told_as_held_up() -> None:
+    pairs = FramePairs()
+    for seq in range(2000):
+        for c, clock in enumerate((1.0, 1.001)):  # 100 ms by the end
+            taken_ns = seq * PERIOD_MS * 1e6
+            there_ns = round(taken_ns + 12e6)
+            pairs.add(
+                c, Frame(IMAGE, seq, there_ns, round(clock * taken_ns + 1e12 * c))
+            )
+        while (moment := pairs.take()) is not None:
+            assert moment.seq == moment.others[0].seq
+        assert pairs.moved_ms() is None
+
+
 def test_numbers_need_not_agree() -> None:
     second = (replace(frame, seq=frame.seq + 900) for frame in frames())
     _, found = paired(frames(), second)
@@ -103,11 +155,20 @@ def test_a_faster_camera_is_left_with_frames_of_its_own() -> None:
 def test_frames_wait_for_a_camera_that_is_gone_but_not_without_end() -> None:
     pairs = FramePairs()
     for frame in frames():
-        assert pairs.add(0, frame) is None
+        pairs.add(0, frame)
+        assert pairs.take() is None
     assert pairs.wanted == 1
-    assert pairs.n_unpaired == N_FRAMES - WAITING
+    assert pairs.n_unpaired == N_FRAMES - LONGEST_WAITING
+    for frame in list(frames())[: N_FRAMES // 2]:
+        pairs.add(1, frame)  # whose clock is known by then
+        pairs.take()
+    for frame in frames(late_ms=PERIOD_MS * N_FRAMES):
+        pairs.add(0, frame)
+        assert pairs.take() is None
+    n_unpaired = pairs.n_unpaired
+    assert n_unpaired == 2.5 * N_FRAMES - WAITING
     pairs.forget()
-    assert pairs.n_unpaired == N_FRAMES - WAITING
+    assert pairs.n_unpaired == n_unpaired
 
 
 def test_recordings_are_paired_by_number_wherever_each_began() -> None:

@@ -1,5 +1,6 @@
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from lightpen.cameras.clock import Clock, MachineClock, SkippingClock
 from lightpen.cameras.frame_box import FrameBox, FrameQueue
 from lightpen.cameras.protocol import (
     CameraSettings,
+    Caps,
     ConfigError,
     DeviceBusy,
     DeviceLost,
@@ -167,6 +169,15 @@ class HungCamera(SimulatedCamera):
         return super().read(timeout_s)
 
 
+class LinkedCamera(SpiedCamera):
+    """Sends its images over a link."""
+
+    @property
+    @override
+    def caps(self) -> Caps:
+        return replace(super().caps, has_link=True)
+
+
 class Workbench:
     """A worker that runs a camera, with what it tells."""
 
@@ -176,11 +187,15 @@ class Workbench:
         clock: Clock,
         settings: CameraSettings,
         n_queued: int,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> None:
         self.camera = camera
         self.events = Events()
         self.worker = CameraWorker(
-            camera, settings, self.events, clock=clock, n_queued=n_queued
+            *(camera, settings, self.events),
+            clock=clock,
+            n_queued=n_queued,
+            known=known,
         )
 
     def wait_until(self, connection: Connection, after: int = 0) -> int:
@@ -218,9 +233,11 @@ class Benches:
         clock: Clock | None = None,
         settings: CameraSettings | None = None,
         n_queued: int = 16,
+        known: Mapping[str, CameraSettings] | None = None,
     ) -> Workbench:
+        settings = settings or CameraSettings()
         workbench = Workbench(
-            camera, clock or MachineClock(), settings or CameraSettings(), n_queued
+            camera, clock or MachineClock(), settings, n_queued, known
         )
         self._made.append(workbench)
         return workbench
@@ -565,6 +582,9 @@ def test_a_busy_camera_is_waited_for(benches: Benches) -> None:
     workbench.wait_until(Connection.STREAMING)
 
     assert camera.opened_at[-1] == pytest.approx(3.0)
+    told = workbench.events.troubles(DeviceBusy)
+    assert len(told) == 1
+    assert "Another program" in told[0]
 
 
 def test_a_camera_that_stays_busy_is_given_up(benches: Benches) -> None:
@@ -596,6 +616,34 @@ def test_impossible_settings_at_first_end_the_worker(benches: Benches) -> None:
     workbench.wait_until(Connection.CLOSED)
 
     assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
+
+
+def test_kept_settings_that_are_impossible_now_are_told_when_images_come(
+    benches: Benches,
+) -> None:
+    camera = SimulatedCamera(SCENE)
+    kept = {camera.serial: CameraSettings(pixel_format="BayerRG8")}
+    workbench = benches.make(camera, known=kept)
+    workbench.worker.start()
+    told = workbench.wait_for_trouble(ConfigError)
+
+    assert workbench.wait_until(Connection.STREAMING) < told
+    assert "BayerRG8" in workbench.events.troubles(ConfigError)[0]
+    workbench.wait_for_frames(2)
+
+
+def test_one_image_that_a_link_damaged_is_counted_but_disturbs_nobody(
+    benches: Benches,
+) -> None:
+    clock = SkippingClock()
+    camera = LinkedCamera(clock)
+    workbench = benches.make(camera, clock)
+    camera.faults.spoil_frames(1)
+    workbench.worker.start()
+    workbench.wait_for_frames(2)
+
+    assert workbench.worker.stats.incomplete == 1
+    assert workbench.events.troubles(FrameIncomplete) == []
 
 
 def test_a_damaged_image_is_told_and_the_next_one_comes(benches: Benches) -> None:

@@ -9,6 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.contradictions import DIAMETER, Contradiction
 from lightpen.estimation.report import warnings_of
 from lightpen.estimation.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
@@ -187,3 +188,20 @@ def test_the_camera_as_adjusted_is_nearer_to_the_truth_than_its_file() -> None:
     assert abs(fitted.fx / CAMERA.fx - 1) < 0.0006
     assert abs(fitted.fy / fitted.fx - CAMERA.fy / CAMERA.fx) < 0.0003
     assert not result.contradictions
+
+
+def test_what_the_images_want_is_told_no_finer_than_they_know_it() -> None:
+    found = Contradiction(
+        what=DIAMETER,
+        unit="mm",
+        stated=9.0,
+        stated_uncertainty=0.04,
+        wanted=10.0611,
+        wanted_uncertainty=0.11,
+        deviations=18.0,
+        of_pen=True,
+    )
+    words = (
+        "want the diameter of the discs to be 10.06 \u00b1 0.11 mm, the file says 9 "
+    )
+    assert words in str(found.sentence)

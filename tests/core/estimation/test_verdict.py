@@ -159,7 +159,7 @@ def test_an_uncertainty_by_leds_that_are_off_is_told_as_such(good: Calibration) 
     [
         (ShareName.CAMERA, "the camera file. Calibrate the camera"),
         (ShareName.LEDS, "the LED file. Measure the LEDs better"),
-        (ShareName.SCALE, "the scale of the LED file. State its uncertainty"),
+        (ShareName.SCALE, "the scale of the LED file. Have the LEDs measured by"),
         (ShareName.DIAMETER, "the diameter of the LED discs. State it"),
         (ShareName.EXTRINSICS, "where the cameras stand. Calibrate the rig"),
     ],

@@ -111,3 +111,62 @@ def test_a_lossy_tiff_is_refused() -> None:
 
     with pytest.raises(FileError, match="compression 7"):
         header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed)
+
+
+@pytest.mark.parametrize("kind", [6, 8, 9, 11, 13, 16])
+def test_a_size_that_the_decoder_reads_and_is_not_known_here_is_refused(
+    kind: int,
+) -> None:
+    entries = [(256, kind, 60_000), (256, 3, 100), (257, 3, 100), (258, 3, 8)]
+    packed = b"".join(
+        struct.pack("<HHII", tag, k, 1, value) for tag, k, value in entries
+    )
+
+    with pytest.raises(FileError, match="damaged"):
+        header_of(b"II*\0" + struct.pack("<IH", 8, len(entries)) + packed)
+
+
+def jpeg_head(kind: int, n_channels: int, n_scanned: int) -> bytes:
+    """Return a JPEG of 6000 x 4000 px up to its first scan."""
+    channels = b"".join(bytes([i + 1, 0x11, 0]) for i in range(n_channels))
+    frame = struct.pack(">BHHB", 8, 4000, 6000, n_channels) + channels
+    scanned = b"".join(bytes([i + 1, 0]) for i in range(n_scanned))
+    scan = bytes([n_scanned]) + scanned + b"\0\x3f\0"
+    parts = [b"\xff\xd8"]
+    for marker, body in ((kind, frame), (0xDA, scan)):
+        parts.append(struct.pack(">BBH", 0xFF, marker, len(body) + 2) + body)
+    return b"".join(parts)
+
+
+@pytest.mark.parametrize(
+    ("kind", "n_channels", "n_scanned", "bytes_a_pixel"),
+    [
+        (0xC0, 1, 1, 0),
+        (0xC0, 3, 3, 0),
+        (0xC0, 3, 1, 6),  # one channel after the other
+        (0xC1, 4, 3, 8),
+        (0xC2, 1, 1, 2),
+        (0xCA, 3, 3, 6),  # progressive, with arithmetic coding
+    ],
+)
+def test_a_jpeg_in_several_scans_takes_its_coefficients_besides(
+    kind: int, n_channels: int, n_scanned: int, bytes_a_pixel: int
+) -> None:
+    header = header_of(jpeg_head(kind, n_channels, n_scanned))
+
+    assert header.working == bytes_a_pixel * 6000 * 4000
+
+
+def test_a_jpeg_of_two_frames_is_refused() -> None:
+    one = jpeg_head(0xC0, 1, 1)
+    frame = one[2:15]
+
+    with pytest.raises(FileError, match="damaged"):
+        header_of(one[:15] + frame + one[15:])
+
+
+def test_a_webp_animation_is_refused() -> None:
+    head = b"VP8X" + struct.pack("<I", 10) + b"\x02\0\0\0" + bytes(6)
+
+    with pytest.raises(FileError, match="animation"):
+        header_of(b"RIFF" + struct.pack("<I", 4 + len(head)) + b"WEBP" + head)

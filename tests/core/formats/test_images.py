@@ -171,6 +171,14 @@ def test_a_png_that_goes_on_behind_its_image_is_refused() -> None:
         decode_image(whole[:-12] + more + whole[-12:], "endless.png")
 
 
+def test_a_png_of_countless_chunks_is_refused() -> None:
+    whole = png(GREY)
+    chunks = png_chunk(b"tEXt", b"") * 30_000
+
+    with pytest.raises(FileError, match="damaged"):
+        decode_image(whole[:33] + chunks + whole[33:], "pieces.png")
+
+
 @pytest.mark.parametrize("level", [0, 9])
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_a_png_of_noise_is_read_however_little_it_is_compressed(

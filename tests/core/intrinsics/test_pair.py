@@ -22,7 +22,9 @@ NAMES = ("left", "right")
 NOISE = 0.03  # px
 
 
-def both_see(camera: Camera, n_views: int = 14, late: float = 0.0) -> Views:
+def both_see(
+    camera: Camera, n_views: int = 14, late: float = 0.0, stretch: float = 0.0
+) -> Views:
     """Return views of a board that moves from view to view, the right one late."""
     board = parse_board("chessboard:9x6:20")
     rng = np.random.default_rng(4)
@@ -32,7 +34,8 @@ def both_see(camera: Camera, n_views: int = 14, late: float = 0.0) -> Views:
     for c, delay in enumerate((0.0, late)):
         speed = np.gradient(poses.translations + drift, axis=0)
         moved = poses.translations + delay * speed
-        points = board.points @ np.swapaxes(poses.rotations, 1, 2) + moved[:, None]
+        printed = board.points * [1 + stretch, 1.0, 1.0]
+        points = printed @ np.swapaxes(poses.rotations, 1, 2) + moved[:, None]
         if c == 1:
             points = points @ TURN.T + SHIFT
         pixels[:, c] = camera.project(points)
@@ -105,6 +108,17 @@ def test_cameras_out_of_step_are_told_with_what_that_costs(camera: Camera) -> No
     assert found.lag is not None
     assert found.lag.lag_ms == pytest.approx(20, abs=8)
     assert "pair.late-by" in [remark.code for remark in found.remarks]
+
+
+def test_what_either_camera_says_of_the_board_is_told_with_its_name(
+    camera: Camera,
+) -> None:
+    found = calibrate_pair(both_see(camera, stretch=0.01), BoardTolerances(), NAMES)
+    told = [str(remark) for remark in found.remarks]
+
+    assert len(told) == 2
+    for name, words in zip(NAMES, told, strict=True):
+        assert words.startswith(f"Camera {name}: The board is not what")
 
 
 def test_too_few_views_of_both_are_refused(camera: Camera) -> None:

@@ -26,7 +26,8 @@ from lightpen.cameras.worker import (
 from lightpen.detection.aim import Aim
 from lightpen.detection.spots import Spots, detect_spots, have_moved
 from lightpen.formats.decoding import encode_png
-from lightpen.live.looking import Live, LiveImage
+from lightpen.live.looking import UNHURRIED, Live, LiveImage
+from lightpen.model.limits import SwingLimits
 from lightpen.record.reading import open_record
 from lightpen.simulator.sample_pens import SAMPLE_PENS
 from lightpen.streaming.server import LOOPBACK, PoseStream, StreamPlace
@@ -260,6 +261,47 @@ def test_who_is_in_a_hurry_is_shown_every_image_though_nothing_moves(
     live.stop()
 
     assert n_later == n_images
+
+
+def gap_s(screen: Screen) -> float:
+    """Return the time from the last image but one to the last."""
+    before, now = screen.images[-2:]
+    return (now.frame.host_ts_ns - before.frame.host_ts_ns) * 1e-9
+
+
+def test_in_a_swing_what_rests_for_long_is_looked_at_less_often_until_it_moves(
+    station: "Station",
+    make_live: MakeLive,
+    screen: Screen,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lightpen.live.looking.PATIENT_NS", 1_000_000_000)
+    station.begin(SwingLimits())
+    make_live()
+
+    screen.wait_for_images(2)
+    assert gap_s(screen) < 2 / FRAME_RATE
+    screen.wait_until(lambda: gap_s(screen) >= UNHURRIED)
+    assert station.state.phase is Phase.CAPTURING
+
+    station.operator.swing()
+    screen.wait_until(lambda: gap_s(screen) < 2 / FRAME_RATE)
+
+
+def test_a_swing_begins_with_a_pen_that_has_rested_for_long(
+    station: "Station",
+    make_live: MakeLive,
+    screen: Screen,
+    interrupted: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lightpen.live.looking.PATIENT_NS", 1)
+    live = make_live()
+    live.set_aim(station.preparation.aim)
+    screen.wait_until(lambda: len(screen.images) > 2 and gap_s(screen) >= UNHURRIED)
+    station.go_on(interrupted)
+
+    station.wait_until(lambda: station.state.phase is Phase.CAPTURING)
 
 
 def test_what_rests_is_looked_at_less_often_until_it_moves() -> None:

@@ -22,6 +22,7 @@ from lightpen.cameras.worker import (
     Failed,
     WorkerEvent,
 )
+from lightpen.detection.aim import Aim
 from lightpen.formats.decoding import encode_png
 from lightpen.live.looking import LIVELY_NS, UNHURRIED, Live, LiveImage
 from lightpen.model.camera import Camera
@@ -130,6 +131,20 @@ def test_images_of_two_simulated_cameras_come_by_moments(
         assert one.frame.device_ts_ns is not None
         assert other.frame.device_ts_ns is not None
         assert abs(other.frame.device_ts_ns - one.frame.device_ts_ns) < 1000
+
+
+def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
+    simulated: tuple[SimulatedCamera, SimulatedCamera],
+    station: "Station",
+    screen: Screen,
+) -> None:
+    live = Live(simulated, SETTINGS, screen, station.runner)
+    live.set_aim(Aim(TINY))
+    live.start()
+    screen.wait_for_moments(2)
+    live.stop()
+
+    assert screen.failures == []
 
 
 def test_a_lost_image_costs_its_moment_and_is_counted(

@@ -155,6 +155,11 @@ def test_postures_the_camera_cannot_see_are_left_out() -> None:
     assert target is not None
     assert np.cos(target.direction) < 0.8 or target.tilt < TILTS[1]
 
+    # Another camera that far to the right sees what the first does not.
+    away = np.array([[0.0, 0.0, 0.0], [-230.0, 0.0, 0.0]])
+    beside = Rig((CAMERA, CAMERA), np.stack([np.eye(3)] * 2), away)
+    assert visible_fields(replace(aside, rig=beside))[1:].all()
+
     behind = replace(known, pen=replace(PEN, normals=-PEN.normals))
     turned = rotations_of(PEN, np.zeros(1), np.zeros(1), np.zeros(1))
     assert not usable_leds(behind, turned).any()

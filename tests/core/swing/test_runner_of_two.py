@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from lightpen.cameras.protocol import CameraSettings
+from lightpen.cameras.protocol import CameraSettings, sealed
 from lightpen.detection.sighting import Sighting, look
 from lightpen.errors import FileError
 from lightpen.formats.decoding import decode_image
@@ -94,6 +94,60 @@ def test_running_fit_and_solution_are_of_both_cameras(
         assert not images.used[2]
 
 
+def capture_more(
+    station: "Station", folder: Path, n_more: int, *, is_first_blind: bool = False
+) -> None:
+    """Go on with a swing before two cameras until it has so many more images."""
+    setup = read_resumable(folder).setup
+    second = SimulatedCamera(
+        *(station.camera.scene, station.clock, station.operator), rig=setup.rig
+    )
+    second.open()
+    second.configure(CameraSettings(frame_rate=FRAME_RATE))
+    second.start()
+    station.go_on(folder)
+    last: list[Sighting | None] = [None, None]
+    n_wanted = station.state.n_kept + n_more
+    while station.state.n_kept < n_wanted:
+        first, other = station.camera.read(1.0), second.read(1.0)
+        if is_first_blind:
+            first = replace(first, image=sealed(np.zeros_like(first.image)))
+        last = [
+            look(frame.image, camera, setup.pen, before=before)
+            for frame, camera, before in zip(
+                (first, other), setup.rig.cameras, last, strict=True
+            )
+        ]
+        sighting, beside = last
+        assert sighting is not None
+        assert beside is not None
+        station.runner.take(
+            replace(first, others=(other,)),
+            replace(sighting, others=(beside,)),
+            station.status.setup,
+        )
+
+
+def test_moments_that_only_the_second_camera_shows_count_live_and_on_files(
+    station: "Station", by_two: Path
+) -> None:
+    capture_more(station, by_two, 3, is_first_blind=True)
+    live = station.state.kept
+    again = read_resumable(by_two).state.kept
+    for kept in (live, again):
+        assert len(kept) == N_IMAGES + 3
+        assert np.isnan(kept.pixels[-3:, 0]).all()
+        assert kept.joint is not None
+        assert kept.joint.used[-3:].any(axis=1).all()
+    np.testing.assert_allclose(again.rotations, live.rotations, atol=1e-3)
+    np.testing.assert_allclose(again.translations, live.translations, atol=0.3)
+
+    station.solve()
+    first, second = station.solution.calibration.cameras
+    assert not first.used[-3:].any()
+    assert second.used[-3:].all()
+
+
 def test_an_interrupted_swing_goes_on_with_both_cameras(
     station: "Station", by_two: Path
 ) -> None:
@@ -102,30 +156,7 @@ def test_an_interrupted_swing_goes_on_with_both_cameras(
     assert swing.is_of([one, one])
     assert not swing.is_of([one])
 
-    second = SimulatedCamera(
-        *(station.camera.scene, station.clock, station.operator), rig=swing.setup.rig
-    )
-    second.open()
-    second.configure(CameraSettings(frame_rate=FRAME_RATE))
-    second.start()
-    station.go_on(by_two)
-    setup, last = swing.setup, list[Sighting | None]([None, None])
-    while station.state.n_kept <= N_IMAGES:
-        frames = [station.camera.read(1.0), second.read(1.0)]
-        last = [
-            look(frame.image, camera, setup.pen, before=before)
-            for frame, camera, before in zip(
-                frames, setup.rig.cameras, last, strict=True
-            )
-        ]
-        first, other = last
-        assert first is not None
-        assert other is not None
-        station.runner.take(
-            replace(frames[0], others=(frames[1],)),
-            replace(first, others=(other,)),
-            station.status.setup,
-        )
+    capture_more(station, by_two, 1)
     newest = open_record(by_two).images[-1]
     assert newest.number == N_IMAGES + 1
     assert len(newest.others) == 1

@@ -1,10 +1,13 @@
 """Touches of the simulated pen, made without an image."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.accepted_tip import accept_tip
+from tests.verifying import TIMEOUT, Verifier
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.instrument import Instrument, instrument_of_files
@@ -16,6 +19,7 @@ from lightpen.simulator.swings import (
     paper_pen,
     simulate_centers,
 )
+from lightpen.swing.preparation import Preparation
 from lightpen.verification.touch import (
     StillFrames,
     Touch,
@@ -89,3 +93,19 @@ def ring() -> Callable[..., FloatArray]:
         return np.asarray(np.array([-8.0, 168.0, 1050.0]) + radius * spokes)
 
     return points
+
+
+@pytest.fixture
+def verifier(tmp_path: Path, prepared: Preparation) -> Iterator[Verifier]:
+    verifier = Verifier(tmp_path, prepared)
+    yield verifier
+    verifier.runner.shut_down()
+    assert verifier.runner.await_end(TIMEOUT)
+
+
+@pytest.fixture
+def at_it(verifier: Verifier) -> Verifier:
+    """A tip is in force, and somebody is there to verify it."""
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.come()
+    return verifier

@@ -53,3 +53,14 @@ def test_a_single_visit_is_refused(instrument: Instrument, touching: Touching) -
 
     with pytest.raises(CalibrationError, match="visited once"):
         measure_drift(visits, instrument, LIMITS)
+
+
+def test_a_move_that_would_not_show_is_not_denied(
+    instrument: Instrument, touching: Touching
+) -> None:
+    visits = [(name, touching(PAPER_CONE[None], seed=7)) for name in ("one", "two")]
+    found = measure_drift(visits, instrument, VerificationLimits(drift=0.001))
+
+    assert not found.moves.any()
+    assert found.assessment.reason.code == "drift.uncertain"
+    assert found.assessment.grade is Grade.CHECK

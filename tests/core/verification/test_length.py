@@ -34,6 +34,24 @@ def test_a_length_is_measured_within_its_uncertainty(
     assert found.runs[0].along_view < 0.1
 
 
+@pytest.mark.parametrize("ball_offset", [2.0, -2.0])
+def test_at_faces_the_ball_is_compensated_along_the_length(
+    instrument: Instrument, touching: Touching, ball_offset: float
+) -> None:
+    """Between inner faces the ball is short of the ends, on outer ones beyond."""
+    run = ("here", touching(np.array([START, START, END, END])))
+
+    plain = measure_length([run], instrument, LENGTH, LIMITS)
+    found = measure_length(
+        [run], instrument, LENGTH + 2 * ball_offset, LIMITS, ball_offset=ball_offset
+    )
+
+    assert found.errors[0] == pytest.approx(plain.errors[0], abs=1e-9)
+    moved = found.runs[0].ends[1][0].point_cam - plain.runs[0].ends[1][0].point_cam
+    outwards = (END - START) / np.linalg.norm(END - START)
+    np.testing.assert_allclose(moved, ball_offset * outwards, atol=0.001)
+
+
 def test_a_pen_that_grew_is_told_by_the_length(
     instrument: Instrument, touching: Touching
 ) -> None:

@@ -1,11 +1,8 @@
 """A verification from the tip in force to its verdict, and what is kept of it."""
 
 import json
-import threading
-from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -13,32 +10,30 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.accepted_tip import (
-    Hold,
     Holder,
     accept_tip,
     leant,
     round_a_ring,
 )
+from tests.verifying import BAR, CHOICES, NOON, TIMEOUT, Verifier
 
 from lightpen.archive.check import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
-from lightpen.cameras.protocol import CameraSettings, Frame, sealed
+from lightpen.cameras.protocol import CameraSettings
 from lightpen.commands.verifications import read_fixed_point, read_scale
 from lightpen.detection.aim import Aim
-from lightpen.detection.sighting import Sighting, look
+from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
 from lightpen.formats.decoding import encode_png
 from lightpen.formats.files import sha256
 from lightpen.formats.opened_files import PenFile
 from lightpen.formats.pen_files import write_pen
-from lightpen.model.rig import rig_of
-from lightpen.record.folder_archive import SIMULATED, FolderArchive
+from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.journal import JOURNAL
 from lightpen.record.reading import DISCARDED, Record, RecordedImage, open_record
 from lightpen.record.supervision import Signature, set_password
-from lightpen.record.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
-from lightpen.sentences import Sentence
+from lightpen.record.verifications import TOUCHES, VERIFICATIONS
 from lightpen.simulator.camera import SimulatedCamera
 from lightpen.simulator.image_plans import plan_scene, render_plan
 from lightpen.simulator.scenes import Scene
@@ -46,147 +41,10 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
-from lightpen.verification.runner import VerificationRunner
-from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
+from lightpen.verification.status import SessionHappening
 from lightpen.verification.touch_images import CONCLUDED
 
 EVE = Signature("Eve", "correct horse")
-TIMEOUT = 60.0  # s until a test gives up
-NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
-CHOICES = VerificationChoices(
-    WHOLE, n_touches=4, radius=31.751, length=150.0, n_frames=3
-)
-FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
-BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
-
-
-class Ear:
-    """Hears what a runner tells, and lets a test wait for it."""
-
-    def __init__(self) -> None:
-        self.events: list[SessionHappening] = []
-        self.troubles: list[str] = []
-        self.reliefs: list[str] = []
-        self.n_read = 0  # times that the tip in force was read
-        self._reading = Reading.NOTHING
-        self._changed = threading.Condition()
-
-    def on_verification(
-        self, status: VerificationStatus, events: tuple[SessionHappening, ...]
-    ) -> None:
-        if (self._reading, status.reading) == (Reading.TIP, Reading.NOTHING):
-            self.n_read += 1
-        self._reading = status.reading
-        self._note(lambda: self.events.extend(events))
-
-    def on_progress(self, fraction: float) -> None:
-        """Nothing is shown."""
-
-    def on_trouble(self, sentence: Sentence) -> None:
-        self._note(lambda: self.troubles.append(sentence.code))
-
-    def on_relief(self, sentence: Sentence) -> None:
-        self._note(lambda: self.reliefs.append(sentence.code))
-
-    def wait_until(self, is_so: Callable[[], bool]) -> None:
-        with self._changed:
-            assert self._changed.wait_for(is_so, TIMEOUT)
-
-    def _note(self, note: Callable[[], None]) -> None:
-        with self._changed:
-            note()
-            self._changed.notify_all()
-
-
-class Verifier:
-    """A runner, and a pen that is held before its camera."""
-
-    def __init__(self, folder: Path, prepared: Preparation) -> None:
-        self.folder, self.preparation = folder, prepared
-        self.ear = Ear()
-        self.runner = VerificationRunner(
-            FolderArchive(folder), folder, self.ear, lambda: NOON
-        )
-        camera, pen, rig_file = prepared.camera, prepared.pen, prepared.rig_file
-        assert camera is not None
-        assert pen is not None
-        rig = rig_of(camera) if rig_file is None else rig_file.rig
-        self.holder = Holder(rig, pen)
-
-    @property
-    def status(self) -> VerificationStatus:
-        return self.runner.status
-
-    @property
-    def kept(self) -> Path:
-        return self.folder / SIMULATED / VERIFICATIONS
-
-    @property
-    def records(self) -> list[dict[str, Any]]:
-        """What each task found."""
-        return [each for each in self._all if each["verification"] != CONCLUSION]
-
-    @property
-    def conclusions(self) -> list[dict[str, Any]]:
-        return [each for each in self._all if each["verification"] == CONCLUSION]
-
-    @property
-    def _all(self) -> list[dict[str, Any]]:
-        files = sorted(self.kept.glob("*.json"))
-        return [json.loads(file.read_bytes()) for file in files]
-
-    @property
-    def runs(self) -> list[Path]:
-        """Records of the images of live touches."""
-        return sorted((self.kept / TOUCHES).glob("*"))
-
-    def come(self, choices: VerificationChoices = CHOICES) -> None:
-        """Be at it, and wait until the tip is read."""
-        n_read = self.ear.n_read
-        self.runner.choose(self.preparation, choices)
-        self.runner.come()
-        self.ear.wait_until(lambda: self.ear.n_read > n_read)
-
-    def refusal(self) -> str:
-        assert self.status.refusal is not None
-        return self.status.refusal.code
-
-    def see(self, sightings: Iterable[Sighting], aim: Aim | None = None) -> None:
-        for sighting in sightings:
-            wanted = aim or self.status.aim
-            assert wanted is not None
-            frame = replace(FRAME, others=(FRAME,) * (len(wanted.aims) - 1))
-            self.runner.take(frame, sighting, wanted)
-
-    def touch(self, *holds: Hold) -> None:
-        for hold in holds:
-            self.see(self.holder.still(hold))
-
-    def read(self, task: TaskKind, place: Path) -> None:
-        """Read recorded images, and wait until that has ended."""
-        n_events, n_troubles = len(self.ear.events), len(self.ear.troubles)
-        self.runner.read(task, str(place), is_still=False)
-        self.ear.wait_until(
-            lambda: (
-                len(self.ear.events) > n_events or len(self.ear.troubles) > n_troubles
-            )
-        )
-
-
-@pytest.fixture
-def verifier(tmp_path: Path, prepared: Preparation) -> Iterator[Verifier]:
-    verifier = Verifier(tmp_path, prepared)
-    yield verifier
-    verifier.runner.shut_down()
-    assert verifier.runner.await_end(TIMEOUT)
-
-
-@pytest.fixture
-def at_it(verifier: Verifier) -> Verifier:
-    """A tip is in force, and somebody is there to verify it."""
-    accept_tip(verifier.folder, verifier.preparation)
-    verifier.come()
-    return verifier
 
 
 def test_a_tip_is_verified_from_the_first_touch_to_the_verdict(at_it: Verifier) -> None:

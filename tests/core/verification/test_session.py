@@ -19,16 +19,10 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen.simulator.toucher import Artefacts, Toucher
 from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
+from lightpen.verification.counting import ALIKE, OTHER_POSTURE
 from lightpen.verification.guidance import fraction_done, instruction
-from lightpen.verification.session import (
-    ALIKE,
-    OTHER_POSTURE,
-    SessionSetup,
-    SessionState,
-    advance,
-    end_task,
-    touched_anew,
-)
+from lightpen.verification.session import advance, end_task, touched_anew
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touching import TouchEvent, TouchHappening
 
 LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict
@@ -341,3 +335,107 @@ def test_a_touch_above_the_cone_does_not_count_in_a_posture(postures: Session) -
         postures.see(postures.holder.away())
 
     assert len(postures.state.touches) == 4
+
+
+# A cone that stands still, as witness that the camera does
+
+
+UPRIGHT = (Hold(tilt=0.0),) * 3
+
+
+@pytest.fixture
+def witnessed(session: Session) -> Session:
+    session.choose(kinds=(TaskKind.FIXED_POINT, TaskKind.LENGTH, TaskKind.DRIFT))
+    return session
+
+
+def visit(session: Session, *holds: Hold) -> None:
+    """Touch the witness, lifting the tip in between."""
+    for hold in holds or UPRIGHT:
+        session.touch(hold)
+        session.see(session.holder.away())
+
+
+def test_a_witness_is_visited_before_between_and_after_the_tasks(
+    witnessed: Session,
+) -> None:
+    tasks = []
+    for holds in ((), leant(4), (), BAR, ()):
+        tasks.append(witnessed.state.task(witnessed.setup))
+        witnessed.touch(*holds) if holds else visit(witnessed)
+
+    assert tasks == [
+        *(TaskKind.DRIFT, TaskKind.FIXED_POINT, TaskKind.DRIFT),
+        *(TaskKind.LENGTH, TaskKind.DRIFT),
+    ]
+    drift = witnessed.state.drift
+    assert drift is not None
+    assert len(drift.names) == 3
+    assert drift.assessment.grade is Grade.PASS
+    assert witnessed.says() == "session.done"
+
+
+def test_a_camera_that_moved_between_visits_is_told_and_counts_in_what_was_touched(
+    witnessed: Session,
+) -> None:
+    moved = (0.06, 0.0, 0.0)
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    before = witnessed.state.fixed_point
+    visit(witnessed)
+    witnessed.touch(*BAR)
+    length = witnessed.state.length
+    visit(witnessed, *(Hold(moved, tilt=0.0),) * 3)
+    state = witnessed.state
+
+    assert state.drift is not None
+    assert state.drift.assessment.reason.code == "drift.moved"
+    assert state.assessment is state.drift.assessment
+    assert before is not None
+    assert state.fixed_point is not None
+    assert np.allclose(state.fixed_point.uncertainty, before.uncertainty, atol=0.003)
+    assert length is not None
+    assert state.length is not None
+    share = 2 * 0.06 / np.sqrt(3)  # k = 2, rectangular; but for the noise of a visit
+    assert state.length.uncertainties[0] > 0.95 * share > length.uncertainties[0]
+
+
+def test_a_witness_held_otherwise_or_missed_does_not_count(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    visit(witnessed, UPRIGHT[0], Hold(tilt=0.4))
+    assert witnessed.says() == "session.other-than-first"
+    visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0))
+    assert witnessed.says() == "session.elsewhere"
+    assert len(witnessed.state.touches) == 1
+
+
+def test_a_first_touch_beside_the_cone_does_not_hold_the_witness_up(
+    witnessed: Session,
+) -> None:
+    visit(witnessed, Hold((30.0, 0.0, 0.0), tilt=0.0), *UPRIGHT)
+
+    assert witnessed.state.task(witnessed.setup) is TaskKind.FIXED_POINT
+
+
+def test_a_task_done_anew_is_witnessed_anew(witnessed: Session) -> None:
+    visit(witnessed)
+    witnessed.touch(*leant(4))
+    visit(witnessed)
+    witnessed.touch(*BAR)
+    visit(witnessed)
+    witnessed.state = touched_anew(witnessed.state, TaskKind.LENGTH)
+    witnessed.touch(*BAR)
+    assert witnessed.state.task(witnessed.setup) is TaskKind.DRIFT
+    visit(witnessed)
+
+    assert witnessed.state.drift is not None
+    assert len(witnessed.state.drift.names) == 4
+
+
+def test_a_witness_alone_is_visited_twice(session: Session) -> None:
+    session.choose(kinds=(TaskKind.DRIFT,))
+    visit(session)
+    assert session.state.drift is None
+    visit(session)
+    assert session.state.drift is not None

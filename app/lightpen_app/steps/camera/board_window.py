@@ -32,7 +32,7 @@ from lightpen.intrinsics.calibration import (
 )
 from lightpen.intrinsics.capture import Capture, Sight, wanted_outline
 from lightpen.intrinsics.coverage import cells_of
-from lightpen.intrinsics.observing import observe_board
+from lightpen.intrinsics.observing import observe_board, why_unseen
 from lightpen.intrinsics.sightings import find_points
 from lightpen.intrinsics.uncertainty_map import UncertaintyMap, map_uncertainty
 from lightpen.intrinsics.views import BoardTolerances, Views
@@ -41,6 +41,7 @@ from lightpen.model.camera import Camera
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial
 from lightpen.record.outcome import TrialOutcome
+from lightpen.sentences import Sentence
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -54,6 +55,7 @@ from lightpen_app.work.live_view import LiveView, Shown
 
 USUAL_BOARD = "chessboard:11x8:20"
 SIDE_WIDTH = 46 * GRID
+LONGEST_UNSEEN = 3.0  # s, after which it is asked what is seen instead
 NANOSECONDS = 1e9
 
 
@@ -80,6 +82,8 @@ class BoardWindow(Translated, QWidget):
         self._capture: Capture | None = None
         self._outline: FloatArray | None = None
         self._found: CameraCalibration | None = None
+        self._seen_s = 0.0  # when it was seen, or last asked why it is not
+        self._why_unseen: Sentence | None = None
         self._hashes: dict[str, str] = {}  # of the views that are kept or computed
         self._is_saved = False
         self._searching: Job | None = None
@@ -201,9 +205,15 @@ class BoardWindow(Translated, QWidget):
         if self._capture is None:
             height, width = frame.image.shape
             self._capture = Capture(self._sought, (width, height))
+            self._seen_s = frame.host_ts_ns / NANOSECONDS
+            self._why_unseen = None
             self._lead()
-        self._searching = job = Job(partial(_look, frame.image, self._sought), self)
         time_s = frame.host_ts_ns / NANOSECONDS
+        asks_why = time_s - self._seen_s >= LONGEST_UNSEEN
+        if asks_why or self._capture.points is not None:
+            self._seen_s = time_s
+        look = partial(_look, frame.image, self._sought, asks_why)
+        self._searching = job = Job(look, self)
 
         # Connections
         job.succeeded.connect(lambda seen: self._on_looked(seen, time_s))
@@ -218,6 +228,8 @@ class BoardWindow(Translated, QWidget):
             return
         n_kept = len(self._capture.kept)
         self._capture = self._capture.after(seen.points, time_s)
+        if seen.why_unseen is not None or seen.points is not None:
+            self._why_unseen = seen.why_unseen
         if len(self._capture.kept) > n_kept:
             self._hashes[self._capture.views.names[-1]] = seen.sha256
             self._lead()
@@ -437,7 +449,9 @@ class BoardWindow(Translated, QWidget):
         for button in (self._shows_residuals, self._shows_uncertainty):
             button.setVisible(self._found is not None)
         self._image.set_overlay(self._overlay())
-        if is_live and self._capture is not None:
+        if is_live and self._why_unseen is not None:
+            self._remark.set_value(_trouble(worded(self._why_unseen)))
+        elif is_live and self._capture is not None:
             words = self._words_of(self._capture.sight)
             self._remark.set_value(Remark(words, Sign.WAIT, Tone.QUIET))
 
@@ -490,6 +504,7 @@ class _Looked:
 
     points: FloatArray | None
     sha256: str = ""
+    why_unseen: Sentence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -505,10 +520,12 @@ class _Wanted:
     outline: FloatArray
 
 
-def _look(image: Image, board: Board, report: Report) -> _Looked:
+def _look(image: Image, board: Board, asks_why: bool, report: Report) -> _Looked:
     points = find_points(image, board, quick=True)
     if points is None:
-        return _Looked(None)
+        return _Looked(
+            None, why_unseen=why_unseen(lambda: [image], board) if asks_why else None
+        )
     return _Looked(points, sha256(image.tobytes()).hexdigest())
 
 

@@ -27,9 +27,9 @@ from lightpen_app.steps.history.filter_bar import FilterBar
 from lightpen_app.steps.history.history_table import HistoryTable
 from lightpen_app.steps.history.reader import HistoryReader, Opening
 from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.trend_panel import TrendPanel
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.translated import Translated
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.workbench import Workbench
@@ -144,6 +144,7 @@ class HistoryContent(Translated, QWidget):
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
         self._archive.set_delivery(opening.delivery)
+        self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
         self.status_changed.emit(self.tr("{0} entries").format(opening.n_lines))
         # Later than what is seen at once.
@@ -181,6 +182,7 @@ class HistoryContent(Translated, QWidget):
     def _show_selection(self) -> None:
         entries = [line.entry for line in self._table.selected()]
         selected = [entry for entry in entries if entry is not None]
+        self._selection.set_limits(self._workbench.choices.limits)
         self._selection.set_value(selected, self._trend.entries)
 
     def _on_rule_changed(self, rule: DueRule) -> None:

@@ -7,41 +7,45 @@ from typing import Any
 
 from PySide6.QtCore import (
     QAbstractTableModel,
+    QEvent,
     QItemSelectionModel,
     QModelIndex,
     QPersistentModelIndex,
     Qt,
     Signal,
 )
-from PySide6.QtGui import QPalette
+from PySide6.QtGui import QFontMetrics, QPalette, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QWidget
 from typing_extensions import override
 
 from lightpen.archive.history import Line
+from lightpen.estimation.verdict import Grade
+from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.quantities import decimals_for, number_text
-from lightpen_app.look.theme import GRID, Tone, colors_of
+from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font, set_size
 from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.reader import BLOCK
-from lightpen_app.steps.history.texts import line_tone, verdict_text, what_text
+from lightpen_app.steps.history.texts import (
+    line_tone,
+    longest_words,
+    verdict_text,
+    what_text,
+)
 from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
 from lightpen_app.widgets.translated import Translated
 
 Index = QModelIndex | QPersistentModelIndex
 WHEN, STATION, PEN, TIP, WHAT, VERDICT, X, Y, Z, U, BY, WORDS = range(12)
 NUMBERS = (X, Y, Z, U)
-WIDTHS = {
-    WHEN: 19,
-    STATION: 8.5,
-    PEN: 8,
-    TIP: 9.5,
-    WHAT: 21.5,
-    VERDICT: 9,
-    X: 11,
-    Y: 11,
-    Z: 11,
-    U: 9,
-    BY: 12,
+NAMED = {  # the least and the most that is shown whole, of what anybody may have named
+    STATION: ("Hall 12", 12 * "n"),
+    PEN: ("LP-0000", 12 * "n"),
+    TIP: ("T-10-80", 12 * "n"),
+    BY: ("A. Name", 16 * "n"),
 }
+MOMENT, COORDINATE, UNCERTAINTY = "0000-00-00 00:00", "-000.0000", "0.0000"
+CELL_MARGIN = 25  # px, beside the words
+LEAST_WORDS = 8 * GRID  # px, of the last column
 LEAST_ROWS = 5
 MOST_BLOCKS = 40  # that are kept
 MOST_SELECTED = 1000  # lines that are compared
@@ -176,9 +180,8 @@ class HistoryTable(Translated, RowTable):
         self._model = HistoryModel()
         super().__init__(self._model, parent)
         self._model.setParent(self)
+        self._is_of_one_station = False
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        for column, width in WIDTHS.items():
-            self.setColumnWidth(column, round(width * GRID))
         self.setMinimumHeight((LEAST_ROWS + 2) * ROW_HEIGHT)
 
         # Connections
@@ -213,6 +216,11 @@ class HistoryTable(Translated, RowTable):
         """Ask for a block again when it is to be shown the next time."""
         self._model.forget_block(first)
 
+    def set_stations(self, stations: Sequence[str]) -> None:
+        """Take over which stations the entries are of."""
+        self._is_of_one_station = len(stations) <= 1
+        self._share_width()
+
     def n_lines(self) -> int:
         """Return how many entries there are."""
         return self._model.rowCount()
@@ -240,9 +248,66 @@ class HistoryTable(Translated, RowTable):
         )
 
     @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._share_width()
+
+    @override
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange):
+            self._share_width()
+
+    def _share_width(self) -> None:
+        """Give each column the least it needs, and of what is left up to the most.
+
+        Where not even that fits, the letters are smaller, and no column tells the
+        station where there is only one.
+        """
+        room = self.viewport().width() - LEAST_WORDS
+        body, small = (
+            QFontMetrics(font(TextSize.BODY)),
+            QFontMetrics(font(TextSize.SMALL)),
+        )
+        is_dense = sum(self._widths(body, 0).values()) > room
+        letters = small if is_dense else body
+        for each in (self, self.horizontalHeader()):
+            set_size(each, TextSize.SMALL if is_dense else TextSize.BODY)
+        self.setColumnHidden(STATION, is_dense and self._is_of_one_station)
+        least, most = self._widths(letters, 0), self._widths(letters, 1)
+        wanted = {column: most[column] - least[column] for column in least}
+        spare = room - sum(least.values())
+        share = min(max(spare / sum(wanted.values()), 0.0), 1.0)
+        for column, width in least.items():
+            self.setColumnWidth(column, width + int(share * wanted[column]))
+        self.setColumnWidth(WORDS, LEAST_WORDS)  # and all that is left
+
+    def _widths(self, letters: QFontMetrics, longer: int) -> dict[int, int]:
+        """Return the width of each column but the last, by short or longer words."""
+        samples = {
+            WHEN: MOMENT,
+            WHAT: longest_words()[longer],
+            VERDICT: max(map(grade_text, Grade), key=letters.horizontalAdvance),
+            **dict.fromkeys((X, Y, Z), COORDINATE),
+            U: UNCERTAINTY,
+            **{column: names[longer] for column, names in NAMED.items()},
+        }
+        if self.isColumnHidden(STATION):
+            del samples[STATION]
+        across = Qt.Orientation.Horizontal
+        return {
+            column: CELL_MARGIN
+            + max(
+                letters.horizontalAdvance(each)
+                for each in (words, str(self._model.headerData(column, across)))
+            )
+            for column, words in samples.items()
+        }
+
+    @override
     def _retranslate(self) -> None:
-        self.viewport().update()
-        self.horizontalHeader().viewport().update()
+        self._share_width()
+        self.show_other_words()
         self.setAccessibleName(self.tr("Entries of the archive, the newest first"))
 
 

@@ -16,6 +16,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import moment_text
+from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
@@ -38,6 +39,8 @@ class SelectionPanel(Translated, QWidget):
         self._heads = tuple(text_label(TextSize.LEAD) for _ in range(2))
         self._compared, self._scattered = NumberTable(), NumberTable()
         self._change, self._verdict = SignLabel(), SignLabel()
+        self._limits = VerificationLimits()
+        self._study = CapabilityRow()
 
         # Layout
         layout = QGridLayout(self)
@@ -56,9 +59,19 @@ class SelectionPanel(Translated, QWidget):
                 layout.addWidget(widget, row, column)
         for remark in (self._change, self._verdict):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
-        layout.setRowStretch(3, 1)
+        layout.addWidget(self._study, 3, 1)
+        layout.setRowStretch(4, 1)
+
+        # Connections
+        self._study.value_changed.connect(self._retranslate)
 
         self._retranslate()
+
+    def set_limits(self, limits: VerificationLimits) -> None:
+        """Judge by other limits."""
+        if limits != self._limits:
+            self._limits = limits
+            self._retranslate()
 
     def set_value(self, selected: Sequence[Written], trend: Sequence[Written]) -> None:
         """Show other entries: those that are selected, and those of the trend."""
@@ -73,13 +86,17 @@ class SelectionPanel(Translated, QWidget):
     def repeatability(self) -> Repeatability | None:
         """Return how well the tips repeat; None if they are fewer than two."""
         entries = self._selected if len(self._selected) >= PAIR else self._trend
-        return repeatability_of(entries, VerificationLimits())
+        study = self._study
+        return repeatability_of(
+            *(entries, self._limits, study.tolerance(), study.reference())
+        )
 
     def words(self) -> tuple[str, ...]:
         """Return what is said of the selection."""
         said = (
             *(head.text() for head in self._heads),
             *(remark.value().text for remark in (self._change, self._verdict)),
+            self._study.words(),
         )
         return tuple(filter(None, said))
 
@@ -118,6 +135,9 @@ class SelectionPanel(Translated, QWidget):
 
     def _show_repeatability(self, found: Repeatability | None) -> None:
         self._scattered.setVisible(found is not None)
+        self._study.setVisible(found is not None)
+        n_repeats = 0 if found is None else len(found.tips)
+        self._study.set_value(None if found is None else found.capability, n_repeats)
         self._verdict.set_value(Remark())
         if found is None:
             self._heads[1].setText(

@@ -11,7 +11,7 @@ from lightpen.record.outcome import TrialOutcome
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.phrases import grade_text
 from lightpen_app.look.theme import Tone
-from lightpen_app.look.words import PARTED
+from lightpen_app.look.words import PARTED, listed
 
 CONTEXT = "history"
 
@@ -79,7 +79,13 @@ def what_text(line: Line) -> str:
         words.append(_translated(_OUTCOMES[event.outcome]))
     if event.is_simulated:
         words.append(_translated(_SIMULATED))
-    return ", ".join(words)
+    return listed(words)
+
+
+def longest_words() -> tuple[str, str]:
+    """Return what is usually told of a calibration, and what at the most."""
+    usual = [kind_text(Kind.ACCEPTED), _translated(_STATES[TipState.REPLACED])]
+    return listed(usual), listed([*usual, _translated(_SIMULATED)])
 
 
 def item_text(event: Event) -> str:

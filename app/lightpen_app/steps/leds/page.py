@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from PySide6.QtCore import QSize
 from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -37,6 +38,8 @@ from lightpen_app.work.workbench import Workbench
 
 T = TypeVar("T")
 
+SHARES, VAST_SHARES = (40, 29, 31), (26, 32, 42)  # of table, pen in space and image
+
 
 class LedsPage(Rearranged, Page):
     """Opens, shows, mends and saves the LED file.
@@ -49,6 +52,7 @@ class LedsPage(Rearranged, Page):
     shows_images = True
     narrow_below = 110 * GRID  # px; then two panels are side by side, not three
     low_below = 62 * GRID  # px; then it scrolls
+    vast_from = QSize(240 * GRID, 130 * GRID)  # px; then the live image is larger
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -75,9 +79,10 @@ class LedsPage(Rearranged, Page):
         self._rows.setSpacing(2 * GRID)
         self._panels = panels = QHBoxLayout()
         panels.setSpacing(2 * GRID)
-        panels.addWidget(self._table, 40)
+        panels.addWidget(self._table)
         self._use_room()
-        panels.addWidget(self._match, 31)
+        panels.addWidget(self._match)
+        self._share_room()
         self._rows.addWidget(self._file)
         self._rows.addLayout(panels, 1)
         scroll = PageScroll()
@@ -168,7 +173,15 @@ class LedsPage(Rearranged, Page):
         if self._room.is_narrow:
             self._rows.addWidget(self._space)
         else:
-            self._panels.insertWidget(1, self._space, 29)
+            self._panels.insertWidget(1, self._space)
+        self._share_room()
+
+    def _share_room(self) -> None:
+        """Divide the width; on a vast page the table has all it needs by less."""
+        shares = VAST_SHARES if self._room.is_vast else SHARES
+        panels = self._table, self._space, self._match
+        for panel, share in zip(panels, shares, strict=True):
+            self._panels.setStretchFactor(panel, share)
 
     @property
     def _is_edited(self) -> bool:

@@ -182,8 +182,7 @@ class ImageTable(Translated, RowTable):
 
     @override
     def _retranslate(self) -> None:
-        self.viewport().update()
-        self.horizontalHeader().viewport().update()
+        self.show_other_words()
         self.setAccessibleName(self.tr("Images, the worst first"))
 
     def _on_current_row_changed(self, now: QModelIndex, _before: QModelIndex) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QTimer, Slot
+from PySide6.QtCore import QSize, QTimer, Slot
 from PySide6.QtWidgets import (
     QApplication,
     QBoxLayout,
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from lightpen_app.steps.review.plots_panel import PlotsPanel
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
-RESULT_WIDTH = 46 * GRID
+RESULT_WIDTH, LARGE_RESULT_WIDTH = 46 * GRID, 80 * GRID
 ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
 
 
@@ -63,6 +63,7 @@ class ReviewPage(Rearranged, Page):
 
     key = "review"
     narrow_below = 112 * GRID  # px; then it has the result in a tab
+    vast_from = QSize(240 * GRID, 140 * GRID)  # px; then the result is larger
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -245,9 +246,10 @@ class ReviewPage(Rearranged, Page):
         if self._search is not None:
             self._search.cancel()
         self._along.shut_down()
-        images = self._images.content_so_far()
-        if images is not None:
-            images.shut_down()
+        for panel in self._panels:
+            content = panel.content_so_far()
+            if content is not None:
+                content.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -338,6 +340,7 @@ class ReviewPage(Rearranged, Page):
     def _use_room(self) -> None:
         """Put the result beside the tabs, or make it the first of a narrow page."""
         side, direction = self._result_side, QBoxLayout.Direction
+        self._result.set_large(self._room.is_vast)
         if self._room.is_narrow:
             self._result_box.setDirection(direction.LeftToRight)
             side.setMinimumWidth(0)
@@ -346,7 +349,8 @@ class ReviewPage(Rearranged, Page):
             self._tabs.setCurrentIndex(0)
         else:
             self._result_box.setDirection(direction.TopToBottom)
-            side.setFixedWidth(RESULT_WIDTH)
+            is_vast = self._room.is_vast
+            side.setFixedWidth(LARGE_RESULT_WIDTH if is_vast else RESULT_WIDTH)
             self._columns.insertWidget(0, side)
             if side.parentWidget() is not None:  # else it would be a window
                 side.show()  # a tab that is not the current one is hidden
@@ -587,6 +591,8 @@ class ReviewPage(Rearranged, Page):
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
+        if self._run.status.result is None:
+            self._reason.refuse()
         images = self._images.content_so_far()
         if images is not None:
             images.forget_refused()

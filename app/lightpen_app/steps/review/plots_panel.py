@@ -14,6 +14,7 @@ from lightpen.record.solving import Solution
 from lightpen_app.look.phrases import share_text
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.plot_card import PlotCard, PlotGrid
 from lightpen_app.steps.review.residual_plots import (
     ArrowPlot,
@@ -73,6 +74,9 @@ class PlotsPanel(Translated, QWidget):
     def cards(self) -> Sequence[PlotCard]:
         """Return the plots with their menus."""
         return self._grid.cards()
+
+    def shut_down(self) -> None:
+        """Let go of what is computed."""
 
     def _show(self, solution: Solution) -> None:
         raise NotImplementedError
@@ -181,14 +185,21 @@ class UncertaintyPanel(PlotsPanel):
             parent,
         )
         self._remark = text_label(TextSize.SMALL, Tone.QUIET)
+        self._monte_carlo = MonteCarloRow()
 
         # Layout
         self._layout.addWidget(self._remark)
+        self._layout.addWidget(self._monte_carlo)
 
         self._retranslate()
 
     @override
+    def shut_down(self) -> None:
+        self._monte_carlo.stop()
+
+    @override
     def _show(self, solution: Solution) -> None:
+        self._monte_carlo.set_value(solution)
         coverage = solution.calibration.coverage
         self._postures.set_data(coverage.tilts, coverage.directions)
         self._retranslate()

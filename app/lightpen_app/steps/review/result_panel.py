@@ -2,24 +2,28 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
+import numpy as np
+from PySide6.QtWidgets import QFrame, QSizePolicy, QVBoxLayout, QWidget
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.verdict import halves_agree
 from lightpen.local_time import local_time
+from lightpen.model.coverage import Coverage
 from lightpen.record.assessment import Assessment
 from lightpen.record.names import Names
 from lightpen.record.solving import Solution
 from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
 from lightpen_app.look.signs import Sign
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.review.tip_readout import TipReadout, TipValue
 from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.posture_dial import DialValue, PostureDial
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 
 BLANK = ("", "", "")
+DIAL_HEIGHT = 22 * GRID  # px
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,13 @@ class ResultPanel(Translated, QFrame):
         self._as_found = SignLabel()
         self._halves = SignLabel()
         self._images = SignLabel()
+        self._postures = text_label(TextSize.LEAD, Tone.QUIET)
+        self._dial = PostureDial()
+        self._dial.setMinimumHeight(DIAL_HEIGHT)
+        # As high as its place is; it draws itself as large as it can.
+        self._dial.setSizePolicy(
+            QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored
+        )
 
         # Layout
         layout = QVBoxLayout(self)
@@ -78,9 +89,22 @@ class ResultPanel(Translated, QFrame):
         layout.addWidget(self._as_found)
         layout.addWidget(self._halves)
         layout.addWidget(self._images)
+        layout.addSpacing(GRID)
+        layout.addWidget(self._postures)
+        layout.addWidget(self._dial, 100)
         layout.addStretch(1)
 
+        self.set_large(False)
         self._retranslate()
+
+    def set_large(self, large: bool) -> None:
+        """Show its figures larger, and the postures, where there is the room."""
+        self._readout.set_large(large)
+        self._table.set_large(large)
+        for label in (self._heading, self._comparison):
+            set_size(label, TextSize.LEAD if large else TextSize.SMALL)
+        for widget in (self._postures, self._dial):
+            widget.setVisible(large)
 
     def value(self) -> Outcome | None:
         """Return the outcome that is shown."""
@@ -94,6 +118,7 @@ class ResultPanel(Translated, QFrame):
     def _retranslate(self) -> None:
         self._comparison.setText(self.tr("Differences / \xb5m"))
         self._table.setAccessibleName(self.tr("Differences"))
+        self._postures.setText(self.tr("Postures of the images that are used"))
         self._refresh()
 
     def _refresh(self) -> None:
@@ -105,7 +130,9 @@ class ResultPanel(Translated, QFrame):
             self._as_found.set_value(Remark())
             self._halves.set_value(Remark())
             self._images.set_value(Remark())
+            self._dial.set_value(DialValue())
             return
+        self._dial.set_value(_postures(outcome.solution.calibration.coverage))
         x, y, z = outcome.tip_pen.tolist()
         u_x, u_y, u_z = outcome.uncertainty.tolist()
         self._readout.set_value(TipValue((x, y, z), (u_x, u_y, u_z)))
@@ -177,6 +204,18 @@ class ResultPanel(Translated, QFrame):
             return Remark(text, Sign.CHECK, Tone.GOOD)
         text = self.tr("Odd and even images differ by more than chance")
         return Remark(text, Sign.WARNING, Tone.WARN)
+
+
+def _postures(coverage: Coverage) -> DialValue:
+    """Return a dial of which each field is full that the images have."""
+    turns = coverage.turns
+    return DialValue(
+        counts=coverage.counts.astype(np.int64),
+        needed=np.minimum(coverage.counts, 1).astype(np.int64),
+        n_upright=coverage.n_upright,
+        n_upright_needed=min(coverage.n_upright, 1),
+        turns=(float(turns.min()), float(turns.max())),
+    )
 
 
 def _texts(values: FloatArray, uncertainties: FloatArray) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_size, text_label
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,21 @@ class TipReadout(QWidget):
         layout.setHorizontalSpacing(GRID)
         layout.setVerticalSpacing(0)
         right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBaseline
+        self._names = [text_label(TextSize.LEAD, Tone.QUIET) for _ in AXES]
         for row, axis in enumerate(AXES):
-            name = text_label(TextSize.LEAD, Tone.QUIET)
+            name = self._names[row]
             name.setText(axis)
             layout.addWidget(name, row, 0, Qt.AlignmentFlag.AlignBaseline)
             layout.addWidget(self._numbers[row], row, 1, right)
             layout.addWidget(self._uncertainties[row], row, 2, right)
         layout.setColumnStretch(1, 1)
+
+    def set_large(self, large: bool) -> None:
+        """Show the figures larger, where there is the room, or no longer."""
+        for label in self._numbers:
+            set_size(label, TextSize.DISPLAY if large else TextSize.TITLE)
+        for label in (*self._names, *self._uncertainties):
+            set_size(label, TextSize.TITLE if large else TextSize.LEAD)
 
     def value(self) -> TipValue | None:
         """Return the tip that is shown."""

@@ -34,6 +34,7 @@ class DataFolderPanel(Translated, QGroupBox):
         super().__init__(parent)
         self._folder = folder
         self._n_others = 0
+        self._trouble = ""
 
         # Widgets
         self._path = text_label(TextSize.SMALL, Tone.QUIET)
@@ -41,6 +42,7 @@ class DataFolderPanel(Translated, QGroupBox):
         self._open = PushButton()
         self._change = PushButton()
         self._others = SignLabel()
+        self._doubt = SignLabel()
 
         # Layout
         row = QHBoxLayout()
@@ -52,6 +54,7 @@ class DataFolderPanel(Translated, QGroupBox):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
         layout.addLayout(row)
+        layout.addWidget(self._doubt)
         layout.addWidget(self._others)
 
         # Connections
@@ -63,6 +66,11 @@ class DataFolderPanel(Translated, QGroupBox):
     def set_others(self, n_others: int) -> None:
         """Tell how many other windows of the program use the folder."""
         self._n_others = n_others
+        self._retranslate()
+
+    def set_trouble(self, trouble: str) -> None:
+        """Tell why nothing can be kept in the folder; empty where it can."""
+        self._trouble = trouble
         self._retranslate()
 
     def _on_open_clicked(self) -> None:
@@ -78,6 +86,10 @@ class DataFolderPanel(Translated, QGroupBox):
         self._change.setToolTip(
             self.tr("Keep swings and results elsewhere from the next start on.")
         )
+        self._change.setProperty("inviting", bool(self._trouble))
+        self._change.style().polish(self._change)
+        doubt = Remark(breakable(self._trouble), Sign.CROSS, Tone.BAD)
+        self._doubt.set_value(doubt if self._trouble else Remark())
         remark = Remark()
         if self._n_others:
             text = self.tr(

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from datetime import date
+from functools import partial
+from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
@@ -16,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from lightpen.record.library_changes import read_kept_picture, read_picture
 from lightpen.record.tip_library import (
     LARGEST_BALL,
     LARGEST_CHANGE,
@@ -31,6 +34,7 @@ from lightpen.record.tip_library import (
 )
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.start.point_field import AXES, PointField
+from lightpen_app.steps.start.tip_picture import ReadPicture, TipPicture
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import field_label, stacked
 from lightpen_app.widgets.number_field import NumberField
@@ -39,6 +43,7 @@ from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 
 LONGEST_NOTE = 500  # characters
+PICTURE_SIZE = QSize(26 * GRID, 22 * GRID)  # px
 MADE: dict[ItemKind, Callable[..., AnyItem]] = {
     ItemKind.PEN: ListedPen,
     ItemKind.TIP: ListedTip,
@@ -48,6 +53,11 @@ MADE: dict[ItemKind, Callable[..., AnyItem]] = {
 
 class ItemForm(Translated, QWidget):
     """Shows an item; the id of one that is known cannot be changed.
+
+    Parameters
+    ----------
+    folder : Path
+        The data folder, in which pictures are kept.
 
     Signals
     -------
@@ -60,8 +70,9 @@ class ItemForm(Translated, QWidget):
     value_edited = Signal()
     spin_toggled = Signal(bool)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._folder = folder
         self._item: AnyItem = ListedTip(id="?")
 
         # Widgets
@@ -84,6 +95,7 @@ class ItemForm(Translated, QWidget):
         self._picture = PathField()
         self._browse = PushButton()
         self._picture.add_button(self._browse)
+        self._preview = TipPicture(PICTURE_SIZE)
         self._note = QLineEdit()
         self._note.setMaxLength(LONGEST_NOTE)
         own = (self._ball, self._change, self._days, self._swings)
@@ -115,11 +127,12 @@ class ItemForm(Translated, QWidget):
         inner.setVerticalSpacing(GRID)
         for column, field in enumerate(own):
             inner.addLayout(self._stacked(field), 0, column)
-        inner.addLayout(self._stacked(self._nominal), 1, 0, 1, 4)
-        inner.addWidget(self._has_axis, 2, 0, 1, 4)
-        inner.addWidget(self._axis_row, 3, 0, 1, 4)
-        inner.addWidget(self._spin_told, 4, 0, 1, 4)
-        inner.addLayout(self._stacked(self._picture), 5, 0, 1, 4)
+        inner.addLayout(self._stacked(self._nominal), 1, 0, 1, 3)
+        inner.addWidget(self._has_axis, 2, 0, 1, 3)
+        inner.addWidget(self._axis_row, 3, 0, 1, 3)
+        inner.addWidget(self._spin_told, 4, 0, 1, 3)
+        inner.addLayout(self._stacked(self._picture), 5, 0, 1, 3)
+        inner.addWidget(self._preview, 1, 3, 5, 1, Qt.AlignmentFlag.AlignCenter)
         for layout in (grid, inner):
             for column in range(4):
                 layout.setColumnStretch(column, 1)
@@ -130,6 +143,7 @@ class ItemForm(Translated, QWidget):
         self._has_axis.toggled.connect(self._on_axis_toggled)
         self._spin.toggled.connect(self._on_spin_toggled)
         self._browse.clicked.connect(self._on_browse_clicked)
+        self._picture.value_changed.connect(self._show_picture)
 
         self._retranslate()
 
@@ -192,6 +206,7 @@ class ItemForm(Translated, QWidget):
         self._due.set_value(item.due)
         self._note.setText(item.note)
         self._picture.set_value("")
+        self._show_picture()
         is_tip = isinstance(item, ListedTip)
         self._tip_only.setVisible(is_tip)
         if isinstance(item, ListedTip):
@@ -243,6 +258,14 @@ class ItemForm(Translated, QWidget):
             self.tr("Pictures (*.png *.jpg *.jpeg *.bmp)"),
         )
 
+    def _show_picture(self) -> None:
+        """Show the picture that was given, else the one that is kept."""
+        path, kept = self._picture.value(), None
+        if isinstance(self._item, ListedTip):
+            kept = kept_picture(self._folder, self._item)
+        given = partial(read_picture, Path(path)) if path else None
+        self._preview.set_value(given or kept)
+
     def _stacked(self, field: QWidget) -> QVBoxLayout:
         return stacked(self._labels[field], field)
 
@@ -262,7 +285,8 @@ class ItemForm(Translated, QWidget):
         }
         for field, text in texts.items():
             self._labels[field].setText(text)
-            field.setAccessibleName(text)
+            named = self._picture.edit() if field is self._picture else field
+            named.setAccessibleName(text)
         self._due.setToolTip(
             self.tr("The last day, such as {0}; empty for no end.").format(
                 date(2026, 8, 14)
@@ -293,6 +317,13 @@ class ItemForm(Translated, QWidget):
         self._browse.setText(self.tr("Browse..."))
         kept = self._item.picture if isinstance(self._item, ListedTip) else None
         self._picture.edit().setPlaceholderText("" if kept is None else kept.place)
+
+
+def kept_picture(folder: Path, tip: ListedTip) -> ReadPicture | None:
+    """Return what reads the picture of a tip that is kept; None if there is none."""
+    if tip.picture is None:
+        return None
+    return partial(read_kept_picture, folder, tip.picture)
 
 
 def _alike(

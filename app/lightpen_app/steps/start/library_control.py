@@ -100,7 +100,7 @@ class LibraryControl(QObject):
         return self._watch.library.tips.get(name)
 
     def _made_dialog(self) -> LibraryDialog:
-        dialog = LibraryDialog(self._page)
+        dialog = LibraryDialog(self._workbench.folder, self._page)
 
         # Connections
         self._watch.change_kept.connect(dialog.tell_kept)

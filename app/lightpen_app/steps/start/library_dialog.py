@@ -1,9 +1,10 @@
 """The tip library: pens, tips and cones with their state, limits and due dates."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from msgspec import structs
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Signal
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QSize, Qt, Signal
 from PySide6.QtGui import QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -23,7 +24,8 @@ from lightpen.record.tip_library import AnyItem, ItemKind, ListedTip
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, text_label
 from lightpen_app.look.words import PARTED
-from lightpen_app.steps.start.item_form import MADE, ItemForm
+from lightpen_app.steps.start.item_form import MADE, ItemForm, kept_picture
+from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.row_table import ROW_HEIGHT, RowTable
@@ -33,8 +35,11 @@ from lightpen_app.widgets.supervisor_fields import SupervisorFields
 from lightpen_app.widgets.translated import Translated
 
 LEAST_ROWS = 7
-WIDTHS = (16, 22, 14, 12, 14, 20)  # of the columns but the last, in GRID
+WIDTHS = (12, 18, 13, 11, 14, 20)  # of the columns but the last, in GRID
+NUMBERS = (3, 4)  # columns of them
+PICTURE_SIZE = QSize(15 * GRID, 26 * GRID)  # px
 KINDS = (ItemKind.TIP, ItemKind.PEN, ItemKind.CONE)
+RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 LONGEST_REASON = 200  # characters
 
 
@@ -62,6 +67,11 @@ class Asked:
 class LibraryDialog(Translated, QDialog):
     """Shows what there is; adds, changes and retires.
 
+    Parameters
+    ----------
+    folder : Path
+        The data folder, in which pictures are kept.
+
     Signals
     -------
     change_asked(Asked)
@@ -72,8 +82,10 @@ class LibraryDialog(Translated, QDialog):
     change_asked = Signal(object)
     chosen = Signal(object, str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._folder = folder
+        self._pictured: ListedTip | None = None
         self._standings = Standings()
         self._pen = ""
         self._is_guarded = False
@@ -90,6 +102,7 @@ class LibraryDialog(Translated, QDialog):
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
         self._table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self._table.setMinimumHeight((LEAST_ROWS + 1) * ROW_HEIGHT)
+        self._picture = TipPicture(PICTURE_SIZE)
         self._retired = QCheckBox()
         self._use, self._add, self._edit, self._retire, self._close = (
             PushButton() for _ in range(5)
@@ -97,7 +110,7 @@ class LibraryDialog(Translated, QDialog):
         self._panel = QFrame()
         self._panel.setProperty("area", "panel")
         self._what = text_label(TextSize.LEAD)
-        self._form = ItemForm()
+        self._form = ItemForm(folder)
         self._reason = EnterEdit()
         self._reason.setMaxLength(LONGEST_REASON)
         self._supervisor = SupervisorFields()
@@ -118,14 +131,13 @@ class LibraryDialog(Translated, QDialog):
         buttons.addWidget(self._close)
         ends = QHBoxLayout()
         ends.setSpacing(GRID)
-        ends.addWidget(self._trouble, 1)
-        ends.addStretch(0)
+        ends.addWidget(self._reason, 1)
         ends.addWidget(self._leave)
         ends.addWidget(self._save)
         panel = QVBoxLayout(self._panel)
-        panel.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
+        panel.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
         panel.setSpacing(GRID)
-        for widget in (self._what, self._form, self._reason, self._supervisor):
+        for widget in (self._what, self._form, self._supervisor, self._trouble):
             panel.addWidget(widget)
         panel.addLayout(ends)
         listed = QVBoxLayout(self._list)
@@ -133,11 +145,14 @@ class LibraryDialog(Translated, QDialog):
         listed.setSpacing(GRID)
         listed.addWidget(self._lead)
         listed.addLayout(top)
-        listed.addWidget(self._table, 1)
+        shown = QHBoxLayout()
+        shown.setSpacing(2 * GRID)
+        shown.addWidget(self._table, 1)
+        shown.addWidget(self._picture, 0, Qt.AlignmentFlag.AlignTop)
+        listed.addLayout(shown, 1)
         listed.addLayout(buttons)
         layout = QVBoxLayout(self)
-        margin = 2 * GRID
-        layout.setContentsMargins(margin, margin, margin, margin)
+        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
         layout.addWidget(self._list, 1)
         layout.addWidget(self._panel)
         self.setMinimumWidth(112 * GRID)
@@ -253,6 +268,8 @@ class LibraryDialog(Translated, QDialog):
             *(ball, change, pens, item.note),
         )
         row = [QStandardItem(text) for text in texts]
+        for column in NUMBERS:
+            row[column].setTextAlignment(RIGHT)
         row[1].setForeground(colors_of(self.palette()).tone(remark.tone))
         return row
 
@@ -326,8 +343,17 @@ class LibraryDialog(Translated, QDialog):
         asked = Asked(item, picture, self._is_new, reason, signature)
         self.change_asked.emit(asked)
 
+    def _show_picture(self, item: AnyItem | None) -> None:
+        """Show the picture of the tip that is chosen, if it has one."""
+        pictured = item if isinstance(item, ListedTip) and item.picture else None
+        self._picture.setVisible(pictured is not None)
+        if pictured is not None and pictured != self._pictured:
+            self._picture.set_value(kept_picture(self._folder, pictured))
+        self._pictured = pictured
+
     def _refresh(self) -> None:
         item = self.current()
+        self._show_picture(item)
         nothing = "" if item is not None else self.tr("Choose one in the table.")
         is_retired = item is not None and item.is_retired
         why_not = self.tr("It is retired.") if is_retired else nothing
@@ -370,6 +396,8 @@ class LibraryDialog(Translated, QDialog):
                 *(self.tr("Calibrated on pens"), self.tr("Note")),
             ]
         )
+        for column in NUMBERS:
+            self._model.horizontalHeaderItem(column).setTextAlignment(RIGHT)
         is_tips = self.kind() is ItemKind.TIP
         for column, width in enumerate(WIDTHS):
             self._table.setColumnWidth(column, width * GRID)

@@ -93,6 +93,8 @@ class LimitsDialog(Translated, QDialog):
 
         # Connections
         self._supervisor.value_edited.connect(self._refresh)
+        self._supervisor.entered.connect(self._on_entered)
+        self._new_password.returnPressed.connect(self._on_entered)
         self._save.clicked.connect(self._on_save_clicked)
         self._buttons.rejected.connect(self.reject)
 
@@ -131,9 +133,14 @@ class LimitsDialog(Translated, QDialog):
     def tell(self, trouble: str) -> None:
         """Say why nothing was laid down."""
         self._trouble.set_value(Remark(trouble, Sign.CROSS, Tone.BAD))
+        self._supervisor.clear_password()
 
     def _refresh(self) -> None:
         self._save.setEnabled(self._supervisor.is_filled())
+
+    def _on_entered(self) -> None:
+        if self._save.isEnabled():
+            self._on_save_clicked()
 
     def _on_save_clicked(self) -> None:
         new = self._new_password.text()

@@ -1,7 +1,7 @@
 """The step Start: who calibrates what, where, and what there is of it already."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,6 +28,12 @@ from lightpen.swing.preparation import (
     Preparation,
 )
 from lightpen.swing.resuming import Resumable, read_resumable
+from lightpen.verification.going_on import abandon_interrupted
+from lightpen.verification.under_way import (
+    InterruptedVerification,
+    UnderWay,
+    find_interrupted,
+)
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
@@ -42,6 +48,7 @@ from lightpen_app.steps.start.limits_dialog import LimitsDialog
 from lightpen_app.steps.start.newcomer_panel import NewcomerPanel
 from lightpen_app.steps.start.result_panel import LastResult, LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.steps.start.vast_panel import VastPanel
 from lightpen_app.widgets.page_scroll import PageScroll
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.rearranged import Rearranged
@@ -59,6 +66,7 @@ class StartPage(Rearranged, Page):
     key = "start"
     narrow_below = 100 * GRID  # px; then it has one column
     large_from = QSize(150 * GRID, 96 * GRID)  # px; then its figures are larger
+    vast_from = QSize(240 * GRID, 150 * GRID)  # px; then there is more below
 
     def __init__(
         self, workbench: Workbench, sounds: Sounds, parent: QWidget | None = None
@@ -75,6 +83,7 @@ class StartPage(Rearranged, Page):
         self._signing: Job | None = None
         self._resumed: Path | None = None
         self._reviewed: Path | None = None
+        self._continued: UnderWay | None = None
         self._is_trying = False
 
         # Widgets: the order of making them is the order of the Tab key
@@ -89,6 +98,7 @@ class StartPage(Rearranged, Page):
         self._sound_test = SoundTest(sounds)
         self._folder = DataFolderPanel(workbench.folder)
         self._newcomer = NewcomerPanel()
+        self._vast = VastPanel(workbench.run.logbook)
         self._typing = QTimer(self)
         self._typing.setSingleShot(True)
         self._typing.setInterval(TYPING_PAUSE_MS)
@@ -112,12 +122,16 @@ class StartPage(Rearranged, Page):
         right.insertWidget(right.count() if is_known else 0, self._newcomer)
         right.addStretch(1)
         content = QWidget()
-        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight, content)
-        columns.setContentsMargins(0, 0, 0, 0)
+        rows = QVBoxLayout(content)
+        rows.setContentsMargins(0, 0, 0, 0)
+        rows.setSpacing(3 * GRID)
+        self._columns = columns = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         columns.setSpacing(3 * GRID)
         self._use_room()  # before the columns: the order of the Tab key
         columns.addLayout(left, 5)
         columns.addLayout(right, 4)
+        rows.addLayout(columns)
+        rows.addWidget(self._vast, 1)
         scroll = PageScroll()
         scroll.setWidget(content)
         layout = QVBoxLayout(self)
@@ -142,15 +156,20 @@ class StartPage(Rearranged, Page):
         self._interrupted.resume_requested.connect(self._on_resume_requested)
         self._interrupted.discard_requested.connect(self._on_discard_requested)
         self._interrupted.search_requested.connect(self._search_interrupted)
+        self._interrupted.continue_requested.connect(self._on_continue_requested)
+        self._interrupted.close_requested.connect(self._on_close_requested)
         self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         self._folder.change_requested.connect(self.data_folder_requested)
-        workbench.windows.counted.connect(self._folder.set_others)
+        workbench.folder_watch.counted.connect(self._folder.set_others)
+        workbench.folder_watch.doubted.connect(self._folder.set_trouble)
         workbench.changed.connect(self._on_workbench_changed)
         workbench.swing_wanted.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
         workbench.run.troubled.connect(self._on_run_troubled)
+        workbench.verification.changed.connect(self._on_verification_changed)
+        workbench.verification.troubled.connect(self._on_verification_troubled)
 
         self._show_changes(None, self._shown)
         self._retranslate()
@@ -198,6 +217,7 @@ class StartPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._searching.stop()
+        self._vast.shut_down()
         for job in (self._lookup, self._search, self._work, self._signing):
             if job is not None:
                 job.cancel()
@@ -212,7 +232,9 @@ class StartPage(Rearranged, Page):
         # What waits for an answer comes first.
         column = self._left if is_narrow else self._right
         column.insertWidget(0, self._interrupted)
-        self._last.set_large(self._room.is_large)
+        self._last.set_room(self._room)
+        self._vast.setVisible(self._room.is_vast)
+        self._show_vast()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
@@ -409,6 +431,7 @@ class StartPage(Rearranged, Page):
         if self._lookup is not None:
             self._lookup.cancel()
         self._looked_up = pen, tip, is_simulated = _key(self._workbench.preparation)
+        self._show_vast()
         if not (pen and tip):
             self._last.set_value(LastResult(is_named=False))
             return
@@ -419,6 +442,12 @@ class StartPage(Rearranged, Page):
         )
         self._lookup.failed.connect(self._on_lookup_failed)
         self._lookup.crashed.connect(self._on_lookup_crashed)
+
+    def _show_vast(self) -> None:
+        """Show more of the tip that is named where there is the room."""
+        if self._room.is_vast:
+            pen, tip, is_simulated = _key(self._workbench.preparation)
+            self._vast.set_value(pen, tip, is_simulated=is_simulated)
 
     def _on_looked_up(self, result: Result | None) -> None:
         is_simulated = self._looked_up[2]
@@ -457,22 +486,25 @@ class StartPage(Rearranged, Page):
     def _search_interrupted(self) -> None:
         if self._search is not None:
             self._search.cancel()
-        run = self._workbench.run
+        run, data = self._workbench.run, self._workbench.folder
         archive, folder = run.archive, run.records_folder
-        self._search = self._started(
-            lambda _: conclude_accepted(archive, find_unfinished(folder)),
-            self._on_interrupted_found,
-        )
+
+        def search(_: Report) -> Interrupted:
+            swings = conclude_accepted(archive, find_unfinished(folder))
+            return Interrupted(swings, find_interrupted(data))
+
+        self._search = self._started(search, self._on_interrupted_found)
         self._search.failed.connect(self.notice_raised)
 
-    def _on_interrupted_found(self, swings: Unfinished) -> None:
+    def _on_interrupted_found(self, found: "Interrupted") -> None:
+        swings = found.swings
         present = self._workbench.run.status.record_folder
         others = Unfinished(
             tuple(r for r in swings.interrupted if r.folder != present),
             tuple(r for r in swings.under_way if r.folder != present),
             swings.damaged,
         )
-        self._interrupted.set_value(others)
+        self._interrupted.set_value(others, found.verifications)
 
     def _on_resume_requested(self, folder: Path) -> None:
         self._interrupted.set_waiting(self.tr("The swing is being read."))
@@ -531,6 +563,54 @@ class StartPage(Rearranged, Page):
     def _go_on(self, swing: Resumable) -> None:
         self._resumed = swing.record.folder
         self._workbench.run.runner.go_on(swing)
+
+    def _on_continue_requested(self, found: InterruptedVerification) -> None:
+        """Choose what the verification was of, and go on with it."""
+        under_way, workbench = found.under_way, self._workbench
+        if under_way is None:
+            return
+        self._settle()
+        station = under_way.names.station
+        if station != workbench.preparation.names.station:
+            self._on_station_changed(station)
+        workbench.set_preparation(replace(workbench.preparation, names=under_way.names))
+        limits = workbench.choices.limits
+        workbench.set_choices(replace(under_way.choices, limits=limits))
+        lacks = workbench.preparation.lacks()
+        if lacks:
+            self.notice_raised.emit(lack_text(lacks[0]))
+            return
+        self._continued = under_way
+        self._interrupted.set_waiting(self.tr("The verification is being read."))
+        workbench.verification.runner.go_on(found)
+
+    def _on_verification_changed(self) -> None:
+        continued = self._continued
+        status = self._workbench.verification.status
+        if continued is not None and status.began == continued.began:
+            self._continued = None
+            self._interrupted.set_waiting("")
+            self.step_requested.emit("verify")
+
+    def _on_verification_troubled(self) -> None:
+        if self._continued is not None:
+            self._continued = None
+            self._interrupted.set_waiting("")
+
+    def _on_close_requested(self, found: InterruptedVerification) -> None:
+        folder, now = self._workbench.folder, self._workbench.around.now
+        self._interrupted.set_waiting(self.tr("The verification is being closed."))
+        self._work = self._started(
+            lambda _: abandon_interrupted(folder, found, now()),
+            lambda _: self._on_closed(),
+        )
+        self._work.failed.connect(self._on_work_failed)
+        self._work.crashed.connect(self._on_work_crashed)
+
+    def _on_closed(self) -> None:
+        self._workbench.enter_owed()
+        self.status_changed.emit(self.tr("Closed as abandoned; see History."))
+        self._search_interrupted()
 
     def _on_verification_requested(self) -> None:
         self._settle()
@@ -611,6 +691,14 @@ class StartPage(Rearranged, Page):
         job.succeeded.connect(on_succeeded)
         job.start()
         return job
+
+
+@dataclass(frozen=True, eq=False)
+class Interrupted:
+    """What was found that has no end."""
+
+    swings: Unfinished
+    verifications: tuple[InterruptedVerification, ...]
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:

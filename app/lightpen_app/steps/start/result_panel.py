@@ -28,11 +28,17 @@ from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
+from lightpen_app.widgets.rearranged import Room
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.standing_mark import standing_remark
 from lightpen_app.widgets.translated import Translated
 
 DAYS_IN_MONTH, DAYS_IN_YEAR = 30, 365
+SIZES = (  # of age, words and figures, where there is little room, plenty, and more
+    (TextSize.TITLE, TextSize.SMALL, TextSize.BODY),
+    (TextSize.DISPLAY, TextSize.BODY, TextSize.TITLE),
+    (TextSize.HUGE, TextSize.LEAD, TextSize.DISPLAY),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +155,14 @@ class LastResultPanel(Translated, QGroupBox):
 
         self._retranslate()
 
-    def set_large(self, large: bool) -> None:
-        """Show its figures larger, where there is the room, or no longer."""
-        set_size(self._age, TextSize.DISPLAY if large else TextSize.TITLE)
-        set_size(self._when, TextSize.BODY if large else TextSize.SMALL)
-        for head in self._heads:
-            set_size(head, TextSize.BODY if large else TextSize.SMALL)
+    def set_room(self, room: Room) -> None:
+        """Show its figures the larger, the more room there is."""
+        age, words, figures = SIZES[room.is_large + room.is_vast]
+        set_size(self._age, age)
+        for label in (self._when, *self._heads):
+            set_size(label, words)
         for cell in (*self._axes, *self._tip, *self._uncertainty):
-            set_size(cell, TextSize.TITLE if large else TextSize.BODY)
+            set_size(cell, figures)
 
     def value(self) -> LastResult:
         """Return what is shown."""

@@ -36,6 +36,8 @@ DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
 SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
+VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more
+PEN_PLACE = 3  # below the count, its bar and its note
 LEAST_IMAGE = 14 * GRID  # px of width
 PROGRESS_STEPS = 1000
 PLOTS_HEIGHT = 32 * GRID  # px, there
@@ -53,6 +55,7 @@ class SwingFace(Rearranged, Translated, QWidget):
 
     narrow_below, low_below = 100 * GRID, 56 * GRID  # px; then its plots are below
     large_from = QSize(150 * GRID, 80 * GRID)  # px; then image and letters are larger
+    vast_from = QSize(240 * GRID, 130 * GRID)  # px; then they are larger still
 
     def __init__(
         self, buttons: Sequence[QPushButton], parent: QWidget | None = None
@@ -98,7 +101,6 @@ class SwingFace(Rearranged, Translated, QWidget):
         self._side = side = QGridLayout()
         side.setSpacing(2 * GRID)
         side.addLayout(numbers, 0, 0)
-        side.addWidget(self._pen, 0, 1)
         self._content = Squeezed()
         self._body = QGridLayout(self._content)
         self._body.setContentsMargins(0, 0, 0, 0)
@@ -190,6 +192,10 @@ class SwingFace(Rearranged, Translated, QWidget):
             self._numbers.addWidget(self._banner)
             self._side.addWidget(self._plots, 1, 0, 1, 3)
             self._side.addWidget(self._image, 0, 2)
+        if self._room.is_vast:
+            self._numbers.insertWidget(PEN_PLACE, self._pen, 100)
+        else:
+            self._side.addWidget(self._pen, 0, 1)
         self._share_room()
         self._side.setVerticalSpacing(GRID if is_small else 2 * GRID)
         self._hold_first_row(self._scroll.viewport().height())
@@ -212,6 +218,8 @@ class SwingFace(Rearranged, Translated, QWidget):
         columns, rows = SIDE_SHARES, ROW_SHARES
         if self._is_small:
             columns, rows = (*columns[:2], 0), (1, 0)
+        elif self._room.is_vast:
+            columns, rows = VAST_SIDE_SHARES, VAST_ROW_SHARES
         elif self._room.is_large:
             columns, rows = LARGE_SIDE_SHARES, LARGE_ROW_SHARES
         for column, share in enumerate(columns):

@@ -3,7 +3,8 @@
 from itertools import chain
 
 import numpy as np
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.arrays import FloatArray
@@ -17,17 +18,20 @@ from lightpen.verification.fixed_point import (
     scatter_of,
 )
 from lightpen.verification.length import Length
-from lightpen.verification.session import SessionSetup, SessionState, ring_fit
+from lightpen.verification.session import drift_so_far, ring_fit
+from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.touch import Touch
 from lightpen_app.look.quantities import number_text
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
+from lightpen_app.widgets.rearranged import Rearranged
 from lightpen_app.widgets.translated import Translated
 
 AXES = ("u", "v", "w")
 DECIMALS = 4  # of mm
+DIAL_SHARE, LARGE_DIAL_SHARE, TABLES_SHARE = 3, 9, 13  # of the width
 LATEST = 6  # touches of a ring, which fit beside it
 TENTHS_OF_PER_MILLE = 1e4  # as the paper tells a relative error
 
@@ -64,10 +68,12 @@ class TaskFinding(Translated, QWidget):
         raise NotImplementedError
 
 
-class FixedPointFinding(TaskFinding):
+class FixedPointFinding(Rearranged, TaskFinding):
     """The postures, u v w of each touch, and both tips beside each other."""
 
     kind = TaskKind.FIXED_POINT
+    narrow_below = 116 * GRID  # px; then one table is below the other
+    large_from = QSize(160 * GRID, 80 * GRID)  # px; then all is larger
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -83,7 +89,9 @@ class FixedPointFinding(TaskFinding):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(2 * GRID)
-        layout.addWidget(self._dial, 3)
+        layout.addWidget(self._dial)
+        self._tables = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._tables.setSpacing(2 * GRID)
         for head, table, share in zip(
             self._heads, (self._touches, self._summary), (6, 7), strict=True
         ):
@@ -92,9 +100,23 @@ class FixedPointFinding(TaskFinding):
             column.addWidget(head)
             column.addWidget(table)
             column.addStretch(1)
-            layout.addLayout(column, share)
+            self._tables.addLayout(column, share)
+        layout.addLayout(self._tables, TABLES_SHARE)
+        self._columns = layout
+        self._use_room()
 
         self._retranslate()
+
+    @override
+    def _use_room(self) -> None:
+        direction = QBoxLayout.Direction
+        self._tables.setDirection(
+            direction.TopToBottom if self._room.is_narrow else direction.LeftToRight
+        )
+        is_large = self._room.is_large
+        for table in (self._touches, self._summary):
+            table.set_large(is_large)
+        self._columns.setStretch(0, LARGE_DIAL_SHARE if is_large else DIAL_SHARE)
 
     @override
     def _retranslate(self) -> None:
@@ -380,6 +402,61 @@ class ArticulationFinding(TaskFinding):
         pen = setup.instrument.pen
         postures = [posture_of(pen, touch.rotation) for touch in touched]
         return dial_of(postures, live_posture(setup, state))
+
+
+class DriftFinding(TaskFinding):
+    """The visits of the witness, and how far it moved since the first."""
+
+    kind = TaskKind.DRIFT
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._table = NumberTable()
+        self._told = text_label(TextSize.BODY, Tone.QUIET)
+        self._told.setWordWrap(True)
+
+        # Layout
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._table)
+        layout.addWidget(self._told)
+        layout.addStretch(1)
+
+        self._retranslate()
+
+    @override
+    def _retranslate(self) -> None:
+        self._table.setAccessibleName(self.tr("Moves of the witness / mm"))
+        self._refresh()
+
+    @override
+    def _refresh(self) -> None:
+        drift = None if self._shown is None else drift_so_far(*self._shown)
+        if drift is None:
+            self._table.set_value(Figures())
+            self._told.setText(
+                self.tr(
+                    "A cone that stands still is the witness: what it moves by from "
+                    "one visit to the next counts in U of what is touched in between."
+                )
+            )
+            return
+        heads = (
+            *(f"{axis} / mm" for axis in AXES),
+            *(self.tr("U of {0} / mm").format(axis) for axis in AXES),
+        )
+        rows = zip(drift.moves, drift.uncertainties, strict=True)
+        cells = tuple((*_lengths(move), *_lengths(u)) for move, u in rows)
+        names = tuple(
+            self.tr("Visit {0}").format(i + 1) for i in range(len(drift.names))
+        )
+        self._table.set_value(Figures(heads, names, cells))
+        shares = ", ".join(_lengths(drift.share))
+        words = self.tr("Standard uncertainty by it along u, v, w: {0} mm.")
+        self._told.setText(words.format(shares))
 
 
 def dial_of(touched: list[Posture], posture: Posture | None) -> DialValue:

@@ -1,5 +1,7 @@
 """The step Verify: from the tip in force to its verdict, without a key."""
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -24,12 +26,14 @@ from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.verify.findings import (
     ArticulationFinding,
+    DriftFinding,
     FixedPointFinding,
     LengthFinding,
     RingFinding,
 )
 from lightpen_app.steps.verify.strips import (
     ArticulationStrip,
+    DriftStrip,
     FixedPointStrip,
     LengthStrip,
     RingStrip,
@@ -39,6 +43,7 @@ from lightpen_app.steps.verify.touch_hand import TouchHand
 from lightpen_app.steps.verify.words import VerifyMoment, VerifyWords
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.image_view import ImageView
+from lightpen_app.widgets.late import Late
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.page_scroll import PageScroll, Squeezed
 from lightpen_app.widgets.push_button import PushButton
@@ -50,6 +55,9 @@ from lightpen_app.widgets.standing_mark import standing_text
 from lightpen_app.widgets.state_banner import StateBanner
 from lightpen_app.work.live_view import Shown
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from lightpen_app.steps.verify.pen_panel import PenPanel
 
 SHOWING_MS = 50  # from a new state to what is shown; the states between make one
 PROGRESS_STEPS = 1000
@@ -108,10 +116,14 @@ class VerifyPage(Rearranged, Page):
             TaskPanel(RingStrip(), RingFinding()),
             TaskPanel(LengthStrip(), LengthFinding()),
             TaskPanel(ArticulationStrip(), ArticulationFinding()),
+            TaskPanel(DriftStrip(), DriftFinding()),
         )
+        self._pen: Late[PenPanel] = Late(self._make_pen_panel)
+        self._pen_tab = PageScroll()
+        self._pen_tab.setWidget(Squeezed(self._pen))
         self._tabs = QTabWidget()
-        for panel in self._panels:
-            self._tabs.addTab(panel, "")
+        for tab in (*self._panels, self._pen_tab):
+            self._tabs.addTab(tab, "")
         self._image = ImageView()
         self._hand = TouchHand(self._live)
         self._showing = QTimer(self)
@@ -125,6 +137,7 @@ class VerifyPage(Rearranged, Page):
         self._run.changed.connect(self._show_soon)
         self._run.happened.connect(self._on_happened)
         self._run.progressed.connect(self._on_progressed)
+        self._run.troubled.connect(self._on_troubled)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._show_soon)
         workbench.changed.connect(self._on_workbench_changed)
@@ -236,7 +249,7 @@ class VerifyPage(Rearranged, Page):
     @override
     def unsaved(self) -> str:
         state = self._runner.status.state
-        if state is None or not (state.touches or state.runs):
+        if state is None or not (state.touches or state.runs or state.visits):
             return ""
         return self.tr(
             "The verification is not finished. The touches of the task at hand are "
@@ -246,6 +259,9 @@ class VerifyPage(Rearranged, Page):
     @override
     def shut_down(self) -> None:
         self._showing.stop()
+        pen = self._pen.content_so_far()
+        if pen is not None:
+            pen.shut_down()
 
     @override
     def _retranslate(self) -> None:
@@ -272,6 +288,7 @@ class VerifyPage(Rearranged, Page):
         self._image.set_message(self.tr("No image yet."))
         self._progress.setAccessibleName(self.tr("Progress"))
         self._tabs.setAccessibleName(self.tr("Tasks"))
+        self._tabs.setTabText(self._tabs.indexOf(self._pen_tab), self.tr("Pen"))
         if self._room.is_narrow:
             index = self._tabs.indexOf(self._image)
             self._tabs.setTabText(index, self.tr("Live image"))
@@ -321,6 +338,12 @@ class VerifyPage(Rearranged, Page):
             self._image.setMinimumWidth(IMAGE_WIDTH)
             self._body.addWidget(self._image, 2)
             self._image.show()  # a tab that is not the current one is hidden
+
+    def _make_pen_panel(self) -> "PenPanel":
+        # What draws its plot takes long to be imported.
+        from lightpen_app.steps.verify.pen_panel import PenPanel
+
+        return PenPanel(self._workbench)
 
     def _moment(self) -> VerifyMoment:
         return VerifyMoment(self._run.status, self._live.connection, self._reading)
@@ -403,6 +426,10 @@ class VerifyPage(Rearranged, Page):
     def _on_happened(self, what: SessionHappening) -> None:
         value = self._words.operator_value(self._moment())
         self._sounds.play(SOUNDS[what], value.fraction or 0.0)
+
+    def _on_troubled(self) -> None:
+        if self._can_be_accepted():
+            self._reason.refuse()
 
     def _on_progressed(self, fraction: float) -> None:
         self._reading = fraction

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -130,16 +130,28 @@ class FixedPointStrip(TaskStrip):
         return self.tr("Touch the cone again"), self.tr("Touches")
 
 
+class SurfaceField(QComboBox):
+    """Where something is touched; as wide as its longest choice."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        for surface in Surface:
+            self.addItem("", surface)
+
+    @override
+    def minimumSizeHint(self) -> QSize:
+        # WORKAROUND for Qt 6: its own is kept from the language before.
+        return self.sizeHint()
+
+
 class RingStrip(TaskStrip):
     """A ring: its certified radius, where it is touched, and how often."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._radius = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
-        self._surface = QComboBox()
-        self._surface.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
-        for surface in Surface:
-            self._surface.addItem("", surface)
+        self._surface = SurfaceField()
         self._runs = NumberField("", (1, MOST_RUNS), 0)
         fields = self._radius, self._uncertainty, self._surface, self._runs
         super().__init__(TaskKind.CIRCLE, fields, parent)
@@ -195,14 +207,34 @@ class ArticulationStrip(TaskStrip):
         return (self.tr("Touch the cone five times in each of five postures"),)
 
 
+class DriftStrip(TaskStrip):
+    """A cone as witness that the camera stands still, which needs nothing else."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(TaskKind.DRIFT, (), parent)
+
+    @override
+    def _with_fields(self, choices: VerificationChoices) -> VerificationChoices:
+        return choices
+
+    @override
+    def _show_fields(self, choices: VerificationChoices) -> None:
+        """It has no fields."""
+
+    @override
+    def _words(self) -> tuple[str, ...]:
+        return (self.tr("Touch the cone before, between and after the other tasks"),)
+
+
 class LengthStrip(TaskStrip):
     """A length: its certified size, and at how many places it is touched."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         self._length = _length_field()
         self._uncertainty = NumberField("mm", (0.0, LARGEST_U), 4)
+        self._surface = SurfaceField()
         self._places = NumberField("", (1, MOST_RUNS), 0)
-        fields = self._length, self._uncertainty, self._places
+        fields = self._length, self._uncertainty, self._surface, self._places
         super().__init__(TaskKind.LENGTH, fields, parent)
 
     @override
@@ -211,6 +243,7 @@ class LengthStrip(TaskStrip):
             choices,
             length=self._length.value(),
             length_uncertainty=self._uncertainty.value(),
+            length_surface=Surface(self._surface.currentData()),
             n_places=round(self._places.value()),
         )
 
@@ -218,15 +251,20 @@ class LengthStrip(TaskStrip):
     def _show_fields(self, choices: VerificationChoices) -> None:
         self._length.setValue(choices.length)
         self._uncertainty.setValue(choices.length_uncertainty)
+        self._surface.setCurrentIndex(self._surface.findData(choices.length_surface))
         self._places.setValue(choices.n_places)
 
     @override
     def _words(self) -> tuple[str, ...]:
+        names = self.tr("in cones"), self.tr("inner faces"), self.tr("outer faces")
+        for index, name in enumerate(names):
+            self._surface.setItemText(index, name)
         self._length.setSpecialValueText(self.tr("not known"))
         return (
             self.tr("Touch both ends of a length"),
             self.tr("Certified length"),
             self.tr("Its U (k = 2)"),
+            self.tr("Touched"),
             self.tr("Places"),
         )
 

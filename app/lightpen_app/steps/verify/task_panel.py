@@ -103,6 +103,9 @@ class TaskPanel(Translated, QWidget):
         found = None if state is None else state.found(self.kind)
         is_at_hand = state is not None and status.task is self.kind
         has_touches = state is not None and bool(state.touches or state.runs)
+        if self.kind is TaskKind.DRIFT:
+            is_at_hand = is_at_hand or (state is not None and bool(state.visits))
+            has_touches = is_at_hand
         self._anew.setEnabled(found is not None or (is_at_hand and has_touches))
         told = None if found is None else found.assessment
         if status.is_done and told is status.assessment:  # it stands above all tasks

@@ -14,11 +14,11 @@ from lightpen.verification.circle import MIN_ANGLE
 from lightpen.verification.guidance import fraction_done, instruction
 from lightpen.verification.session import (
     BROKEN_OFF,
-    SessionSetup,
-    SessionState,
+    VISIT_TOUCHES,
     covered,
     rules_of,
 )
+from lightpen.verification.session_state import SessionSetup, SessionState, n_visits
 from lightpen.verification.status import Reading, VerificationStatus
 from lightpen.verification.touching import HELD_ENOUGH, TouchPhase
 from lightpen_app.look.grades import GRADE_MARKS
@@ -30,6 +30,8 @@ from lightpen_app.steps.verify.findings import dial_of, live_posture
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.posture_dial import DialValue
 from lightpen_app.widgets.state_banner import State
+
+WITH_POSTURES = TaskKind.FIXED_POINT, TaskKind.ARTICULATION, TaskKind.DRIFT
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +90,10 @@ class VerifyWords(QObject):
             case TaskKind.ARTICULATION:
                 text = self.tr("{0} of {1} touches").format(n_touches, N_TOUCHES)
                 n_runs = N_POSTURES
+            case TaskKind.DRIFT:
+                text = self.tr("{0} of {1} touches").format(n_touches, VISIT_TOUCHES)
+                run = len(state.visits) + 1
+                n_runs = max(n_visits(choices), run)
             case _:
                 text = self.tr("{0} of 2 ends").format(n_touches)
                 n_runs = choices.n_places
@@ -102,6 +108,7 @@ class VerifyWords(QObject):
             TaskKind.CIRCLE: self.tr("Ring"),
             TaskKind.LENGTH: self.tr("Length"),
             TaskKind.ARTICULATION: self.tr("Postures"),
+            TaskKind.DRIFT: self.tr("Witness"),
         }[kind]
         found = None if status.state is None else status.state.found(kind)
         is_chosen = status.setup is None or kind in status.setup.choices.kinds
@@ -164,6 +171,9 @@ class VerifyWords(QObject):
                 again = self.tr("Lift, touch again")
                 other = self.tr("Another posture") if state.runs else ""
                 return again if is_next else other or self.tr("Touch the cone")
+            case TaskKind.DRIFT:
+                again = self.tr("Lift, touch again")
+                return again if is_next else self.tr("Touch the cone upright")
             case _:
                 another = self.tr("The other end")
                 return another if is_next else self.tr("Touch one end")
@@ -208,9 +218,11 @@ class VerifyWords(QObject):
 
 
 def _dial(setup: SessionSetup, state: SessionState) -> DialValue | None:
-    if state.task(setup) not in (TaskKind.FIXED_POINT, TaskKind.ARTICULATION):
+    task = state.task(setup)
+    if task not in WITH_POSTURES:
         return None
     pen = setup.instrument.pen
-    touched = [touch for run in (*state.runs, state.touches) for touch in run]
+    before = state.visits if task is TaskKind.DRIFT else state.runs
+    touched = [touch for run in (*before, state.touches) for touch in run]
     postures = [posture_of(pen, touch.rotation) for touch in touched]
     return dial_of(postures, live_posture(setup, state))

@@ -23,7 +23,7 @@ from lightpen.detection.labelling.matching import (
 )
 from lightpen.detection.labelling.p3p import solve_p3p
 from lightpen.detection.labelling.spot_arrays import SpotArrays
-from lightpen.model.ellipse import disc_images
+from lightpen.model.ellipse import conic_images
 
 MAX_SPOTS = 14  # of which triples are made
 MAX_GAP = 1.15  # between two LEDs, over the size of the pen
@@ -130,15 +130,14 @@ def shifted_poses(
         Predicted cam_from_pen.
     """
     leds = pen.leds @ R.T + t
-    here = sight.pinhole.project(leds)
-    shifts = (sight.points[0] - here[:, None]).reshape(-1, 2)
-    depths = np.repeat(leds[:, 2], sight.points.shape[1])
-    near = np.einsum("si,si->s", shifts, shifts) < MAX_SHIFT**2
-    shifts, depths = shifts[near], depths[near]
-    translations = np.tile(t, (len(shifts), 1))
-    translations[:, :2] += shifts * (depths / sight.pinhole.fx)[:, None]
-    image = np.zeros(len(shifts), dtype=np.int64)
-    rotations = np.tile(R, (len(shifts), 1, 1))
+    here = leds[:, :2] * (sight.focal / leds[:, 2:])
+    shifts = sight.points[0] - here[:, None]
+    near = np.einsum("lsi,lsi->ls", shifts, shifts) < MAX_SHIFT**2
+    depths = np.broadcast_to(leds[:, 2:], near.shape)[near]
+    translations = np.broadcast_to(t, (len(depths), 3)).copy()
+    translations[:, :2] += shifts[near] * (depths / sight.focal)[:, None]
+    image = np.zeros(len(depths), dtype=np.int64)
+    rotations = np.broadcast_to(R, (len(depths), 3, 3))
     matched = match(sight, pen, image, rotations, translations, SHIFT_TOLERANCE)
     return _most_explaining(matched, SHIFT_TOLERANCE, 2)
 
@@ -160,7 +159,7 @@ def _spot_triples(
     a, b, c = triples[..., 0], triples[..., 1], triples[..., 2]
     plausible = near[rows, a, b] & near[rows, a, c] & near[rows, b, c]
     p, q = (sight.points[rows, x] - sight.points[rows, a] for x in (b, c))
-    scale = (there[rows, a, 2] / sight.pinhole.fx) ** 2
+    scale = (there[rows, a, 2] / sight.focal) ** 2
     area = np.abs(p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]) * scale
     if effort.n_triples == 1:
         score = -area
@@ -247,8 +246,9 @@ def _triple_misfit(
     towards = -np.einsum("hki,hki->hk", normals, centers)
     facing = (towards > MIN_FACING * np.linalg.norm(centers, axis=-1)).all(axis=1)
     misfit = np.full(len(image), np.inf)
+    conics = conic_images(centers[facing], normals[facing], pen.radius)
     misfit[facing] = _shape_misfit(
-        disc_images(sight.pinhole, centers[facing], normals[facing], pen.radius).shapes,
+        sight.focal**2 * conics.shapes,
         sight.shapes[image[facing, None], triple[facing]],
     )
     return misfit

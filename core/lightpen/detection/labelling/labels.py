@@ -374,7 +374,7 @@ def _on_unwhole(
     if np.all(sight.unwhole_points == FAR):
         return np.full_like(candidates.spot, -1)
     middle = np.einsum("cij,j->ci", candidates.R, pen.leds.mean(axis=0)) + candidates.t
-    radii = sight.pinhole.fx * pen.radius / middle[:, 2:]
+    radii = sight.focal * pen.radius / middle[:, 2:]
     unwhole = replace(sight, points=sight.unwhole_points)
     image, R, t = candidates.image, candidates.R, candidates.t
     return match(unwhole, pen, image, R, t, MAX_OFF_CENTER * radii).spot

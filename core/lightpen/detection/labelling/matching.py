@@ -6,16 +6,16 @@ the pinhole pixels of `lightpen.detection.labelling.spot_arrays`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from math import lgamma
 
 import numpy as np
-import numpy.typing as npt
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.detection.labelling.constellation import Constellation
 from lightpen.detection.labelling.spot_arrays import SpotArrays
-from lightpen.model.ellipse import conic_centers, disc_images
-from lightpen.model.rigid import rotation_from_vector
+from lightpen.model.ellipse import conic_centers, conic_images
+from lightpen.model.rigid import rotation_from_vector, skew
 
 MIN_FACING = 0.1  # cosine between a disc's normal and the direction to the camera
 
@@ -33,8 +33,9 @@ SHAPE_TOLERANCE = 0.12  # difference of shapes over the trace of the predicted o
 MAX_COMMON_BROADENING = 0.5  # of all shapes alike, by defocus or motion
 AREA_RANGE = (0.5, 2.0)  # measured over predicted, all discs together
 
-# Of 0, 1/2, 1, ... 511: a table, as lgamma takes one number at a time.
-LOG_FACTORIALS = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
+# Of k / 2, for k up to 1023: a table, as lgamma takes one number at a time.
+LOG_FACTORIALS_OF_HALVES = np.array([lgamma(0.5 * k + 1) for k in range(1024)])
+LOG_FACTORIALS = LOG_FACTORIALS_OF_HALVES[::2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,17 +67,17 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.image)
 
-    @property
+    @cached_property
     def n_explained(self) -> IntArray:
         """LEDs that have a spot, (C,)."""
         return np.asarray((self.spot >= 0).sum(axis=1))
 
-    @property
+    @cached_property
     def sum_squares(self) -> FloatArray:
         """Sum of the squared residuals, px^2, (C,)."""
         return np.asarray(np.einsum("cl,cl->c", self.residuals, self.residuals))
 
-    @property
+    @cached_property
     def rms(self) -> FloatArray:
         """Root mean square over the image coordinates, px, (C,)."""
         n_coordinates = np.maximum(2 * self.n_explained, 1)
@@ -118,18 +119,17 @@ def match(
     tolerance : float or (C, 1) array
         Largest distance of a pair, px.
     """
-    leds = pen.leds @ np.swapaxes(R, 1, 2) + t[:, None]
-    normals = pen.normals @ np.swapaxes(R, 1, 2)
-    seen = _facing(leds, normals)
-    inverse_depth = sight.pinhole.fx / np.maximum(leds[..., 2], 1e-3)
-    there = leds[..., :2] * inverse_depth[..., None]
+    R_t = R.transpose(0, 2, 1)
+    leds = pen.leds @ R_t + t[:, None]
+    seen = _facing(leds, pen.normals @ R_t)
+    there = leds[..., :2] * (sight.focal / np.maximum(leds[..., 2:], 1e-3))
     spots = sight.points[image]
     squares = (there[:, :, None, 0] - spots[:, None, :, 0]) ** 2
     squares += (there[:, :, None, 1] - spots[:, None, :, 1]) ** 2
     spot = squares.argmin(axis=2)
     led = squares.argmin(axis=1)
-    square = np.take_along_axis(squares, spot[..., None], axis=2)[..., 0]
-    mutual = np.take_along_axis(led, spot, axis=1) == np.arange(len(pen.leds))
+    square = squares.min(axis=2)
+    mutual = led[np.arange(len(image))[:, None], spot] == np.arange(len(pen.leds))
     paired = mutual & seen & (square < tolerance**2)
     return Candidates(
         image=image,
@@ -165,10 +165,10 @@ def fit(
     sight: SpotArrays, pen: Constellation, candidates: Candidates, n_steps: int = 1
 ) -> Candidates:
     """Refine poses on their pairs by least squares, ellipse centres modelled."""
-    R_t = np.swapaxes(candidates.R, 1, 2)
+    R_t = candidates.R.transpose(0, 2, 1)
     leds = pen.leds @ R_t + candidates.t[:, None]
     # How far ellipse centres lie from LED centres hardly depends on the pose.
-    eccentric = conic_centers(leds, pen.normals @ R_t, pen.radius) * sight.pinhole.fx
+    eccentric = conic_centers(leds, pen.normals @ R_t, pen.radius) * sight.focal
     eccentric -= _project(sight, leds)
     even = np.ones_like(candidates.residuals)
     offsets = _offsets(sight, pen, candidates, eccentric)
@@ -194,19 +194,14 @@ def log_false_alarms(sight: SpotArrays, candidates: Candidates) -> FloatArray:
     n = candidates.n_explained
     n_leds = candidates.spot.shape[1]
     n_spots = sight.usable.sum(axis=1)[candidates.image]
-    choices = _log_factorial(n_leds) - _log_factorial(n) - _log_factorial(n_leds - n)
-    choices += _log_factorial(n_spots) - _log_factorial(n_spots - n)
+    choices = LOG_FACTORIALS[n_leds] - LOG_FACTORIALS[n] - LOG_FACTORIALS[n_leds - n]
+    choices += LOG_FACTORIALS[n_spots] - LOG_FACTORIALS[n_spots - n]
     surplus = np.maximum(2 * n - 6, 0)
-    radius = np.sqrt(np.maximum(candidates.sum_squares, 1e-12))
-    ball = 0.5 * surplus * np.log(np.pi) - _log_factorial(0.5 * surplus)
-    ball += surplus * (np.log(radius) - 0.5 * np.log(_covered_area(sight, candidates)))
+    squares = np.maximum(candidates.sum_squares, 1e-12)
+    share = np.log(np.pi * squares / _covered_area(sight, candidates))
+    ball = 0.5 * surplus * share - LOG_FACTORIALS_OF_HALVES[surplus]
     logs: FloatArray = (choices + np.minimum(ball, 0)) / np.log(10)
     return logs
-
-
-def _log_factorial(x: npt.ArrayLike) -> FloatArray:
-    """Return log x! of whole and half numbers."""
-    return np.asarray(LOG_FACTORIALS[np.asarray(2 * np.asarray(x), dtype=np.int64)])
 
 
 def _covered_area(sight: SpotArrays, candidates: Candidates) -> FloatArray:
@@ -214,7 +209,8 @@ def _covered_area(sight: SpotArrays, candidates: Candidates) -> FloatArray:
     points = _paired_points(sight, candidates)
     low = np.where(paired, points, np.inf).min(axis=1)
     high = np.where(paired, points, -np.inf).max(axis=1)
-    area: FloatArray = np.prod(np.maximum(high - low, 1.0), axis=1)
+    sides = np.maximum(high - low, 1.0)
+    area: FloatArray = sides[:, 0] * sides[:, 1]
     return area
 
 
@@ -236,7 +232,7 @@ def _paired_shapes(sight: SpotArrays, candidates: Candidates) -> FloatArray:
 
 
 def _project(sight: SpotArrays, leds: FloatArray) -> FloatArray:
-    there: FloatArray = leds[..., :2] * (sight.pinhole.fx / leds[..., 2:])
+    there: FloatArray = leds[..., :2] * (sight.focal / leds[..., 2:])
     return there
 
 
@@ -247,7 +243,7 @@ def _offsets(
     eccentric: FloatArray | float = 0.0,
 ) -> FloatArray:
     """Return spots minus predicted ellipse centres, (C, L, 2), px; 0 without a spot."""
-    leds = pen.leds @ np.swapaxes(candidates.R, 1, 2) + candidates.t[:, None]
+    leds = pen.leds @ candidates.R.transpose(0, 2, 1) + candidates.t[:, None]
     offsets = _paired_points(sight, candidates) - _project(sight, leds) - eccentric
     offsets[candidates.spot < 0] = 0
     return offsets
@@ -261,30 +257,34 @@ def _step(
     weights: FloatArray,
 ) -> Candidates:
     """Make one weighted Gauss-Newton step on poses, rotating in the camera frame."""
-    arms = pen.leds @ np.swapaxes(candidates.R, 1, 2)
-    depths = arms[..., 2] + candidates.t[:, 2:]
-    leds = arms[..., :2] + candidates.t[:, None, :2]
-    scale = sight.pinhole.fx / depths
-    J = np.zeros((*depths.shape, 2, 6))
+    arms = pen.leds @ candidates.R.transpose(0, 2, 1)
+    leds = arms + candidates.t[:, None]
+    scale = sight.focal / leds[..., 2]
+    J = np.zeros((*scale.shape, 2, 6))
     J[..., 0, 3] = J[..., 1, 4] = scale
-    J[..., 5] = -leds * (scale / depths)[..., None]
-    # The first three columns are arm x the last three.
-    J[..., 0] = arms[..., 1:2] * J[..., 5] - arms[..., 2:] * J[..., 4]
-    J[..., 1] = arms[..., 2:] * J[..., 3] - arms[..., :1] * J[..., 5]
-    J[..., 2] = arms[..., :1] * J[..., 4] - arms[..., 1:2] * J[..., 3]
-    weights = np.where(candidates.spot >= 0, weights, 0.0)[..., None]
-    n_equations = 2 * depths.shape[1]
-    weighted = (J * weights[..., None]).reshape(-1, n_equations, 6).swapaxes(1, 2)
+    J[..., 5] = leds[..., :2] * (scale / -leds[..., 2])[..., None]
+    J[..., :3] = J[..., 3:] @ skew(-arms)
+    weights = np.where(candidates.spot >= 0, weights, 0.0)
+    n_equations = 2 * arms.shape[1]
+    weighted = (J * weights[..., None, None]).reshape(-1, n_equations, 6)
+    weighted = weighted.transpose(0, 2, 1)
     normal = weighted @ J.reshape(-1, n_equations, 6)
     gradient = weighted @ offsets.reshape(-1, n_equations, 1)
     # Too few pairs leave the matrix singular; a trace of damping then keeps the pose.
     diagonal = np.einsum("cii->ci", normal)
-    diagonal += 1e-9 * diagonal + 1e-9
+    diagonal *= 1 + 1e-9
+    diagonal += 1e-9
     step = np.asarray(np.linalg.solve(normal, gradient)[..., 0], dtype=np.float64)
     turn = np.sqrt(np.einsum("ci,ci->c", step[:, :3], step[:, :3]))
-    step *= np.minimum(1, MAX_TURN / np.maximum(turn, MAX_TURN))[:, None]
-    R = rotation_from_vector(step[:, :3]) @ candidates.R
-    return replace(candidates, R=R, t=candidates.t + step[:, 3:])
+    step *= (MAX_TURN / np.maximum(turn, MAX_TURN))[:, None]
+    return Candidates(
+        candidates.image,
+        rotation_from_vector(step[:, :3]) @ candidates.R,
+        candidates.t + step[:, 3:],
+        candidates.spot,
+        candidates.residuals,
+        candidates.area_ratio,
+    )
 
 
 def _drop_misshapen(
@@ -297,21 +297,22 @@ def _drop_misshapen(
     """
     paired = candidates.spot >= 0
     measured = _paired_shapes(sight, candidates)
-    R_t = np.swapaxes(candidates.R, 1, 2)
+    R_t = candidates.R.transpose(0, 2, 1)
     leds = pen.leds @ R_t + candidates.t[:, None]
-    discs = disc_images(sight.pinhole, leds, pen.normals @ R_t, pen.radius)
-    predicted = discs.shapes
+    predicted = conic_images(leds, pen.normals @ R_t, pen.radius).shapes
+    predicted *= sight.focal**2
     size = np.einsum("clii->cl", predicted)
     difference = (measured - predicted) / size[..., None, None]
-    flat = difference[..., [0, 0, 1], [0, 1, 1]]
+    flat = difference.reshape(*size.shape, 4)
     common = _median(flat, paired)
     limited = np.clip(common, -MAX_COMMON_BROADENING, MAX_COMMON_BROADENING)
     flat = flat - limited[:, None]
-    squares = np.einsum("clk,clk,k->cl", flat, flat, [1.0, 2.0, 1.0])
-    growth = 1 + np.maximum(common[:, 0] + common[:, 2], -0.5)
+    squares = np.einsum("clk,clk->cl", flat, flat)
+    broadening = common[:, 0] + common[:, 3]
+    growth = 1 + np.maximum(broadening, -0.5)
     bad = squares > (SHAPE_TOLERANCE * growth[:, None]) ** 2
     dropped = _drop(candidates, bad)
-    return replace(dropped, area_ratio=1 + common[:, 0] + common[:, 2])
+    return replace(dropped, area_ratio=1 + broadening)
 
 
 def _out_of_gate(candidates: Candidates) -> BoolArray:
@@ -344,8 +345,9 @@ def _drop_worst(
     if not len(row):
         return candidates
     without = candidates.of(row)
-    without.spot[np.arange(len(row)), led] = -1
-    without = fit(sight, pen, without, n_steps=2)
+    spot = without.spot.copy()
+    spot[np.arange(len(row)), led] = -1
+    without = fit(sight, pen, replace(without, spot=spot), n_steps=2)
     floor = 2 * n[row] * FLOOR_RMS**2
     ratio = (without.sum_squares + floor) / (candidates.sum_squares[row] + floor)
     chance = ratio ** (n[row] - 4)
@@ -369,7 +371,9 @@ def _median(values: FloatArray, known: BoolArray) -> FloatArray:
     """Return the median over axis 1 of the known values, 0 where there are none."""
     n = known.sum(axis=1)
     extra = (1,) * (values.ndim - 2)
-    ordered = np.sort(np.where(known.reshape(known.shape + extra), values, 1e9), axis=1)
+    ordered = np.where(known.reshape(known.shape + extra), values, 1e9)
+    ordered.sort(axis=1)
     rows, last = np.arange(len(values)), np.maximum(n - 1, 0)
     median = 0.5 * (ordered[rows, last // 2] + ordered[rows, (last + 1) // 2])
-    return np.where(n.reshape(n.shape + extra) > 0, median, 0.0)
+    median[n == 0] = 0.0
+    return np.asarray(median)

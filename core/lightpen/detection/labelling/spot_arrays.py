@@ -23,8 +23,8 @@ class SpotArrays:
 
     Attributes
     ----------
-    pinhole : Camera
-        The camera without its distortion, principal point at (0, 0).
+    focal : float
+        Pinhole pixels in one unit of the normalised plane.
     points : (B, N, 2) array
         Centres, `FAR` where there is no usable spot.
     unwhole_points : (B, N, 2) array
@@ -36,7 +36,7 @@ class SpotArrays:
         Radius of the discs of the pen, mm.
     """
 
-    pinhole: Camera
+    focal: float
     points: FloatArray
     unwhole_points: FloatArray
     shapes: FloatArray
@@ -47,7 +47,7 @@ class SpotArrays:
     def rays(self) -> FloatArray:
         """Unit vectors to the usable spots, (B, N, 3)."""
         rays = np.ones((*self.usable.shape, 3))
-        rays[..., :2] = self.points / self.pinhole.fx
+        rays[..., :2] = self.points / self.focal
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
         return rays
 
@@ -55,8 +55,8 @@ class SpotArrays:
     def ranges(self) -> FloatArray:
         """Distances of the usable spots, if they are discs of the pen, (B, N), mm."""
         ranges = np.full(self.usable.shape, np.inf)
-        points = self.points[self.usable] / self.pinhole.fx
-        shapes = self.shapes[self.usable] / self.pinhole.fx**2
+        points = self.points[self.usable] / self.focal
+        shapes = self.shapes[self.usable] / self.focal**2
         ranges[self.usable] = _ranges(points, shapes, self.radius)
         return ranges
 
@@ -84,12 +84,13 @@ def spot_arrays(
     J = focal * plane.jacobian
     points = np.full((*there.shape, 2), FAR)
     points[there] = focal * plane.points
-    shapes = np.tile(np.eye(2), (*there.shape, 1, 1))
-    shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ np.swapaxes(J, 1, 2)
+    shapes = np.empty((*there.shape, 2, 2))
+    shapes[:] = np.eye(2)
+    shapes[there] = J @ np.concatenate([s.shapes for s in spots]) @ J.transpose(0, 2, 1)
     unwhole = flaws & UNWHOLE != 0
     usable = there & (use_unwhole | ~unwhole)
     return SpotArrays(
-        pinhole=Camera(camera.width, camera.height, focal, focal, 0.0, 0.0),
+        focal=focal,
         points=np.where(usable[..., None], points, FAR),
         unwhole_points=np.where(unwhole[..., None], points, FAR),
         shapes=shapes,

@@ -166,6 +166,22 @@ def test_a_board_held_still_is_kept_by_itself(
     press(window, "Stop")
 
 
+def test_another_board_held_before_the_camera_is_named(
+    window: BoardWindow, images: list[Image], workbench: Workbench, qtbot: QtBot
+) -> None:
+    window.findChildren(EnterEdit)[0].setText("chessboard:8x6:20")
+    press(window, "Start")
+    told = []
+    for count in range(6):  # in 4 s
+        workbench.live.image_shown.emit(_shown(images[0], 2 * count))
+        qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+        told.append(remark(window))
+
+    assert "not seen" in told[0]
+    assert "of 8 x 6 inner corners, but one of 5 x 7" in told[-1]
+    press(window, "Stop")
+
+
 def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
     window: BoardWindow,
     images: list[Image],

@@ -12,6 +12,8 @@ import pytest
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
     QComboBox,
     QFileDialog,
     QLineEdit,
@@ -34,11 +36,14 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
+from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.steps.history.archive_panel import ArchivePanel
+from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
 from lightpen_app.steps.history.history_table import (
     PEN,
+    STATION,
     TIP,
     UNREAD,
     WHAT,
@@ -49,9 +54,9 @@ from lightpen_app.steps.history.history_table import (
 )
 from lightpen_app.steps.history.page import HistoryPage
 from lightpen_app.steps.history.selection_panel import SelectionPanel
-from lightpen_app.steps.history.trend_panel import TrendPanel
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -229,6 +234,28 @@ def test_a_server_that_cannot_be_reached_is_told_without_the_password(
     desk.workbench.run.logbook.close()
 
 
+@pytest.mark.parametrize("language", list(Language))
+def test_at_the_usual_width_every_column_is_seen_and_told_whole(
+    desk: Desk, qapp: QApplication, language: Language
+) -> None:
+    LanguageSwitch(qapp).set_language(language)
+    desk.enter(3)
+    desk.open()
+    desk.page.resize(976, 700)  # that of a window of 1280 px
+    desk.until(lambda: desk.table.n_lines() == 3)
+
+    assert not desk.table.horizontalScrollBar().isVisible()
+    across = desk.table.horizontalHeader()
+    for column in range(WORDS):
+        if column != STATION:  # the only one
+            needed = desk.table.sizeHintForColumn(column)
+            assert across.sectionSize(column) >= needed, column
+    assert desk.table.isColumnHidden(STATION)
+
+    desk.page.resize(1616, 700)
+    assert not desk.table.isColumnHidden(STATION)
+
+
 def test_a_block_that_is_read_computes_nothing_anew_of_what_is_selected(
     desk: Desk,
 ) -> None:
@@ -303,6 +330,26 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert panel.words()[1] == "Repeatability of the 2 that are selected"
     assert "The tip lies 2.0000 mm from" in panel.words()[2]
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
+
+
+def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
+    desk: Desk,
+) -> None:
+    desk.enter(3)  # at x of 0, 1 and 2 mm
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel, row = desk.child(SelectionPanel), desk.child(CapabilityRow)
+    desk.until(lambda: panel.repeatability())
+    assert row.words() == ""
+    tolerance, x, *_ = row.findChildren(NumberField)
+    tolerance.setValue(9.0)
+    row.findChildren(QCheckBox)[0].click()
+    x.setValue(1.0)
+
+    assert "Cg: x 0.30" in row.words()  # 0.2 * 9 / (6 * 1)
+    assert "Cgk: x 0.30" in row.words()
+    assert "Not capable: 1.33 is asked for." in row.words()
+    assert "A study takes 30 to 50 repeats; these are 3." in row.words()
 
 
 def test_a_note_is_entered_and_shown_with_its_entry(desk: Desk) -> None:
@@ -389,7 +436,7 @@ def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     assert panel.figures().cells[0][:2] == ("2026-01-04", "2026-02-03")
 
     desk.show_tab(DUE)
-    days = desk.child(NumberField)
+    days, _ = panel.findChildren(NumberField)
     days.setFocus()
     days.selectAll()
     QTest.keyClicks(days, "7")

@@ -56,6 +56,7 @@ from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
 from lightpen_app.steps.review.images_panel import ImagesPanel
+from lightpen_app.steps.review.monte_carlo_row import MonteCarloRow
 from lightpen_app.steps.review.next_tips_row import NextTipsRow
 from lightpen_app.steps.review.page import ReviewPage
 from lightpen_app.steps.review.plot_card import PlotCard
@@ -66,7 +67,10 @@ from lightpen_app.steps.review.residual_view import ResidualView
 from lightpen_app.steps.review.result_panel import ResultPanel
 from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.tip_readout import TipReadout
+from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
+from lightpen_app.widgets.posture_dial import PostureDial
+from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import SignLabel
@@ -330,6 +334,25 @@ def test_the_step_is_closed_until_the_pen_was_swung(
     assert button(page, "Repeat").toolTip() == "Swing the pen first."
     page.run_main_action()
     assert not page.is_complete()
+
+
+def test_a_vast_screen_shows_the_postures_beside_larger_figures(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    dial, panel = the(page, PostureDial), the(page, ResultPanel)
+    page.resize(1616, 870)
+    assert not dial.isVisible()
+    width = panel.width()
+    page.resize(2300, 1250)
+
+    qtbot.waitUntil(lambda: panel.width() > 1.5 * width)
+    assert dial.isVisible()
+    assert 0 < dial.value().n_full == dial.value().n_fields
+    outcome = panel.value()
+    assert outcome is not None
+    coverage = outcome.solution.calibration.coverage
+    kept = int(dial.value().counts.sum()) + dial.value().n_upright
+    assert kept == len(coverage.tilts)
 
 
 def test_a_good_swing_passes_with_its_reason_and_the_next_step(
@@ -668,6 +691,30 @@ def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
     deviation = (tip(workbench) - [-1.0, -90.0, -24.0]) * 1000
     shown = list(map(float, differences(page)["since nominal"]))
     assert shown == pytest.approx(deviation.tolist(), abs=1.0)
+
+
+def test_the_budget_is_checked_by_monte_carlo_on_request(
+    page: ReviewPage, qtbot: QtBot
+) -> None:
+    tabs = the(page, QTabWidget)
+    names = [tabs.tabText(i) for i in range(tabs.count())]
+    tabs.setCurrentIndex(names.index("Uncertainty"))
+    row = the(page, MonteCarloRow)
+    the(row, NumberField).setValue(20)
+    start, cancel = row.findChildren(PushButton)
+    start.click()
+    cancel.click()
+    assert start.isVisibleTo(page)
+    assert not cancel.isVisibleTo(page)
+
+    start.click()
+    figures = the(row, NumberTable)
+    qtbot.waitUntil(lambda: figures.isVisibleTo(page), timeout=PATIENCE_MS)
+    by_trials, _, by_budget, difference = figures.value().cells
+    for one, other, in_precision in zip(by_trials, by_budget, difference, strict=True):
+        # Of 20 trials a standard deviation is known to a sixth.
+        assert abs(float(in_precision)) < 4
+        assert 0.4 < float(one) / float(other) < 2.0
 
 
 def test_the_words_change_with_the_language(page: ReviewPage) -> None:

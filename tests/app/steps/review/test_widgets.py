@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QKeySequence
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.detection.reasons import Reason
@@ -86,6 +86,22 @@ def test_a_table_is_as_high_as_its_figures_and_lets_tab_pass(qtbot: QtBot) -> No
 
     assert table.sizeHint().height() == empty + 2 * 24
     assert not table.tabKeyNavigation()
+
+
+def test_a_table_is_wide_enough_for_its_longest_figure(qtbot: QtBot) -> None:
+    table = NumberTable()
+    qtbot.addWidget(table)
+    rows = ("A name of some length", "b")
+    table.set_value(Figures(("x", "y"), rows, (("1", "2"), ("-1087.4606", "4"))))
+    table.show()
+
+    for large in (False, True):
+        table.set_large(large)
+        table.resize(table.minimumSizeHint())
+        QApplication.processEvents()
+        assert table.columnWidth(0) >= table.sizeHintForColumn(0)
+        names = table.verticalHeader()
+        assert names.width() >= names.sizeHint().width()
 
 
 def test_remarks_take_no_more_room_than_they_need(qtbot: QtBot) -> None:

@@ -44,11 +44,14 @@ from lightpen_app.look.theme import TextSize, Tone
 from lightpen_app.look.words import breakable
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.page import MainAction, Page
-from lightpen_app.steps.start.interrupted_panel import InterruptedPanel, InterruptedRow
+from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.page import StartPage
+from lightpen_app.steps.start.pictures import Pictures
 from lightpen_app.steps.start.result_panel import LastResultPanel
 from lightpen_app.steps.start.sound_test import SoundTest
+from lightpen_app.steps.start.waiting_row import WaitingRow
 from lightpen_app.widgets.sign_label import SignLabel
+from lightpen_app.widgets.trend_panel import TrendPanel
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -127,7 +130,7 @@ class Opened:
         (panel,) = self.page.findChildren(LastResultPanel)
         return tuple(word for word in panel.words() if word != "SIMULATED")
 
-    def rows(self) -> tuple[InterruptedRow, ...]:
+    def rows(self) -> tuple[WaitingRow, ...]:
         (panel,) = self.page.findChildren(InterruptedPanel)
         assert panel.isVisibleTo(self.page) is bool(panel.rows())
         return panel.rows()
@@ -655,6 +658,35 @@ def test_on_a_large_screen_the_tip_in_force_is_told_in_larger_figures(
 
     assert small == (TextSize.TITLE, TextSize.BODY)
     assert large == (TextSize.DISPLAY, TextSize.TITLE)
+
+
+def test_a_vast_screen_shows_how_the_tip_developed_or_what_all_is_for(
+    show: Callable[[Workbench], Opened], workbench: Workbench, qtbot: QtBot
+) -> None:
+    start = show(workbench)
+    start.page.resize(1616, 870)
+    assert not shown_below(start)
+    start.page.resize(2300, 1250)
+    qtbot.waitUntil(lambda: shown_below(start) == {"pictures"})
+
+    for days in (30, 12):
+        accepted(workbench, timedelta(days=days))
+    workbench.run.logbook.enter_owed()
+    start.page.entered()
+
+    qtbot.waitUntil(lambda: shown_below(start) == {"trend"})
+    (trend,) = start.page.findChildren(TrendPanel)
+    assert len(trend.value().entries) == 2
+
+
+def shown_below(start: Opened) -> set[str]:
+    """What a vast page shows below all that is needed."""
+    kinds = {"trend": TrendPanel, "pictures": Pictures}
+    return {
+        name
+        for name, kind in kinds.items()
+        if any(each.isVisible() for each in start.page.findChildren(kind))
+    }
 
 
 @pytest.mark.parametrize(

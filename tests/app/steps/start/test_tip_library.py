@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt, QThreadPool
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QColor, QImage, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
@@ -36,6 +36,7 @@ from lightpen_app.steps.start.form import NamesForm
 from lightpen_app.steps.start.library_dialog import LibraryDialog
 from lightpen_app.steps.start.page import StartPage
 from lightpen_app.steps.start.spin_recorder import SpinRecorder
+from lightpen_app.steps.start.tip_picture import TipPicture
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.workbench import Workbench
 
@@ -271,6 +272,52 @@ def test_a_tip_is_added_and_changed_in_the_dialog_and_entered_with_who(
     assert [change.operator for change in changes] == ["Ann", "Ann"]
     assert changes[0].reason == "new"
     desk.click("Close")
+
+
+def test_the_picture_of_a_tip_is_seen_where_it_is_chosen_and_where_it_is_kept(
+    desk: Desk, tmp_path: Path
+) -> None:
+    photo = tmp_path / "photo.png"
+    red = QImage(640, 320, QImage.Format.Format_RGB32)
+    red.fill(QColor("red"))
+    red.save(str(photo))
+    other = tmp_path / "other.txt"
+    other.write_text("no picture")
+    desk.add(ListedTip(id="T-10-80"), ListedTip(id="T-20"))
+    desk.names.library_requested.emit(ItemKind.TIP)
+
+    def seen() -> list[TipPicture]:
+        found = desk.dialog.findChildren(TipPicture)
+        return [each for each in found if each.isVisible()]
+
+    assert not seen()
+    desk.click("Change...")
+    (preview,) = seen()
+    assert preview.text() == "No picture"
+    for file, is_picture in ((other, False), (photo, True)):
+        desk.enter("Picture", str(file))
+        QTest.keyClick(desk.control("Picture"), Qt.Key.Key_Return)
+        desk.settle()
+        assert preview.pixmap().isNull() is not is_picture
+    assert_red(preview)
+    desk.click("Keep")
+    desk.settle()
+
+    (kept,) = seen()
+    desk.settle()
+    assert_red(kept)
+    (file,) = (desk.data / "library" / "pictures").iterdir()
+    red.fill(QColor("blue"))
+    red.save(str(file))
+    desk.click("Change...")
+    desk.settle()
+    assert "is not the one that was kept" in preview.text()
+
+
+def assert_red(picture: TipPicture) -> None:
+    shown = picture.pixmap().toImage()
+    assert shown.width() == 2 * shown.height() == picture.width()
+    assert shown.pixelColor(shown.rect().center()) == QColor("red")
 
 
 def test_what_makes_no_sense_is_told_in_the_dialog_and_nothing_is_kept(

@@ -1,0 +1,131 @@
+"""What a type-1 gauge study needs, and what it says of the tips that are shown."""
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.arrays import FloatArray
+from lightpen.verification.repeatability import CAPABLE, STUDY, Capability
+from lightpen_app.look.quantities import AXES, number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+
+WIDEST, REACH = 10.0, 1000.0  # mm
+
+
+class CapabilityRow(Translated, QWidget):
+    """Takes a tolerance and the tip by a better instrument; shows Cg and Cgk.
+
+    Signals
+    -------
+    value_changed()
+        The user chose otherwise.
+    """
+
+    value_changed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._shown: tuple[Capability | None, int] = (None, 0)
+
+        # Widgets
+        self._label = text_label(TextSize.BODY)
+        self._tolerance = NumberField("mm", (0.0, WIDEST), 4)
+        self._label.setBuddy(self._tolerance)
+        self._has_reference = QCheckBox()
+        self._reference = tuple(NumberField("mm", (-REACH, REACH), 4) for _ in AXES)
+        self._told = SignLabel()
+
+        # Layout
+        width = QHBoxLayout()
+        width.setSpacing(GRID)
+        width.addWidget(self._label)
+        width.addWidget(self._tolerance)
+        width.addWidget(self._has_reference)
+        width.addStretch(1)
+        point = QHBoxLayout()
+        point.setSpacing(GRID)
+        for field in self._reference:
+            point.addWidget(field)
+        point.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addLayout(width)
+        layout.addLayout(point)
+        layout.addWidget(self._told)
+
+        # Connections
+        self._has_reference.toggled.connect(self._on_changed)
+        for field in (self._tolerance, *self._reference):
+            field.setKeyboardTracking(False)
+            field.valueChanged.connect(self._on_changed)
+
+        self._retranslate()
+
+    def tolerance(self) -> float | None:
+        """Return the width of the tolerance, mm; None where no study is wanted."""
+        return self._tolerance.value() or None
+
+    def reference(self) -> FloatArray | None:
+        """Return the tip by a better instrument, (3,), mm, if it is known."""
+        if not self._has_reference.isChecked():
+            return None
+        return np.array([field.value() for field in self._reference])
+
+    def set_value(self, found: Capability | None, n_tips: int) -> None:
+        """Show what a study of so many tips has found, or that there is none."""
+        self._shown = found, n_tips
+        self._refresh()
+
+    def words(self) -> str:
+        """Return what is said of the study."""
+        return self._told.value().text
+
+    def _on_changed(self) -> None:
+        self._refresh()
+        self.value_changed.emit()
+
+    @override
+    def _retranslate(self) -> None:
+        self._label.setText(self.tr("Capability: tolerance"))
+        self._tolerance.setAccessibleName(self.tr("Tolerance of a coordinate"))
+        self._tolerance.setSpecialValueText(self.tr("no study"))
+        self._has_reference.setText(self.tr("Tip by a better instrument"))
+        for axis, field in zip(AXES, self._reference, strict=True):
+            field.setAccessibleName(self.tr("{0} of the reference").format(axis))
+        self._refresh()
+
+    def _refresh(self) -> None:
+        for field in self._reference:
+            field.setVisible(self._has_reference.isChecked())
+        self._has_reference.setVisible(self.tolerance() is not None)
+        found, n_tips = self._shown
+        if found is None:
+            self._told.set_value(Remark())
+            return
+        words = [self._of_each("Cg", found.cg)]
+        if found.cgk is not None:
+            words.append(self._of_each("Cgk", found.cgk))
+        least = number_text(CAPABLE, 2)
+        words.append(
+            self.tr("Capable: all are {0} or more.").format(least)
+            if found.is_capable
+            else self.tr("Not capable: {0} is asked for.").format(least)
+        )
+        if n_tips < STUDY:
+            text = self.tr("A study takes {0} to 50 repeats; these are {1}.")
+            words.append(text.format(STUDY, n_tips))
+        mark = (
+            (Sign.CHECK, Tone.GOOD) if found.is_capable else (Sign.WARNING, Tone.WARN)
+        )
+        self._told.set_value(Remark(" ".join(words), *mark))
+
+    def _of_each(self, name: str, values: FloatArray) -> str:
+        each = zip(AXES, values.tolist(), strict=True)
+        numbers = ", ".join(f"{axis} {number_text(value, 2)}" for axis, value in each)
+        return f"{name}: {numbers}."

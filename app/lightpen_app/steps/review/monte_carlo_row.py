@@ -1,0 +1,190 @@
+"""U by Monte Carlo on request, beside U by the budget."""
+
+import os
+
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.estimation.monte_carlo import MIN_TRIALS, MonteCarlo, run_monte_carlo
+from lightpen.estimation.uncertainty import COVERAGE_FACTOR
+from lightpen.estimation.workers import local_workers
+from lightpen.record.solving import Solution
+from lightpen_app.look.quantities import AXES, MICROMETRES, decimals_for, number_text
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.number_field import NumberField
+from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job, Report
+
+USUAL_TRIALS, MOST_TRIALS = 200, 10_000
+PROGRESS_STEPS = 1000
+
+
+class MonteCarloRow(Translated, QWidget):
+    """Checks the budget of a solution by simulated calibrations, in other processes."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._solution: Solution | None = None
+        self._found: MonteCarlo | None = None
+        self._trouble = ""
+        self._job: Job | None = None
+
+        # Widgets
+        self._start = PushButton()
+        self._label = text_label(TextSize.BODY)
+        self._trials = NumberField("", (MIN_TRIALS, MOST_TRIALS), 0)
+        self._trials.setValue(USUAL_TRIALS)
+        self._label.setBuddy(self._trials)
+        self._cancel = PushButton()
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+        self._told = SignLabel()
+        self._table = NumberTable()
+
+        # Layout
+        line = QHBoxLayout()
+        line.setSpacing(GRID)
+        line.addWidget(self._start)
+        line.addWidget(self._cancel)
+        line.addWidget(self._label)
+        line.addWidget(self._trials)
+        line.addWidget(self._progress, 1)
+        line.addWidget(self._told, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addLayout(line)
+        layout.addWidget(self._table)
+
+        # Connections
+        self._start.clicked.connect(self._on_start_clicked)
+        self._cancel.clicked.connect(self._on_cancel_clicked)
+
+        self._retranslate()
+
+    def set_value(self, solution: Solution) -> None:
+        """Be about another solution; what was computed of the one before is gone."""
+        if solution is self._solution:
+            return
+        self.stop()
+        self._solution, self._found, self._trouble = solution, None, ""
+        self._refresh()
+
+    def stop(self) -> None:
+        """Compute no more."""
+        job, self._job = self._job, None
+        if job is not None:
+            job.cancel()
+
+    def _on_start_clicked(self) -> None:
+        solution = self._solution
+        if solution is None:
+            return
+        calibration, n_trials = solution.calibration, round(self._trials.value())
+
+        def compute(report: Report) -> MonteCarlo:
+            with local_workers(max(1, (os.cpu_count() or 1) - 1)) as in_workers:
+                return run_monte_carlo(calibration, n_trials, in_workers, report)
+
+        self.stop()
+        self._found, self._trouble = None, ""
+        self._progress.setValue(0)
+        self._job = job = Job(compute, self)
+
+        # Connections
+        job.progressed.connect(self._on_progressed)
+        job.succeeded.connect(self._on_found)
+        job.failed.connect(self._on_failed)
+        job.crashed.connect(self._on_cancel_clicked)
+        job.start()
+        self._refresh()
+        self._cancel.setFocus()
+
+    def _on_progressed(self, fraction: float) -> None:
+        self._progress.setValue(round(PROGRESS_STEPS * fraction))
+
+    def _on_found(self, found: MonteCarlo) -> None:
+        self._job, self._found = None, found
+        self._refresh()
+
+    def _on_failed(self, why: str) -> None:
+        self._job, self._trouble = None, why
+        self._refresh()
+
+    def _on_cancel_clicked(self) -> None:
+        self.stop()
+        self._refresh()
+        self._start.setFocus()
+
+    @override
+    def _retranslate(self) -> None:
+        self._start.setText(self.tr("Check by Monte Carlo"))
+        self._start.setToolTip(
+            self.tr(
+                "Draw files, seat and noise as U counts them, and calibrate from each "
+                "(JCGM 101). It takes all cores but one for some seconds to minutes."
+            )
+        )
+        self._cancel.setText(self.tr("Cancel"))
+        self._label.setText(self.tr("Trials"))
+        self._trials.setAccessibleName(self.tr("Trials"))
+        self._progress.setAccessibleName(self.tr("Progress"))
+        self._table.setAccessibleName(self.tr("U by Monte Carlo beside the budget"))
+        self._refresh()
+
+    def _refresh(self) -> None:
+        is_busy = self._job is not None
+        self._start.setVisible(not is_busy)
+        self._start.set_why_not(self._why_not())
+        for field in (self._label, self._trials):
+            field.setVisible(not is_busy)
+        self._cancel.setVisible(is_busy)
+        self._progress.setVisible(is_busy)
+        self._told.set_value(self._told_remark())
+        self._told.setVisible(not is_busy)
+        self._table.setVisible(self._found is not None)
+        if self._found is not None:
+            self._table.set_value(self._figures(self._found))
+
+    def _why_not(self) -> str:
+        if self._solution is not None and self._solution.source.rig is not None:
+            return self.tr("It is for the swing of one camera.")
+        return ""
+
+    def _told_remark(self) -> Remark:
+        if self._trouble:
+            return Remark(self._trouble, Sign.CROSS, Tone.BAD)
+        if self._found is None:
+            return Remark()
+        text = self.tr("{0} trials gave a tip, {1} did not.")
+        n_solved = len(self._found.errors)
+        return Remark(text.format(n_solved, self._found.n_failed), Sign.RING)
+
+    def _figures(self, found: MonteCarlo) -> Figures:
+        """Return U by both, and their difference by what so many trials know."""
+        by_trials = COVERAGE_FACTOR * found.deviation * MICROMETRES
+        within = COVERAGE_FACTOR * found.precision * MICROMETRES
+        by_budget = COVERAGE_FACTOR * found.linear * MICROMETRES
+        rows = (
+            (self.tr("U (k = 2) by Monte Carlo / \xb5m"), by_trials, within),
+            (self.tr("known to (k = 1) / \xb5m"), within, within),
+            (self.tr("U (k = 2) by the budget / \xb5m"), by_budget, within),
+        )
+        cells = [
+            tuple(
+                number_text(x, decimals_for(u))
+                for x, u in zip(values.tolist(), digits.tolist(), strict=True)
+            )
+            for _, values, digits in rows
+        ]
+        cells.append(tuple(number_text(x, 1) for x in found.difference.tolist()))
+        names = (
+            *(name for name, *_ in rows),
+            self.tr("budget less Monte Carlo, in what so many trials know"),
+        )
+        return Figures(AXES, names, tuple(cells))

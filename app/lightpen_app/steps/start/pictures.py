@@ -1,0 +1,122 @@
+"""What the program is for, in pictures: the pen, the cone, and the steps."""
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QCoreApplication, Qt
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
+
+from lightpen.model.posture import Posture
+from lightpen.simulator.swings import PAPER_TIP, paper_pen
+from lightpen_app.look.theme import GRID, TextSize, set_size, text_label
+from lightpen_app.widgets.pen_in_space import PenInSpace, PenStand
+from lightpen_app.widgets.translated import Translated
+
+LEAST_SIDE = 16 * GRID  # px, of a picture; with its words all fits 940 x 500
+ANY_HEIGHT = 16777215  # QWIDGETSIZE_MAX
+UPRIGHT = Posture(0.0, 0.0, 0.0)
+LEANING = Posture(math.radians(25), math.radians(200), math.radians(15))
+RIGHT = Posture(math.radians(25), 0.0, math.radians(-15))
+STANDS = ((UPRIGHT, None), (LEANING, RIGHT))
+
+translate = QCoreApplication.translate
+
+
+class Pictures(Translated, QWidget):
+    """Shows what is calibrated, how, and in which steps."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+
+        # Widgets
+        self._heading = text_label(TextSize.TITLE)
+        self._pictures = [_picture(*stand) for stand in STANDS]
+        self._words = [text_label(TextSize.BODY) for _ in STANDS]
+        self._steps = text_label(TextSize.BODY)
+        self._steps.setTextFormat(Qt.TextFormat.RichText)
+
+        # Layout
+        layout = self._layout = QGridLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2 * GRID)
+        layout.addWidget(self._heading, 0, 0, 1, 2)
+        for column, words in enumerate(self._words):
+            layout.addWidget(self._pictures[column], 1, column)
+            words.setAlignment(Qt.AlignmentFlag.AlignTop)
+            layout.addWidget(words, 2, column)
+            layout.setColumnStretch(column, 1)
+        layout.setRowStretch(1, 1)
+        layout.addWidget(self._steps, 3, 0, 1, 2)
+
+        self._retranslate()
+
+    def set_vast(self) -> None:
+        """Put the steps beside larger pictures, in larger letters."""
+        for picture in self._pictures:
+            picture.setMaximumHeight(ANY_HEIGHT)
+        for label in (*self._words, self._steps):
+            set_size(label, TextSize.LEAD)
+        self._layout.addWidget(self._steps, 1, len(STANDS))
+        self._layout.setColumnStretch(len(STANDS), 1)
+
+    def _retranslate(self) -> None:
+        self._heading.setText(translate("Introduction", "Where is the tip of the pen?"))
+        told = (
+            translate(
+                "Introduction",
+                "The pen carries LEDs that a camera sees. What it touches with its "
+                "tip can be measured, once it is known where the tip is from the "
+                "LEDs. That is what is calibrated.",
+            ),
+            translate(
+                "Introduction",
+                "The tip rests in a cone and stays there while the pen is leaned "
+                "to all sides. The only point of the pen that does not move is "
+                "the centre of its tip.",
+            ),
+        )
+        for label, text in zip(self._words, told, strict=True):
+            label.setText(text)
+        rows = "".join(
+            f"<li><b>{name}</b> \N{EN DASH} {what}</li>" for name, what in _steps()
+        )
+        self._steps.setText(f"<ol>{rows}</ol>")
+
+
+def _steps() -> tuple[tuple[str, str], ...]:
+    """Return the name of each step, and what is done there."""
+    return (
+        (
+            translate("Introduction", "Start"),
+            translate("Introduction", "say which pen and which tip."),
+        ),
+        (
+            translate("Introduction", "Camera"),
+            translate("Introduction", "see that the images are bright and sharp."),
+        ),
+        (
+            translate("Introduction", "LEDs"),
+            translate(
+                "Introduction", "see that the file of the LEDs is that of this pen."
+            ),
+        ),
+        (
+            translate("Introduction", "Swing"),
+            translate(
+                "Introduction", "lean the pen as the arrow shows; no key is needed."
+            ),
+        ),
+        (
+            translate("Introduction", "Review"),
+            translate("Introduction", "see how certain the tip is, and accept it."),
+        ),
+    )
+
+
+def _picture(posture: Posture, target: Posture | None) -> PenInSpace:
+    picture = PenInSpace()
+    expanding = QSizePolicy.Policy.Expanding
+    picture.setSizePolicy(expanding, expanding)
+    picture.setFixedHeight(LEAST_SIDE)
+    picture.set_value(PenStand(paper_pen(), np.array(PAPER_TIP), posture, target))
+    return picture

@@ -1,0 +1,76 @@
+"""The picture of a tip, as the library keeps it or as it is about to be kept."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QSize, Qt
+from PySide6.QtGui import QImage, QImageReader, QPixmap
+from PySide6.QtWidgets import QLabel, QWidget
+
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
+
+ReadPicture = Callable[[], bytes]  # raises a `LightpenError`
+
+
+class TipPicture(Translated, QLabel):
+    """Shows a picture, or why it cannot be shown; it is read off the GUI's thread.
+
+    Parameters
+    ----------
+    place : QSize
+        In which it is shown as large as it can be, px.
+    """
+
+    def __init__(self, place: QSize, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._job: Job | None = None
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.setWordWrap(True)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setFixedSize(place)
+        self.setProperty("area", "panel")
+        self._retranslate()
+
+    def set_value(self, read: ReadPicture | None) -> None:
+        """Show another picture, or that there is none."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job = None
+        self.clear()
+        if read is None:
+            self._retranslate()
+            return
+        place, density = self.size(), self.devicePixelRatioF()
+        self._job = job = Job(lambda _: _scaled(read, place, density), self)
+
+        # Connections
+        job.succeeded.connect(self._on_read)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_read(self, image: QImage) -> None:
+        self._job = None
+        self.setPixmap(QPixmap.fromImage(image))
+
+    def _on_failed(self, why: str) -> None:
+        self._job = None
+        self.setText(why)
+
+    def _retranslate(self) -> None:
+        self.setAccessibleName(self.tr("Picture of the tip"))
+        if self._job is None and self.pixmap().isNull():
+            self.setText(self.tr("No picture"))
+
+
+def _scaled(read: ReadPicture, place: QSize, density: float) -> QImage:
+    """Return a picture as large as it is shown."""
+    buffer = QBuffer()
+    buffer.setData(QByteArray(read()))
+    buffer.open(QIODevice.OpenModeFlag.ReadOnly)
+    reader = QImageReader(buffer)
+    reader.setAutoTransform(True)  # as the camera was held
+    size = reader.size().scaled(place * density, Qt.AspectRatioMode.KeepAspectRatio)
+    reader.setScaledSize(size)
+    image = reader.read()
+    image.setDevicePixelRatio(density)
+    return image

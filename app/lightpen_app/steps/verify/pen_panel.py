@@ -1,0 +1,308 @@
+"""The pen's health: its LEDs over accepted swings, and a better LED file by them."""
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QVBoxLayout, QWidget
+from typing_extensions import override
+
+from lightpen.formats.opened_files import PenFile
+from lightpen.verification.length import Scale
+from lightpen.verification.pen_health import PenHealth
+from lightpen.verification.pen_over_time import (
+    NewLedFile,
+    PenOverTime,
+    improve_led_file,
+    read_pen_over_time,
+)
+from lightpen_app.look.grades import GRADE_MARKS
+from lightpen_app.look.quantities import MICROMETRES, number_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.signs import Sign
+from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.words import moment_text, shortened
+from lightpen_app.steps.verify.pen_plot import LedMovesPlot
+from lightpen_app.widgets.number_table import Figures, NumberTable
+from lightpen_app.widgets.plots import Axes
+from lightpen_app.widgets.push_button import PushButton
+from lightpen_app.widgets.sign_label import Remark, SignLabel
+from lightpen_app.widgets.translated import Translated
+from lightpen_app.work.job import Job
+from lightpen_app.work.workbench import Workbench
+
+LATEST = 8  # swings, which the table has room for
+PROGRESS_STEPS = 1000
+PLOT_HEIGHT = 20 * GRID
+PPM = 1e6
+
+
+class PenPanel(Translated, QWidget):
+    """Shows the pen that is chosen over its swings, and makes a better LED file."""
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self._shown: PenOverTime | None = None
+        self._new: NewLedFile | None = None
+        self._trouble = ""
+        self._reading: Job | None = None
+        self._improving: Job | None = None
+        self._read_of: tuple[object, ...] = ()
+
+        # Widgets
+        self._verdict = SignLabel()
+        self._left_out = text_label(TextSize.SMALL, Tone.QUIET)
+        self._left_out.setWordWrap(True)
+        self._plot = LedMovesPlot()
+        self._plot.setMinimumHeight(PLOT_HEIGHT)
+        self._head = text_label(TextSize.SMALL, Tone.QUIET)
+        self._table = NumberTable()
+        self._improve = PushButton()
+        self._cancel = PushButton()
+        self._progress = QProgressBar()
+        self._progress.setRange(0, PROGRESS_STEPS)
+        self._progress.setTextVisible(False)
+        self._told = SignLabel()
+        self._use = PushButton()
+
+        # Layout
+        actions = QHBoxLayout()
+        actions.setSpacing(GRID)
+        actions.addWidget(self._improve, 0, Qt.AlignmentFlag.AlignTop)
+        actions.addWidget(self._cancel, 0, Qt.AlignmentFlag.AlignTop)
+        actions.addWidget(self._progress, 1)
+        actions.addWidget(self._told, 1, Qt.AlignmentFlag.AlignTop)
+        actions.addWidget(self._use, 0, Qt.AlignmentFlag.AlignTop)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 2 * GRID, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self._verdict)
+        layout.addWidget(self._left_out)
+        layout.addLayout(actions)
+        layout.addWidget(self._head)
+        layout.addWidget(self._table)
+        layout.addWidget(self._plot, 1)
+
+        # Connections
+        self._improve.clicked.connect(self._on_improve_clicked)
+        self._cancel.clicked.connect(self._on_cancel_clicked)
+        self._use.clicked.connect(self._on_use_clicked)
+        workbench.changed.connect(self._on_workbench_changed)
+
+        self._retranslate()
+
+    def shut_down(self) -> None:
+        """Let go of what is computed."""
+        for job in (self._reading, self._improving):
+            if job is not None:
+                job.cancel()
+
+    @override
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._read()
+
+    @override
+    def _retranslate(self) -> None:
+        self._improve.setText(self.tr("Improve the LED file"))
+        self._improve.setToolTip(
+            self.tr(
+                "Pool the newest swings; the last one has to confirm what comes of "
+                "them. The old file stays."
+            )
+        )
+        self._cancel.setText(self.tr("Cancel"))
+        self._use.setText(self.tr("Use the new file"))
+        self._progress.setAccessibleName(self.tr("Progress"))
+        head = self.tr("LEDs since the first swing / \xb5m, size of the pen / ppm")
+        self._head.setText(head)
+        self._table.setAccessibleName(head)
+        title = self.tr("LEDs since the first swing / mm")
+        self._plot.set_axes(Axes(title, self.tr("swing no.")))
+        self._refresh()
+
+    # What is read
+
+    def _on_workbench_changed(self) -> None:
+        if self.isVisible() and self._chosen() != self._read_of:
+            self._read()
+
+    def _chosen(self) -> tuple[object, ...]:
+        now = self._workbench.preparation
+        return now.names.pen, now.origin, now.pen_file, now.camera_file
+
+    def _read(self) -> None:
+        """Read the swings of the pen anew."""
+        now, archive = self._workbench.preparation, self._workbench.run.archive
+        if self._reading is not None:
+            self._reading.cancel()
+        is_other, self._read_of = self._chosen() != self._read_of, self._chosen()
+        if is_other:
+            self._shown, self._new, self._trouble = None, None, ""
+        if now.pen_file is None:
+            self._refresh()
+            return
+        work = partial(read_pen_over_time, archive, now)
+        self._reading = job = Job(work, self)
+
+        # Connections
+        job.succeeded.connect(self._on_read)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_read(self, found: PenOverTime) -> None:
+        self._reading, self._shown = None, found
+        self._refresh()
+
+    def _on_failed(self, why: str) -> None:
+        self._reading = self._improving = None
+        self._trouble = why
+        self._refresh()
+
+    # A better LED file
+
+    def _on_improve_clicked(self) -> None:
+        pen, workbench = self._shown, self._workbench
+        if pen is None:
+            return
+        self._new, self._trouble = None, ""
+        self._progress.setValue(0)
+        now, scale = workbench.around.now(), self._scale()
+        work = partial(improve_led_file, workbench.folder, pen, scale, now)
+        self._improving = job = Job(work, self)
+
+        # Connections
+        job.progressed.connect(self._on_progressed)
+        job.succeeded.connect(self._on_improved)
+        job.failed.connect(self._on_failed)
+        job.crashed.connect(self._on_cancel_clicked)
+        job.start()
+        self._refresh()
+        self._cancel.setFocus()
+
+    def _scale(self) -> Scale | None:
+        """Return the scale by a certified length, where one was touched just now."""
+        state = self._workbench.verification.status.state
+        found = None if state is None else state.length
+        return None if found is None else found.scale
+
+    def _on_progressed(self, fraction: float) -> None:
+        self._progress.setValue(round(PROGRESS_STEPS * fraction))
+
+    def _on_improved(self, new: NewLedFile) -> None:
+        self._improving, self._new = None, new
+        self._refresh()
+        self._use.setFocus()
+
+    def _on_cancel_clicked(self) -> None:
+        job, self._improving = self._improving, None
+        if job is not None:
+            job.cancel()
+        self._refresh()
+        self._improve.setFocus()
+
+    def _on_use_clicked(self) -> None:
+        if self._new is None:
+            return
+        path: Path = self._new.path
+        job = Job(lambda _: PenFile.read(path), self)
+
+        # Connections
+        job.succeeded.connect(self._on_new_read)
+        job.failed.connect(self._on_failed)
+        job.start()
+
+    def _on_new_read(self, pen_file: PenFile) -> None:
+        now = self._workbench.preparation
+        self._workbench.set_preparation(replace(now, pen_file=pen_file))
+
+    # What is shown
+
+    def _refresh(self) -> None:
+        found, is_busy = self._shown, self._improving is not None
+        health = None if found is None else found.health
+        self._verdict.set_value(self._health_remark(health))
+        self._left_out.setText(self._left_out_text())
+        self._left_out.setVisible(bool(self._left_out.text()))
+        for widget in (self._head, self._table):
+            widget.setVisible(health is not None)
+        self._plot.setVisible(health is not None)
+        if health is not None and found is not None:
+            self._table.set_value(self._figures(found, health))
+            moves = [np.linalg.norm(swing.shifts, axis=1) for swing in health.swings]
+            self._plot.set_data(np.array(moves), health.moved)
+        self._improve.setVisible(not is_busy)
+        self._improve.set_why_not(self._why_not_improve())
+        self._cancel.setVisible(is_busy)
+        self._progress.setVisible(is_busy)
+        self._told.set_value(self._told_remark())
+        self._told.setVisible(not is_busy)
+        self._use.setVisible(self._new is not None and not is_busy)
+
+    def _health_remark(self, health: PenHealth | None) -> Remark:
+        if health is not None:
+            told = health.assessment
+            return Remark(worded(told.reason), *GRADE_MARKS[told.grade])
+        if self._shown is None:
+            return Remark(self.tr("The swings of the pen are being read."), Sign.WAIT)
+        text = self.tr(
+            "Two accepted swings with this LED file are needed to tell how pen {0} "
+            "changes; there are {1}."
+        )
+        pen, n_swings = shortened(self._shown.names.pen), len(self._shown.swings)
+        return Remark(text.format(pen, n_swings), Sign.RING)
+
+    def _left_out_text(self) -> str:
+        if self._shown is None or not self._shown.n_left_out:
+            return ""
+        text = self.tr("Swings with another LED file, or that cannot be read: {0}.")
+        return text.format(self._shown.n_left_out)
+
+    def _why_not_improve(self) -> str:
+        found = self._shown
+        if found is None or found.camera is None:
+            return self.tr("Nothing is read yet.")
+        if found.n_missing:
+            text = self.tr(
+                "It takes four accepted swings with this LED file and camera file; {0} "
+                "more."
+            )
+            return text.format(found.n_missing)
+        if found.health is not None and found.health.moved:
+            return self.tr("An LED has moved: no file is right for all swings.")
+        return ""
+
+    def _told_remark(self) -> Remark:
+        if self._new is None:
+            return (
+                Remark(self._trouble, Sign.CROSS, Tone.BAD)
+                if self._trouble
+                else (Remark())
+            )
+        improved = self._new.improved
+        text = self.tr(
+            "Written as {0}: the swing held out fits it to {1} px, the old file to {2} "
+            "px. A tip belongs to its LED file: calibrate again with the new one."
+        )
+        after, before = improved.sigma_after, improved.sigma_before
+        words = (self._new.path.name, number_text(after, 4), number_text(before, 4))
+        return Remark(text.format(*words), Sign.CHECK, Tone.GOOD)
+
+    def _figures(self, found: PenOverTime, health: PenHealth) -> Figures:
+        """Return how far each LED moved and how much the pen grew, swing by swing."""
+        heads = *map(str, range(1, len(found.pen.leds) + 1)), self.tr("size")
+        names, cells = [], []
+        for swing, told in list(zip(found.swings, health.swings, strict=True))[
+            -LATEST:
+        ]:
+            names.append(moment_text(swing.when, "yyyy-MM-dd hh:mm"))
+            lengths = np.linalg.norm(told.shifts, axis=1) * MICROMETRES
+            moves = (number_text(x, 0) if np.isfinite(x) else "" for x in lengths)
+            growth = told.growth
+            size = "" if growth is None else number_text(PPM * growth, 0)
+            cells.append((*moves, size))
+        return Figures(heads, tuple(names), tuple(cells))

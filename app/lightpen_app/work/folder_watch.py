@@ -1,0 +1,95 @@
+"""Whether the data folder can be written, and how many windows use it."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.record.data_folder import check_writable
+from lightpen.record.presence import Presence
+from lightpen_app.work.job import Job
+
+LOOKING_MS = 5000  # from one look to the next
+
+
+class FolderWatch(QObject):
+    """Looks at the data folder now and then, and lets other windows know of this one.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Signals
+    -------
+    counted(int)
+        So many other windows of the program use it, told when it changes.
+    doubted(str)
+        The sentence why nothing can be kept in it, or that it can again, empty.
+    """
+
+    counted = Signal(int)
+    doubted = Signal(str)
+
+    def __init__(self, folder: Path, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._folder = folder
+        self._presence = Presence(folder)
+        self._n_others = 0
+        self._trouble = ""
+        self._counter: Job | None = None
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOKING_MS)
+
+        # Connections
+        self._timer.timeout.connect(self._look)
+
+    def start(self) -> None:
+        """Look now, and from now on."""
+        self._check()
+        self._count()
+        self._timer.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._timer.stop()
+
+    def leave(self) -> None:
+        """Let the others know that this window is gone."""
+        self._presence.leave()
+
+    def _look(self) -> None:
+        if self._counter is not None:  # a disk that does not answer is asked once
+            return
+        if self._trouble:
+            self._check()
+        self._count()
+
+    def _check(self) -> None:
+        folder = self._folder
+        job = Job(lambda _: check_writable(folder), self)
+
+        # Connections
+        job.succeeded.connect(self._on_writable)
+        job.failed.connect(self._doubt)
+        job.start()
+
+    def _on_writable(self, _: None) -> None:
+        self._doubt("")
+
+    def _doubt(self, trouble: str) -> None:
+        if trouble != self._trouble:
+            self._trouble = trouble
+            self.doubted.emit(trouble)
+
+    def _count(self) -> None:
+        presence = self._presence
+        self._counter = job = Job(lambda _: presence.count_others(), self)
+
+        # Connections
+        job.succeeded.connect(self._on_counted)
+        job.start()
+
+    def _on_counted(self, n_others: int) -> None:
+        self._counter = None
+        if n_others != self._n_others:
+            self._n_others = n_others
+            self.counted.emit(n_others)

@@ -1,0 +1,141 @@
+"""Videos decoded in a process of its own, whose memory has a limit.
+
+What a frame of a video takes is known only to its decoder: a stream of H.264 in 3 kB
+may say anywhere that its frames are 16000 x 16000 px from here on, and a gigabyte is
+asked for before anyone can look. A decoder that crashes takes no other process with it.
+"""
+
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from lightpen.arrays import Image
+from lightpen.errors import FileError
+from lightpen.formats import videos
+from lightpen.formats.decoding import keep_freed_memory
+from lightpen.formats.files import printable
+from lightpen.sentences import sentence
+
+MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
+
+
+def count_frames(path: Path) -> int:
+    """Return how many frames a video has; see `videos.count_frames`.
+
+    Raises
+    ------
+    FileError
+        As there, or decoding it takes too much memory.
+    """
+    with _decoder(_send_count, path) as receive:
+        n_frames: int = receive()
+    return n_frames
+
+
+def frame_loaders(path: Path, n_frames: int) -> Iterator[Callable[[], Image]]:
+    """Yield a loader for each frame: it returns it in grey, or raises `FileError`."""
+    with _decoder(_send_frames, path, n_frames) as receive:
+        for _ in range(n_frames):
+            try:
+                yield partial(_loaded, receive())
+            except FileError as error:
+                yield partial(_loaded, error)
+
+
+@contextmanager
+def _decoder(
+    send: Callable[..., None], path: Path, *arguments: int
+) -> Iterator[Callable[[], Any]]:
+    """Start a process that sends; yield what receives, or raises what it raised."""
+    context = get_context("spawn")  # a fork would copy threads that hold locks
+    ours, its = context.Pipe(duplex=False)
+    process = context.Process(
+        target=_serve, args=(its, send, path, *arguments), daemon=True
+    )
+    process.start()
+    its.close()
+
+    def receive() -> Any:
+        try:
+            what = ours.recv()
+        except (EOFError, OSError) as error:  # it crashed
+            raise _too_much(path) from error
+        if isinstance(what, FileError):
+            raise what
+        return what
+
+    try:
+        yield receive
+    finally:
+        process.kill()
+        process.join()
+        process.close()
+        ours.close()
+
+
+def _serve(
+    to: Connection, send: Callable[..., None], path: Path, *arguments: int
+) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked hears it, and ends this
+    keep_freed_memory()
+    _limit_memory()
+    try:
+        send(to, path, *arguments)
+    except FileError as error:
+        to.send(error)
+    except (cv2.error, MemoryError):
+        to.send(_too_much(path))
+    except OSError:  # nobody listens any more
+        return
+
+
+def _send_count(to: Connection, path: Path) -> None:
+    to.send(videos.count_frames(path))
+
+
+def _send_frames(to: Connection, path: Path, n_frames: int) -> None:
+    for load in videos.frame_loaders(path, n_frames):
+        try:
+            to.send(load())
+        except FileError as error:
+            to.send(error)
+
+
+def _limit_memory() -> None:
+    """Let this process have little more memory than it has (Linux)."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    status = Path("/proc/self/status").read_text("ascii")
+    (data,) = (line for line in status.splitlines() if line.startswith("VmData:"))
+    most = int(data.split()[1]) * 1024 + MAX_DECODER_MEMORY
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if hard == resource.RLIM_INFINITY or most < hard:
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+
+def _loaded(frame: Image | FileError) -> Image:
+    if isinstance(frame, FileError):
+        raise frame
+    return frame
+
+
+def _too_much(path: Path) -> FileError:
+    return FileError(
+        sentence(
+            "video.too-much-memory",
+            "The video {path} cannot be decoded within {most:.0f} MB. Save its frames "
+            "as images.",
+            path=printable(str(path)),
+            most=MAX_DECODER_MEMORY / 1e6,
+        )
+    )

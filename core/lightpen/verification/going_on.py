@@ -1,0 +1,193 @@
+"""An interrupted verification: read back to go on with it, or concluded as abandoned.
+
+What was touched is measured anew from the LED centres in the records of the touches,
+run by run, so that all is found again as it was. A touch that was not complete does not
+count. What fixed lamps told before is not taken up: they are watched anew.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from lightpen.errors import FileError, UsageError
+from lightpen.formats.files import printable
+from lightpen.formats.hashes import InputFile, hashed
+from lightpen.model.origin import Origin
+from lightpen.record.folder_archive import FolderArchive
+from lightpen.record.outcome import TrialOutcome
+from lightpen.record.reading import Record, RecordedImage, open_record
+from lightpen.record.unfinished import discard_swing
+from lightpen.record.verifications import TOUCHES
+from lightpen.sentences import sentence
+from lightpen.swing.preparation import Preparation
+from lightpen.swing.serial_queue import Report
+from lightpen.verification.choices import TaskKind
+from lightpen.verification.conclusion import Conclusion, conclusion_record
+from lightpen.verification.keeping import keep_verification, verifications_folder
+from lightpen.verification.recorded_runs import read_runs
+from lightpen.verification.session import (
+    run_again,
+    setup_of,
+    touch_again,
+    with_found,
+)
+from lightpen.verification.session_state import SessionSetup, SessionState
+from lightpen.verification.tip_in_force import TipInForce, read_tip_in_force
+from lightpen.verification.touch import StillFrames, TouchFrame, measure_touches
+from lightpen.verification.touch_images import CONCLUDED, touch_image_name
+from lightpen.verification.touching import read_rules
+from lightpen.verification.under_way import (
+    InterruptedVerification,
+    UnderWay,
+    UnderWayFile,
+    written_since,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class GoneOn:
+    """An interrupted verification, as it was when it was interrupted.
+
+    Attributes
+    ----------
+    files : tuple of Path
+        The records that are written of it.
+    unwritten : tuple of TaskKind
+        Tasks that are done and have no record yet.
+    """
+
+    under_way: UnderWay
+    tip: TipInForce
+    setup: SessionSetup
+    state: SessionState
+    files: tuple[Path, ...]
+    unwritten: tuple[TaskKind, ...]
+
+
+def go_on_with(
+    archive: FolderArchive,
+    data: Path,
+    preparation: Preparation,
+    under_way: UnderWay,
+    report: Report,
+) -> GoneOn:
+    """Return an interrupted verification, with what it found and touched.
+
+    Parameters
+    ----------
+    preparation : Preparation
+        With the names and the files of it.
+
+    Raises
+    ------
+    LightpenError
+        Another tip is in force by now, other files are chosen, or a record of touches
+        cannot be read.
+    """
+    tip = read_tip_in_force(archive, preparation)
+    _require_same(tip, under_way)
+    root = _root(data, under_way)
+    setup, state = setup_of(tip, under_way.choices), SessionState()
+    for n, images in enumerate(under_way.read, start=1):
+        rules = read_rules(images.is_still, under_way.choices.n_frames)
+        done = read_runs(images.task, images.place, tip, setup, rules, lambda _: None)
+        state = with_found(state, done.found)
+        report(n / (len(under_way.read) + 1))
+    for run in under_way.runs:
+        record = open_record(root / TOUCHES / run.folder)
+        held = _held_in(record, under_way.choices.n_frames)
+        if record.verdict == CONCLUDED:
+            touches = measure_touches(setup.instrument, held)
+            state = run_again(setup, state, touches, is_last=run.is_last)
+        else:
+            state = touch_again(setup, state, held)
+    since = written_since(root, under_way)
+    files = tuple(root / name for name in (*under_way.files, *since.files))
+    unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
+    return GoneOn(under_way, tip, setup, state, files, unwritten)
+
+
+def abandon_interrupted(
+    data: Path, interrupted: InterruptedVerification, now: datetime
+) -> None:
+    """Conclude an interrupted verification as abandoned; what is kept of it stays.
+
+    Of one whose file is damaged nobody knows what it was: the file is put aside.
+
+    Raises
+    ------
+    FileError
+        Something cannot be written.
+    """
+    under_way, held = interrupted.under_way, UnderWayFile(interrupted.path)
+    held.hold()
+    if under_way is None:
+        held.put_aside()
+        return
+    root = _root(data, under_way)
+    for run in under_way.runs:
+        with suppress(FileError):  # one that is gone or damaged tells it itself
+            if open_record(root / TOUCHES / run.folder).verdict is None:
+                discard_swing(root / TOUCHES / run.folder)
+    files = []
+    for name in (*under_way.files, *written_since(root, under_way).files):
+        with suppress(FileError):
+            files.append(hashed(root / name))
+    record = conclusion_record(
+        *(under_way.names, under_way.origin),
+        InputFile(Path(under_way.tip_file), under_way.tip_sha256),
+        Conclusion(TrialOutcome.ABANDONED, under_way.began, now),
+        tuple(files),
+    )
+    is_simulated = under_way.origin is Origin.SIMULATED
+    keep_verification(data, record, is_simulated=is_simulated)
+    held.conclude()
+
+
+def _root(data: Path, under_way: UnderWay) -> Path:
+    is_simulated = under_way.origin is Origin.SIMULATED
+    return verifications_folder(data, is_simulated=is_simulated)
+
+
+def _require_same(tip: TipInForce, under_way: UnderWay) -> None:
+    names = under_way.names
+    if tip.tip_file.sha256 != under_way.tip_sha256:
+        raise UsageError(
+            sentence(
+                "under-way.other-tip",
+                "The verification was of {result}, and another result is in force for "
+                "tip {tip} of pen {pen} by now. Close the verification, and begin "
+                "another one.",
+                result=printable(under_way.tip_file),
+                tip=printable(names.tip),
+                pen=printable(names.pen),
+            )
+        )
+    is_pen = tip.pen_file.sha256 == under_way.pen_sha256
+    if not is_pen or tip.viewers.hashes != under_way.seen_by:
+        raise UsageError(
+            sentence(
+                "under-way.other-files",
+                "The verification was begun with another file of the camera or of the "
+                "LEDs than is chosen now. Choose that file, and go on with it.",
+            )
+        )
+
+
+def _held_in(record: Record, n_frames: int) -> tuple[StillFrames, ...]:
+    """Return the touches in a record that are complete."""
+    by_touch: dict[int, list[RecordedImage]] = {}
+    for image in record.used_images:
+        by_touch.setdefault(image.touch, []).append(image)
+    whole = (images for images in by_touch.values() if len(images) >= n_frames)
+    return tuple(StillFrames(tuple(map(_frame, images))) for images in whole)
+
+
+def _frame(image: RecordedImage) -> TouchFrame:
+    return TouchFrame(
+        touch_image_name(image.number),
+        image.rig_pixels,
+        image.rotation,
+        image.translation,
+    )

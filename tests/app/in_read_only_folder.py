@@ -1,0 +1,59 @@
+"""What `test_read_only.py` runs in a name space of its own, where it may mount."""
+
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QLabel
+
+from lightpen.live.sources import Surroundings, sample_files
+from lightpen_app.look.theme import TextSize
+from lightpen_app.work.settings import Settings, Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard, Walker
+
+WAY = "The data folder is chosen at the step Start, or in the options (F10)."
+
+
+def test_a_read_only_data_folder_is_told_with_the_way_to_another(
+    settings: Settings, open_wizard: "OpenWizard", around: Surroundings, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    for words in (["--bind", str(data)], ["-o", "remount,ro,bind"]):
+        subprocess.run(["mount", *words, str(data)], check=True)
+    files = sample_files(around, tmp_path / "files")
+    assert files.camera_file is not None
+    assert files.pen_file is not None
+    settings.set_station(
+        "Hall 2",
+        Station(
+            *("Ann", "LP-04", "T-10", "C-1"),
+            camera_file=str(files.camera_file.path),
+            pen_file=str(files.pen_file.path),
+        ),
+    )
+    settings.set_last_station("Hall 2")
+
+    walker = open_wizard()
+    walker.until_tells(f"Nothing can be kept in the data folder {data}: the disk is")
+    walker.until_tells(WAY)
+    assert walker.offers("Choose another data folder")
+
+    walker.click("Close")
+    for title in ("Camera", "LEDs", "Swing"):
+        walker.until(walker.main_button().isEnabled)
+        walker.main_button().click()
+        walker.until_shows(title)
+    walker.until_says("No swing")
+    walker.until_tells(WAY)
+    walker.window.resize(940, 500)
+    walker.until_tells("the disk is read-only.")
+    assert min(letters(walker)) >= TextSize.SMALL
+
+
+def letters(walker: "Walker") -> list[int]:
+    """How large the letters are that are seen, px."""
+    labels = (each for each in walker.seen() if isinstance(each, QLabel))
+    return [each.fontInfo().pixelSize() for each in labels if each.text()]

@@ -1,0 +1,100 @@
+"""Limits and a supervisor's password, as an operator and a supervisor meet them."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from tests.accepted_tip import Holder, accept_tip, leant
+from tests.verifying import FRAME
+
+from lightpen.estimation.verdict import Grade
+from lightpen.model.rig import rig_of
+from lightpen.record.supervision import read_supervision
+from lightpen.simulator.swings import PAPER_TIP
+from lightpen_app.work.settings import Settings, Station
+
+if TYPE_CHECKING:
+    from tests.app.conftest import OpenWizard, Walker
+
+STATION = "Hall 2"
+STRICT = "0.0010"
+CHOSEN = Station(
+    *("Ann", "LP-04", "T-10", "C-1"),
+    ball_diameter=10.0,
+    verified="fixed point",
+    fixed_point_touches=3,
+    touch_images=2,
+)
+
+
+@pytest.fixture
+def known(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
+    """The program at a station that is known, with a tip in force."""
+    settings.set_station(STATION, CHOSEN)
+    settings.set_last_station(STATION)
+    walker = open_wizard()
+    walker.until(lambda: not walker.workbench.preparation.lacks())
+    accept_tip(walker.workbench.folder, walker.workbench.preparation)
+    return walker
+
+
+def sign(walker: "Walker", name: str, password: str) -> None:
+    walker.click_into("Supervisor", name)
+    walker.click_into("Supervisor's password", password)
+    walker.press(Qt.Key.Key_Return)
+
+
+def lay_down_limits(walker: "Walker", password: str, limit: str) -> None:
+    walker.click("All limits...")
+    walker.click_into("Fixed point: std across the view", limit)
+    sign(walker, "Eve", password)
+
+
+def test_a_wrong_password_lays_down_nothing_and_is_asked_for_again(
+    known: "Walker",
+) -> None:
+    walker, folder = known, known.workbench.folder
+    lay_down_limits(walker, "correct horse", STRICT)
+    walker.until(lambda: walker.workbench.supervision.is_guarded)
+    assert read_supervision(folder).limits[STATION].verification.across == 0.001
+
+    lay_down_limits(walker, "wrong horse", "1.0000")
+    walker.until_tells("password is another one")
+    assert read_supervision(folder).limits[STATION].verification.across == 0.001
+    walker.type("correct horse")  # the password waits for it
+    walker.press(Qt.Key.Key_Return)
+    walker.until(lambda: walker.workbench.choices.limits.across == 1.0)
+
+
+def test_beyond_the_limits_a_supervisor_accepts_after_a_wrong_password(
+    known: "Walker",
+) -> None:
+    walker, workbench = known, known.workbench
+    lay_down_limits(walker, "correct horse", STRICT)
+    walker.until(lambda: workbench.supervision.is_guarded)
+    walker.take_window()  # of several windows none is active by itself here
+    walker.click_step("Verify")
+    walker.until_says("Touch the cone")
+    camera, pen = workbench.preparation.camera, workbench.preparation.pen
+    assert camera is not None
+    assert pen is not None
+    bent = Holder(rig_of(camera), pen, PAPER_TIP + np.array([0.3, 0.0, 0.0]))
+    status = workbench.verification.status
+    assert status.aim is not None
+    for hold in leant(3):
+        for sighting in bent.still(hold):
+            workbench.verification.runner.take(FRAME, sighting, status.aim)
+    walker.until_says("Not proven")
+    assert workbench.verification.status.assessment is not None
+    assert workbench.verification.status.assessment.grade is Grade.REPEAT
+
+    walker.click("Accept...")
+    walker.click_into("Reason", "Roughing only.")
+    assert not walker.offers("Accept with this reason")
+    sign(walker, "Eve", "wrong horse")
+    walker.until_tells("password is another one")
+    assert workbench.verification.status.accepted_by == ""
+    walker.type("correct horse")  # name and reason are still there
+    walker.press(Qt.Key.Key_Return)
+    walker.until(lambda: workbench.verification.status.accepted_by == "Eve")

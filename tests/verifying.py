@@ -1,0 +1,145 @@
+"""A verification that a test leads: a runner, and a pen held before its camera."""
+
+import json
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tests.accepted_tip import Hold, Holder
+
+from lightpen.cameras.protocol import Frame, sealed
+from lightpen.detection.aim import Aim
+from lightpen.detection.sighting import Sighting
+from lightpen.model.rig import rig_of
+from lightpen.record.folder_archive import SIMULATED, FolderArchive
+from lightpen.record.verifications import CONCLUSION, TOUCHES, VERIFICATIONS
+from lightpen.sentences import Sentence
+from lightpen.swing.preparation import Preparation
+from lightpen.verification.choices import WHOLE, TaskKind, VerificationChoices
+from lightpen.verification.runner import VerificationRunner
+from lightpen.verification.status import Reading, SessionHappening, VerificationStatus
+
+TIMEOUT = 60.0  # s until a test gives up
+NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
+CHOICES = VerificationChoices(
+    WHOLE, n_touches=4, radius=31.751, length=150.0, n_frames=3
+)
+FRAME = Frame(sealed(np.zeros((2, 2), np.uint8)), 0, 0)
+BAR = Hold((-75.0, -20.0, 0.0)), Hold((75.0, -20.0, 0.0))
+
+
+class Ear:
+    """Hears what a runner tells, and lets a test wait for it."""
+
+    def __init__(self) -> None:
+        self.events: list[SessionHappening] = []
+        self.troubles: list[str] = []
+        self.reliefs: list[str] = []
+        self.n_read = 0  # times that the tip in force was read
+        self._reading = Reading.NOTHING
+        self._changed = threading.Condition()
+
+    def on_verification(
+        self, status: VerificationStatus, events: tuple[SessionHappening, ...]
+    ) -> None:
+        if (self._reading, status.reading) == (Reading.TIP, Reading.NOTHING):
+            self.n_read += 1
+        self._reading = status.reading
+        self._note(lambda: self.events.extend(events))
+
+    def on_progress(self, fraction: float) -> None:
+        """Nothing is shown."""
+
+    def on_trouble(self, sentence: Sentence) -> None:
+        self._note(lambda: self.troubles.append(sentence.code))
+
+    def on_relief(self, sentence: Sentence) -> None:
+        self._note(lambda: self.reliefs.append(sentence.code))
+
+    def wait_until(self, is_so: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(is_so, TIMEOUT)
+
+    def _note(self, note: Callable[[], None]) -> None:
+        with self._changed:
+            note()
+            self._changed.notify_all()
+
+
+class Verifier:
+    """A runner, and a pen that is held before its camera."""
+
+    def __init__(self, folder: Path, prepared: Preparation) -> None:
+        self.folder, self.preparation = folder, prepared
+        self.ear = Ear()
+        self.runner = VerificationRunner(
+            FolderArchive(folder), folder, self.ear, lambda: NOON
+        )
+        camera, pen, rig_file = prepared.camera, prepared.pen, prepared.rig_file
+        assert camera is not None
+        assert pen is not None
+        rig = rig_of(camera) if rig_file is None else rig_file.rig
+        self.holder = Holder(rig, pen)
+
+    @property
+    def status(self) -> VerificationStatus:
+        return self.runner.status
+
+    @property
+    def kept(self) -> Path:
+        return self.folder / SIMULATED / VERIFICATIONS
+
+    @property
+    def records(self) -> list[dict[str, Any]]:
+        """What each task found."""
+        return [each for each in self._all if each["verification"] != CONCLUSION]
+
+    @property
+    def conclusions(self) -> list[dict[str, Any]]:
+        return [each for each in self._all if each["verification"] == CONCLUSION]
+
+    @property
+    def _all(self) -> list[dict[str, Any]]:
+        files = sorted(self.kept.glob("*.json"))
+        return [json.loads(file.read_bytes()) for file in files]
+
+    @property
+    def runs(self) -> list[Path]:
+        """Records of the images of live touches."""
+        return sorted((self.kept / TOUCHES).glob("*"))
+
+    def come(self, choices: VerificationChoices = CHOICES) -> None:
+        """Be at it, and wait until the tip is read."""
+        n_read = self.ear.n_read
+        self.runner.choose(self.preparation, choices)
+        self.runner.come()
+        self.ear.wait_until(lambda: self.ear.n_read > n_read)
+
+    def refusal(self) -> str:
+        assert self.status.refusal is not None
+        return self.status.refusal.code
+
+    def see(self, sightings: Iterable[Sighting], aim: Aim | None = None) -> None:
+        for sighting in sightings:
+            wanted = aim or self.status.aim
+            assert wanted is not None
+            frame = replace(FRAME, others=(FRAME,) * (len(wanted.aims) - 1))
+            self.runner.take(frame, sighting, wanted)
+
+    def touch(self, *holds: Hold) -> None:
+        for hold in holds:
+            self.see(self.holder.still(hold))
+
+    def read(self, task: TaskKind, place: Path) -> None:
+        """Read recorded images, and wait until that has ended."""
+        n_events, n_troubles = len(self.ear.events), len(self.ear.troubles)
+        self.runner.read(task, str(place), is_still=False)
+        self.ear.wait_until(
+            lambda: (
+                len(self.ear.events) > n_events or len(self.ear.troubles) > n_troubles
+            )
+        )
