@@ -16,7 +16,6 @@ others, ext4 in a file, the superuser alone.
 """
 
 import argparse
-import fcntl
 import json
 import os
 import random
@@ -346,6 +345,8 @@ class _PowerCut(_OnDisk):
     """The disk has what was written to it, and nothing of what the system still had."""
 
     def stop(self) -> None:
+        import fcntl  # which Windows does not have
+
         folder = os.open(self.place.folder, os.O_RDONLY)
         try:
             fcntl.ioctl(folder, EXT4_IOC_SHUTDOWN, struct.pack("I", NO_LOG_FLUSH))

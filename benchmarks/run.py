@@ -4,7 +4,7 @@ Usage: python benchmarks/run.py [--update-readme] [SECTION ...]
 
 Figures on the image sets need LIGHTPEN_DATA. Nothing else should run meanwhile: the
 sections `files`, `hostile`, `archive` and `soak` take from ten minutes to an hour, all
-others together some twenty minutes. Exit status 1 if a limit is missed.
+others together some thirty minutes. Exit status 1 if a limit is missed.
 """
 
 import argparse

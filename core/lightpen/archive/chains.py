@@ -177,21 +177,52 @@ def entry_of_result(database: Database, chain: str, place: str) -> Written | Non
     return None if row is None else read_row(database, row)
 
 
-def entered_places(database: Database, chain: str) -> frozenset[str]:
-    """Return the places of the result files and swings that a chain tells of.
+class EnteredPlaces:
+    """The places of the result files and swings that a chain tells of.
 
-    A swing whose result was taken back is not among them: it may still be set aside.
+    What was read once is kept, so that of a long chain only its new entries are.
+
+    Parameters
+    ----------
+    chain : str
+        Whose entries are never changed.
     """
-    wanted = (
-        select(ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
-        .where(ENTRIES.c.chain == chain)
-        .order_by(ENTRIES.c.number)
-    )
-    with database.reading() as connection:
-        rows = connection.execute(wanted).all()
-    last = {row.swing: row.kind for row in rows}
-    swings = {swing for swing, kind in last.items() if kind != Kind.TAKEN_BACK.value}
-    return frozenset(swings | {row.result for row in rows})
+
+    def __init__(self, database: Database, chain: str) -> None:
+        self._database, self._chain = database, chain
+        self._n_read = 0
+        self._results = set[str]()
+        self._kinds: dict[str, str] = {}  # of the last entry of a swing
+
+    def read(self) -> None:
+        """Read what was entered since.
+
+        Raises
+        ------
+        ArchiveError
+            It cannot be read.
+        """
+        wanted = (
+            select(
+                *(ENTRIES.c.number, ENTRIES.c.result, ENTRIES.c.swing, ENTRIES.c.kind)
+            )
+            .where(ENTRIES.c.chain == self._chain, ENTRIES.c.number > self._n_read)
+            .order_by(ENTRIES.c.number)
+        )
+        with self._database.reading() as connection:
+            for row in connection.execute(wanted):
+                self._results.add(row.result)
+                self._kinds[row.swing] = row.kind
+                self._n_read = row.number
+
+    def __contains__(self, place: str) -> bool:
+        """Return whether a place was entered, as far as was read.
+
+        A swing whose result was taken back was not: it may still be set aside.
+        """
+        taken_back = Kind.TAKEN_BACK.value
+        is_swing = self._kinds.get(searchable(place), taken_back) != taken_back
+        return is_swing or searchable(place) in self._results
 
 
 def columns_of(entry: Written) -> dict[str, Any]:

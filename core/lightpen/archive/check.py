@@ -1,6 +1,7 @@
 """Whether all of an archive is as it was entered: its rows, chains and records."""
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 from sqlalchemy import Row, exists, select, text
 
 from lightpen.archive.chains import chain_at_home, heads, records_of, sound_entry
-from lightpen.archive.database import Database
+from lightpen.archive.database import Database, is_open, look_into
 from lightpen.archive.entries import NOTHING_BEFORE, Head, text_sha256
 from lightpen.archive.files_check import FilesCheck
 from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
@@ -76,6 +77,37 @@ def check_archive(
     stages += [_strays(database), _changed_records(database), _lost_records(database)]
     findings = tuple(each for stage in stages for each in _told(stage))
     return Checked(n_before, files.n_files, findings)
+
+
+def check_file(archive: Path, data: Path, report: Report) -> Checked:
+    """Look at an archive in a file, and at the files that it vouches for.
+
+    Of a file that a program began to write meanwhile nothing is known but what a check
+    beside that program tells, which is made then.
+
+    Parameters
+    ----------
+    data, report
+        As of `check_archive`.
+
+    Raises
+    ------
+    ArchiveError
+        It is not there, not of this program, or cannot be read at all.
+    """
+    while True:
+        before = _last_written(archive)
+        with closing(look_into(archive)) as database:
+            checked = check_archive(database, data, report)
+        if not checked.findings or before is None or before == _last_written(archive):
+            return checked
+
+
+def _last_written(archive: Path) -> int | None:
+    """Return when a file at rest was written, ns; None while a program has it open."""
+    if is_open(archive) or not archive.exists():
+        return None
+    return archive.stat().st_mtime_ns
 
 
 def _told(stage: Iterator[Sentence]) -> Iterator[Sentence]:

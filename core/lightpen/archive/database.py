@@ -189,6 +189,11 @@ def look_into(path: Path) -> Database:
     return database
 
 
+def is_open(path: Path) -> bool:
+    """Return whether a program has the archive in a file open, or was killed so."""
+    return Path(f"{path}-wal").exists()
+
+
 def open_server(address: str) -> Database:
     """Open the archive on a server, or make its tables.
 
@@ -239,8 +244,7 @@ def _without_password(url: URL) -> str:
 
 
 def _read_only(path: Path) -> Database:
-    # With a journal beside it, somebody writes, or was killed while writing.
-    mode = "mode=ro" if Path(f"{path}-wal").exists() else "immutable=1"
+    mode = "mode=ro" if is_open(path) else "immutable=1"
     place = f"{path.absolute().as_uri()}?{mode}"
     engine = _sqlite_engine(lambda: _connected(place))
     return Database(engine, printable(str(path)), path)

@@ -12,7 +12,7 @@ from lightpen.archive.chains import searchable, since_us
 from lightpen.archive.database import Database
 from lightpen.archive.entries import Kind, Written
 from lightpen.archive.history import known_names
-from lightpen.archive.queries import last_accepted, of_chain
+from lightpen.archive.queries import calibrating, last_accepted, of_chain
 from lightpen.archive.tables import ENTRIES
 from lightpen.record.due_rule import DueRule
 from lightpen.record.tip_library import Library
@@ -30,15 +30,18 @@ class DueTip:
     ----------
     entry : Written
         That put it in force.
+    calibrated : datetime
+        Of one that was put in force again, when it was calibrated all the same.
     due : datetime
         By its age.
     n_swings : int
-        Of its pen since.
+        Of its pen since it was calibrated.
     n_left : int or None
         Swings until it is due by their count; None if any number may be made.
     """
 
     entry: Written
+    calibrated: datetime
     due: datetime
     n_swings: int
     n_left: int | None
@@ -49,7 +52,7 @@ class DueTip:
         So it is where its age is not known: its day is still to come, by a clock that
         was set back, or was ahead then.
         """
-        is_to_come = self.entry.entry.event.at > now + CLOCKS_AGREE
+        is_to_come = self.calibrated > now + CLOCKS_AGREE
         is_old = now > self.due or is_to_come
         return is_old or (self.n_left is not None and self.n_left <= 0)
 
@@ -76,10 +79,15 @@ def due_tips(
     entries = [entry for entry in found if entry is not None]
     if not entries:
         return ()
-    swings = _swings(database, chain, min(each.entry.since for each in entries))
+    origins = [calibrating(database, each) for each in entries]
+    swings = _swings(database, chain, min(each.entry.since for each in origins))
     return tuple(
         sorted(
-            (_due_tip(each, swings, rule, library) for each in entries), key=_urgency
+            (
+                _due_tip(entry, origin, swings, rule, library)
+                for entry, origin in zip(entries, origins, strict=True)
+            ),
+            key=_urgency,
         )
     )
 
@@ -94,15 +102,20 @@ def _urgency(tip: DueTip) -> tuple[bool, datetime]:
 
 
 def _due_tip(
-    entry: Written, swings: Mapping[str, list[int]], usual: DueRule, library: Library
+    entry: Written,
+    origin: Written,
+    swings: Mapping[str, list[int]],
+    usual: DueRule,
+    library: Library,
 ) -> DueTip:
-    names = entry.entry.event.names
+    names, calibrated = entry.entry.event.names, origin.entry.event.at
     rule = library.rule_of(names.tip, usual)
     of_pen = swings.get(searchable(names.pen), [])
-    n_swings = len(of_pen) - bisect_right(of_pen, since_us(entry.entry.since))
+    n_swings = len(of_pen) - bisect_right(of_pen, since_us(origin.entry.since))
     return DueTip(
         entry,
-        rule.due(entry.entry.event.at),
+        calibrated,
+        rule.due(calibrated),
         n_swings,
         rule.max_swings - n_swings if rule.max_swings else None,
     )

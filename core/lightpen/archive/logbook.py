@@ -28,13 +28,12 @@ from lightpen.archive.accounts import (
     account_of_unreadable,
 )
 from lightpen.archive.chains import (
+    EnteredPlaces,
     append,
-    entered_places,
     entry_of_result,
     heads,
     own_chain,
     records_of,
-    searchable,
 )
 from lightpen.archive.courier import Courier
 from lightpen.archive.database import Database, open_file
@@ -46,9 +45,10 @@ from lightpen.archive.station_accounts import (
     is_station_file,
     station_files,
 )
-from lightpen.errors import FileError
+from lightpen.errors import ArchiveError, FileError
 from lightpen.formats.files import FOLDER, unreadable
 from lightpen.local_time import local_now
+from lightpen.record.acceptance import require_in_use
 from lightpen.record.assessment import Assessment
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.journal import JOURNAL, last_verdict
@@ -64,7 +64,7 @@ LONGEST_FAREWELL_S = 1.0  # that a server may hold up the end of the program
 
 
 @dataclass(frozen=True)
-class DeliveryState:
+class Delivered:
     """How far a server has what was entered.
 
     Attributes
@@ -103,7 +103,12 @@ class Logbook:
         self._results = FolderArchive(data)
         self._lock = Lock()
         self.database: Database = open_file(data / ARCHIVE)
-        self.chain = own_chain(self.database)
+        try:
+            self.chain = own_chain(self.database)
+        except ArchiveError:
+            self.database.close()
+            raise
+        self._entered = EnteredPlaces(self.database, self.chain)
         self._courier = Courier(self.database, self.chain, server) if server else None
 
     def enter_owed(
@@ -128,8 +133,8 @@ class Logbook:
             Nothing can be entered.
         """
         with self._lock:
-            entered = entered_places(self.database, self.chain)
-            owed, troubles = tuple(self._owed(entered)), []
+            self._entered.read()
+            owed, troubles = tuple(self._owed()), []
             for n_done, path in enumerate(owed):
                 report(n_done / len(owed))
                 try:
@@ -188,9 +193,12 @@ class Logbook:
         ------
         ArchiveError
             The entry put no tip in force, or it cannot be entered; it stays owed then.
+        AcceptanceError
+            The tip is retired.
         FileError
             It cannot be put in force; what was in force stays so.
         """
+        require_in_use(self._results, entry.entry.event.names.tip)
         event, record = entry.entry.event, entry.entry.event.record_sha256 or ""
         now = local_now()
         with self._lock:
@@ -204,7 +212,7 @@ class Logbook:
         self.enter_owed()
         return result
 
-    def delivery(self) -> DeliveryState | None:
+    def delivery(self) -> Delivered | None:
         """Return how far the server has what was entered; None if there is no server.
 
         Raises
@@ -216,9 +224,9 @@ class Logbook:
             return None
         n_delivered, trouble = self._courier.n_delivered, self._courier.trouble
         if n_delivered is None:
-            return DeliveryState(None, trouble)
+            return Delivered(None, trouble)
         ends = {head.chain: head.number for head in heads(self.database)}
-        return DeliveryState(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
+        return Delivered(max(0, ends.get(self.chain, 0) - n_delivered), trouble)
 
     def close(self) -> None:
         """Let go of the archive, and seal its file if nobody else has it open.
@@ -233,18 +241,18 @@ class Logbook:
                 self._courier.close(LONGEST_FAREWELL_S)
             close_sealed(self.database)
 
-    def _owed(self, entered: frozenset[str]) -> Iterator[Path]:
+    def _owed(self) -> Iterator[Path]:
         """Yield the files, and then the swings, that have no entry."""
         own = (*library_files(self._data), *station_files(self._data))
         for file in (*self._results.all_files(), *own):
-            if not self._is_in(entered, file):
+            if not self._is_entered(file):
                 yield file
         for folder in _set_aside(self._data / RECORDS):
-            if not self._is_in(entered, folder):
+            if not self._is_entered(folder):
                 yield folder
 
-    def _is_in(self, entered: frozenset[str], path: Path) -> bool:
-        return searchable(self._results.place_of(path)) in entered
+    def _is_entered(self, path: Path) -> bool:
+        return self._results.place_of(path) in self._entered
 
     def _account_of(self, path: Path) -> Account:
         if path.parent.name == LIBRARY:

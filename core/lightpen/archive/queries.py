@@ -107,6 +107,21 @@ def last_accepted(
     return None if row is None else read_row(database, row)
 
 
+def calibrating(database: Database, entry: Written) -> Written:
+    """Return the entry of the calibration whose tip an entry put in force again.
+
+    It is the entry itself if that was the calibration, or if the other is not here.
+    """
+    while entry.entry.event.kind is Kind.RESTORED:
+        found = select(*READ).where(ENTRIES.c.sha256 == entry.entry.event.concerns)
+        with database.reading() as connection:
+            row = connection.execute(found.limit(1)).one_or_none()
+        if row is None:
+            break
+        entry = read_row(database, row)
+    return entry
+
+
 def of_chain(chain: str) -> ColumnElement[bool]:
     """Return the condition that an entry is of a chain, for those few else found.
 

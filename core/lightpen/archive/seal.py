@@ -14,7 +14,7 @@ from msgspec import Meta, Struct, to_builtins
 from sqlalchemy import select
 
 from lightpen.archive.chains import heads
-from lightpen.archive.database import Database
+from lightpen.archive.database import Database, is_open
 from lightpen.archive.entries import Chain, Head
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
@@ -74,7 +74,7 @@ def close_sealed(database: Database) -> None:
         is_due = archive is not None and not _tells_of_change(database, archive)
     finally:
         database.close()
-    if archive is None or not is_due or _is_open(archive):
+    if archive is None or not is_due or is_open(archive):
         return
     seal = to_builtins(Seal(ends, sha256(archive)))
     write_whole(seal_of(archive), with_checksum(json_bytes(seal)))
@@ -134,7 +134,7 @@ def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...], seal: Seal) -> bo
     FileError
         It cannot be read.
     """
-    if _is_open(archive):
+    if is_open(archive):
         return False
     return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)
 
@@ -150,7 +150,3 @@ def _tells_of_change(database: Database, archive: Path) -> bool:
     except FileError:
         return True
     return seal is not None and bool(lost_heads(database, seal))
-
-
-def _is_open(archive: Path) -> bool:
-    return Path(f"{archive}-wal").exists()

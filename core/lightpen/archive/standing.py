@@ -25,5 +25,5 @@ def standings(
     for tip in due_tips(database, chain, rule, library):
         event = tip.entry.entry.event
         pair = event.names.pen, event.names.tip
-        in_force[pair] = InForce(event.at, tip.due, tip.is_due(now))
+        in_force[pair] = InForce(tip.calibrated, tip.due, tip.is_due(now))
     return Standings(library, in_force, now)

@@ -8,7 +8,7 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
 from lightpen.archive.chains import own_chain
-from lightpen.archive.check import SHORT, check_archive
+from lightpen.archive.check import SHORT, check_file
 from lightpen.archive.database import Database, look_into, open_file, open_server
 from lightpen.archive.entries import Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
@@ -34,8 +34,8 @@ def _check(options: argparse.Namespace) -> int:
     def run(options: argparse.Namespace) -> None:
         nonlocal has_findings
         data = _data(options)
-        with _looked_into(data) as database, progress("Checking") as report:
-            checked = check_archive(database, data, report)
+        with progress("Checking") as report:
+            checked = check_file(data / ARCHIVE, data, report)
         for finding in checked.findings:
             print(shown(str(finding)))
         has_findings = bool(checked.findings)

@@ -85,7 +85,7 @@ def accept(
         result = _stored_result(archive, record)
         if result is None:
             assessment = assess(archive, record, solution)
-            _require_in_use(archive, record)
+            require_in_use(archive, recorded_names(record).tip)
             _require_acceptable(assessment.verdict, reason)
             supervisor = _supervisor(archive.supervision(), assessment, signature)
             result = replace(
@@ -142,14 +142,19 @@ def _supervisor(
     return signature.name.strip()
 
 
-def _require_in_use(archive: Archive, record: Record) -> None:
+def require_in_use(archive: Archive, name: str) -> None:
     """Refuse a tip that was retired: whoever retired it knows why.
 
     A library that cannot be read is told of with the verdict.
+
+    Raises
+    ------
+    AcceptanceError
+        It is retired.
     """
     tip = None
     with suppress(FileError):
-        tip = archive.library().tips.get(recorded_names(record).tip)
+        tip = archive.library().tips.get(name)
     if tip is not None and tip.is_retired:
         raise AcceptanceError(
             sentence(

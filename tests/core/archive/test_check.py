@@ -11,7 +11,7 @@ import pytest
 from tests.core.archive.conftest import Station
 
 from lightpen.archive.chains import copy_entries, records_of
-from lightpen.archive.check import check_archive
+from lightpen.archive.check import check_archive, check_file
 from lightpen.archive.database import look_into
 from lightpen.archive.seal import close_sealed, seal_of
 from lightpen.errors import ArchiveError
@@ -62,6 +62,20 @@ def test_what_is_entered_during_a_check_is_no_change(station: Station) -> None:
 
     assert check_archive(station.database, None, enter).findings == ()
     assert not left
+
+
+def test_a_file_that_a_program_writes_during_a_check_is_looked_at_again(
+    archive: Path,
+) -> None:
+    whole = archive.read_bytes()
+    archive.write_bytes(whole.replace(b"Ann", b"Bob"))  # as if read half written
+    left = [whole]
+
+    def write(fraction: float) -> None:
+        if left:
+            archive.write_bytes(left.pop())
+
+    assert check_file(archive, archive.parent, write).findings == ()
 
 
 @pytest.mark.parametrize(

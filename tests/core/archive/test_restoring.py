@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -10,13 +11,17 @@ from msgspec import structs
 from tests.core.archive.test_logbook import NAMES, checked, result
 
 from lightpen.archive.chains import append, entries_of
+from lightpen.archive.due import due_tips
 from lightpen.archive.entries import Event, Kind, Written, text_sha256
 from lightpen.archive.history import lines, remarks_on
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.queries import Wanted, last_accepted
-from lightpen.errors import ArchiveError
+from lightpen.errors import AcceptanceError, ArchiveError
+from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import RECORDS, FolderArchive
+from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.names import Names
+from lightpen.record.tip_library import ItemKind, ListedTip
 
 BEA = Names("Hall 7", "Bea")
 
@@ -65,6 +70,31 @@ def test_an_older_tip_is_in_force_again_and_all_results_are_kept(
     last = last_accepted(logbook.database, "LP-04", "T-10")
     assert last is not None
     assert last.sha256 == entries(logbook)[-1].sha256 != second.sha256
+
+
+def test_a_restored_tip_is_as_old_as_its_calibration(
+    data: Path, logbook: Logbook
+) -> None:
+    first, _ = entries(logbook)
+    restored = logbook.restore(first, BEA, "The new one is bent.")
+    again = logbook.restore(entries(logbook)[1], BEA, "By mistake.")
+    logbook.restore(entries(logbook)[2], BEA, "No, it is bent.")
+
+    assert restored.accepted <= again.accepted
+    (tip,) = due_tips(logbook.database, logbook.chain, DueRule(30))
+    assert tip.entry == entries(logbook)[-1]
+    assert tip.calibrated == first.entry.event.at
+    assert tip.due == first.entry.event.at + timedelta(days=30)
+
+
+def test_a_tip_that_was_retired_is_not_restored(data: Path, logbook: Logbook) -> None:
+    now, by = entries(logbook)[0].entry.event.at, Author()
+    add_item(data, ListedTip(id="T-10"), by, now)
+    retire_item(data, ItemKind.TIP, "T-10", by, now)
+
+    with pytest.raises(AcceptanceError, match="T-10 is retired"):
+        logbook.restore(entries(logbook)[0], BEA, "The new one is bent.")
+    assert len(FolderArchive(data).all_files()) == 2
 
 
 def test_a_restored_tip_can_be_taken_back(data: Path, logbook: Logbook) -> None:

@@ -8,7 +8,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QMenu, QProgressBar, QVBoxLayout, QWidget
 
 from lightpen.archive.check import Checked
-from lightpen.archive.logbook import DeliveryState
+from lightpen.archive.logbook import Delivered
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
@@ -52,7 +52,7 @@ class ArchivePanel(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._checked: Checked | None = None
-        self._delivery: DeliveryState | None = None
+        self._delivery: Delivered | None = None
 
         # Widgets
         self._check = PushButton()
@@ -119,7 +119,7 @@ class ArchivePanel(Translated, QWidget):
         self._checked = checked
         self._retranslate()
 
-    def set_delivery(self, delivery: DeliveryState | None) -> None:
+    def set_delivery(self, delivery: Delivered | None) -> None:
         """Show how far the server has what was entered; None without a server."""
         self._delivery = delivery
         self._show_delivery()
@@ -161,7 +161,7 @@ class ArchivePanel(Translated, QWidget):
         remark = Remark("") if delivery is None else self._remark_on(delivery)
         self._delivered.set_value(remark)
 
-    def _remark_on(self, delivery: DeliveryState) -> Remark:
+    def _remark_on(self, delivery: Delivered) -> Remark:
         n_waiting, trouble = delivery.n_waiting, delivery.trouble
         if trouble is not None:
             text = self.tr(

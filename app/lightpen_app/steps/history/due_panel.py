@@ -123,7 +123,7 @@ class DuePanel(Translated, QWidget):
         self._table.set_value(Figures(columns, rows, cells))
 
     def _cells(self, tip: DueTip, now: datetime) -> tuple[str, ...]:
-        days = (tip.entry.entry.event.at, tip.due)
+        days = (tip.calibrated, tip.due)
         return (
             *(moment_text(day, "yyyy-MM-dd") for day in days),
             f"{tip.n_swings}",

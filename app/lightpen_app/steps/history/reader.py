@@ -11,7 +11,7 @@ from lightpen.archive.due import DueTip, due_tips
 from lightpen.archive.entries import Written
 from lightpen.archive.history import KnownNames, Line, known_names, lines, remarks_on
 from lightpen.archive.late_logbook import LateLogbook
-from lightpen.archive.logbook import DeliveryState
+from lightpen.archive.logbook import Delivered
 from lightpen.archive.queries import Wanted, n_wanted
 from lightpen.record.due_rule import DueRule
 from lightpen.record.tip_library import Library
@@ -31,7 +31,7 @@ class Opening:
     ----------
     first : tuple of Line
         The newest.
-    delivery : DeliveryState or None
+    delivery : Delivered or None
         How far the server has what was entered here; None if there is no server.
     """
 
@@ -39,7 +39,7 @@ class Opening:
     n_lines: int
     first: tuple[Line, ...]
     names: KnownNames
-    delivery: DeliveryState | None = None
+    delivery: Delivered | None = None
 
 
 class HistoryReader(QObject):
