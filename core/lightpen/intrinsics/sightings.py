@@ -26,6 +26,7 @@ from lightpen.arrays import FloatArray, Image
 from lightpen.detection.rim import fit_rim
 from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
 
+PARTS = (5, 4), (3, 3)  # of a chessboard, that grow; small ones may stop too soon
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
 SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
 ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
@@ -105,11 +106,15 @@ def _from_front(points: FloatArray, board: Board) -> FloatArray:
 
 
 def count_corners(image: Image) -> tuple[int, int] | None:
-    """Return how many inner corners a chessboard has; None if none is seen."""
+    """Return how many inner corners a chessboard has, the more first; None without."""
     small, _ = _smaller(_to_8_bit(image))
     flags = THOROUGH | cv2.CALIB_CB_LARGER
-    found, _, meta = cv2.findChessboardCornersSBWithMeta(small, (3, 3), flags)
-    return (int(meta.shape[1]), int(meta.shape[0])) if found else None
+    for corners in PARTS:
+        found, _, meta = cv2.findChessboardCornersSBWithMeta(small, corners, flags)
+        if found:
+            rows, columns = sorted(meta.shape[:2])
+            return int(columns), int(rows)
+    return None
 
 
 def for_search(image: Image) -> Image:
