@@ -26,7 +26,7 @@ from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.steps.verify.ring_view import RingValue, RingView
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.posture_dial import DialValue, PostureDial, field_of
-from lightpen_app.widgets.rearranged import Rearranged
+from lightpen_app.widgets.rearranged import NO_ROOM, Rearranged
 from lightpen_app.widgets.translated import Translated
 
 AXES = ("u", "v", "w")
@@ -77,6 +77,7 @@ class FixedPointFinding(Rearranged, TaskFinding):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
+        self._room = NO_ROOM  # so that its least size at first widens no window
 
         # Widgets
         self._dial = PostureDial()
