@@ -70,6 +70,18 @@
         <translation>复制另一工位所保存文件中的条目</translation>
     </message>
     <message>
+        <source>The server does not have all entries. They stay here, and are delivered when it answers. {0}</source>
+        <translation>服务器尚缺部分条目。条目保存在本机，待服务器恢复响应后送达。{0}</translation>
+    </message>
+    <message>
+        <source>The server has all entries.</source>
+        <translation>服务器已收到全部条目。</translation>
+    </message>
+    <message>
+        <source>Entries are being delivered to the server.</source>
+        <translation>正在向服务器送交条目。</translation>
+    </message>
+    <message>
         <source>{0} more were found.</source>
         <translation>另外还发现 {0} 处。</translation>
     </message>
@@ -356,6 +368,41 @@
     </message>
 </context>
 <context>
+    <name>CapabilityRow</name>
+    <message>
+        <source>Capability: tolerance</source>
+        <translation>量具能力：公差</translation>
+    </message>
+    <message>
+        <source>Tolerance of a coordinate</source>
+        <translation>单个坐标的公差</translation>
+    </message>
+    <message>
+        <source>no study</source>
+        <translation>不评定</translation>
+    </message>
+    <message>
+        <source>Tip by a better instrument</source>
+        <translation>由更精密仪器测得的测头中心</translation>
+    </message>
+    <message>
+        <source>{0} of the reference</source>
+        <translation>参考值的 {0}</translation>
+    </message>
+    <message>
+        <source>Capable: all are {0} or more.</source>
+        <translation>能力足够：各值均不小于 {0}。</translation>
+    </message>
+    <message>
+        <source>Not capable: {0} is asked for.</source>
+        <translation>能力不足：要求不小于 {0}。</translation>
+    </message>
+    <message>
+        <source>A study takes {0} to 50 repeats; these are {1}.</source>
+        <translation>评定需要 {0} 至 50 次重复，目前为 {1} 次。</translation>
+    </message>
+</context>
+<context>
     <name>DataFolderPanel</name>
     <message>
         <source>Data folder</source>
@@ -426,6 +473,36 @@
     <message>
         <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
         <translation>演示结束。您可以随意查看；演示数据不会保留。要标定测头，请不带演示启动程序。</translation>
+    </message>
+</context>
+<context>
+    <name>DriftFinding</name>
+    <message>
+        <source>Moves of the witness / mm</source>
+        <translation>监视点的位移 / mm</translation>
+    </message>
+    <message>
+        <source>A cone that stands still is the witness: what it moves by from one visit to the next counts in U of what is touched in between.</source>
+        <translation>以固定不动的锥孔作为监视点：相邻两次触测之间它的位移计入其间所测内容的 U。</translation>
+    </message>
+    <message>
+        <source>U of {0} / mm</source>
+        <translation>{0} 的 U / mm</translation>
+    </message>
+    <message>
+        <source>Visit {0}</source>
+        <translation>第 {0} 次</translation>
+    </message>
+    <message>
+        <source>Standard uncertainty by it along u, v, w: {0} mm.</source>
+        <translation>由此引起的 u、v、w 方向标准不确定度：{0} mm。</translation>
+    </message>
+</context>
+<context>
+    <name>DriftStrip</name>
+    <message>
+        <source>Touch the cone before, between and after the other tasks</source>
+        <translation>在其他任务之前、之间和之后触测锥孔</translation>
     </message>
 </context>
 <context>
@@ -1274,6 +1351,14 @@
 <context>
     <name>InterruptedPanel</name>
     <message>
+        <source>Interrupted: {0}</source>
+        <translation>中断的项目：{0}</translation>
+    </message>
+    <message>
+        <source>Interrupted verification</source>
+        <translation>中断的验证</translation>
+    </message>
+    <message>
         <source>Interrupted swings: {0}</source>
         <translation>中断的摆动：{0}</translation>
     </message>
@@ -1941,6 +2026,18 @@
 <context>
     <name>LengthStrip</name>
     <message>
+        <source>in cones</source>
+        <translation>在锥孔内</translation>
+    </message>
+    <message>
+        <source>inner faces</source>
+        <translation>内侧面</translation>
+    </message>
+    <message>
+        <source>outer faces</source>
+        <translation>外侧面</translation>
+    </message>
+    <message>
         <source>not known</source>
         <translation>未知</translation>
     </message>
@@ -1955,6 +2052,10 @@
     <message>
         <source>Its U (k = 2)</source>
         <translation>其 U (k = 2)</translation>
+    </message>
+    <message>
+        <source>Touched</source>
+        <translation>触测部位</translation>
     </message>
     <message>
         <source>Places</source>
@@ -2322,6 +2423,10 @@
 <context>
     <name>MainWindow</name>
     <message>
+        <source>The data folder is chosen at the step Start, or in the options (F10).</source>
+        <translation>数据文件夹可在“开始”步骤或选项 (F10) 中选择。</translation>
+    </message>
+    <message>
         <source>The program made a mistake of its own and goes on. All images taken so far are safe. Please send this report to its makers: {0}</source>
         <translation>程序自身出错，但会继续运行。已采集的图像全部安全。请将此报告发给开发者：{0}</translation>
     </message>
@@ -2485,6 +2590,57 @@
     <message>
         <source>rms / mm</source>
         <translation>均方根 / mm</translation>
+    </message>
+</context>
+<context>
+    <name>MonteCarloRow</name>
+    <message>
+        <source>Check by Monte Carlo</source>
+        <translation>用蒙特卡洛法检验</translation>
+    </message>
+    <message>
+        <source>Draw files, seat and noise as U counts them, and calibrate from each (JCGM 101). It takes all cores but one for some seconds to minutes.</source>
+        <translation>按 U 的计入方式抽取文件、落座和噪声，并逐次重新标定（JCGM 101）。将占用除一个以外的所有处理器核心，历时数秒至数分钟。</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <source>Trials</source>
+        <translation>试验次数</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>进度</translation>
+    </message>
+    <message>
+        <source>U by Monte Carlo beside the budget</source>
+        <translation>蒙特卡洛法与不确定度预算的 U 对照</translation>
+    </message>
+    <message>
+        <source>It is for the swing of one camera.</source>
+        <translation>仅适用于单相机的摆动。</translation>
+    </message>
+    <message>
+        <source>{0} trials gave a tip, {1} did not.</source>
+        <translation>{0} 次试验求得测头中心，{1} 次未求得。</translation>
+    </message>
+    <message>
+        <source>U (k = 2) by Monte Carlo / µm</source>
+        <translation>蒙特卡洛法的 U (k = 2) / µm</translation>
+    </message>
+    <message>
+        <source>known to (k = 1) / µm</source>
+        <translation>其自身精度 (k = 1) / µm</translation>
+    </message>
+    <message>
+        <source>U (k = 2) by the budget / µm</source>
+        <translation>预算的 U (k = 2) / µm</translation>
+    </message>
+    <message>
+        <source>budget less Monte Carlo, in what so many trials know</source>
+        <translation>预算减蒙特卡洛，以其自身精度为单位</translation>
     </message>
 </context>
 <context>
@@ -2700,6 +2856,73 @@
     </message>
 </context>
 <context>
+    <name>PenPanel</name>
+    <message>
+        <source>Improve the LED file</source>
+        <translation>改进 LED 文件</translation>
+    </message>
+    <message>
+        <source>Pool the newest swings; the last one has to confirm what comes of them. The old file stays.</source>
+        <translation>合并最近的几次摆动，并须由最后一次加以证实。旧文件保留不变。</translation>
+    </message>
+    <message>
+        <source>Cancel</source>
+        <translation>取消</translation>
+    </message>
+    <message>
+        <source>Use the new file</source>
+        <translation>使用新文件</translation>
+    </message>
+    <message>
+        <source>Progress</source>
+        <translation>进度</translation>
+    </message>
+    <message>
+        <source>LEDs since the first swing / µm, size of the pen / ppm</source>
+        <translation>自首次摆动以来各 LED 的位移 / µm，光笔尺寸变化 / ppm</translation>
+    </message>
+    <message>
+        <source>LEDs since the first swing / mm</source>
+        <translation>自首次摆动以来各 LED 的位移 / mm</translation>
+    </message>
+    <message>
+        <source>swing no.</source>
+        <translation>摆动序号</translation>
+    </message>
+    <message>
+        <source>The swings of the pen are being read.</source>
+        <translation>正在读取该光笔的摆动。</translation>
+    </message>
+    <message>
+        <source>Two accepted swings with this LED file are needed to tell how pen {0} changes; there are {1}.</source>
+        <translation>判断光笔 {0} 的变化需要两次使用此 LED 文件并已接受的摆动，目前有 {1} 次。</translation>
+    </message>
+    <message>
+        <source>Swings with another LED file, or that cannot be read: {0}.</source>
+        <translation>使用其他 LED 文件或无法读取的摆动：{0} 次。</translation>
+    </message>
+    <message>
+        <source>Nothing is read yet.</source>
+        <translation>尚未读取任何内容。</translation>
+    </message>
+    <message>
+        <source>It takes four accepted swings with this LED file and camera file; {0} more.</source>
+        <translation>需要四次使用此 LED 文件和相机文件并已接受的摆动，还差 {0} 次。</translation>
+    </message>
+    <message>
+        <source>An LED has moved: no file is right for all swings.</source>
+        <translation>有 LED 发生了移位：没有一个文件适用于所有摆动。</translation>
+    </message>
+    <message>
+        <source>Written as {0}: the swing held out fits it to {1} px, the old file to {2} px. A tip belongs to its LED file: calibrate again with the new one.</source>
+        <translation>已写入 {0}：留出的摆动与新文件相差 {1} px，与旧文件相差 {2} px。测头与其 LED 文件对应：请用新文件重新标定。</translation>
+    </message>
+    <message>
+        <source>size</source>
+        <translation>尺寸</translation>
+    </message>
+</context>
+<context>
     <name>PenView</name>
     <message>
         <source>The LEDs appear here.</source>
@@ -2858,6 +3081,10 @@
     <message>
         <source>Differences</source>
         <translation>差值</translation>
+    </message>
+    <message>
+        <source>Postures of the images that are used</source>
+        <translation>所用图像的姿态</translation>
     </message>
     <message>
         <source>{0} of {1} images used</source>
@@ -3156,18 +3383,6 @@
     <message>
         <source>Leave it in force</source>
         <translation>保持生效</translation>
-    </message>
-    <message>
-        <source>The tip is copied: x, y, z in mm.</source>
-        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
-    </message>
-    <message>
-        <source>Folder to save in</source>
-        <translation>保存到的文件夹</translation>
-    </message>
-    <message>
-        <source>Saved in {0}</source>
-        <translation>已保存到 {0}</translation>
     </message>
     <message>
         <source>The tip shows here once the pen is swung.</source>
@@ -3719,6 +3934,18 @@
         <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
     </message>
     <message>
+        <source>The verification is being read.</source>
+        <translation>正在读取验证。</translation>
+    </message>
+    <message>
+        <source>The verification is being closed.</source>
+        <translation>正在结束验证。</translation>
+    </message>
+    <message>
+        <source>Closed as abandoned; see History.</source>
+        <translation>已作为放弃结束，见“历史”。</translation>
+    </message>
+    <message>
         <source>A swing is under way.</source>
         <translation>正在摆动。</translation>
     </message>
@@ -4226,6 +4453,21 @@
     </message>
 </context>
 <context>
+    <name>TakingAlong</name>
+    <message>
+        <source>The tip is copied: x, y, z in mm.</source>
+        <translation>已复制测头坐标：x、y、z，单位 mm。</translation>
+    </message>
+    <message>
+        <source>Folder to save in</source>
+        <translation>保存到的文件夹</translation>
+    </message>
+    <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
+    </message>
+</context>
+<context>
     <name>TaskPanel</name>
     <message>
         <source>Recorded images...</source>
@@ -4242,6 +4484,17 @@
     <message>
         <source>Do this task again; what it found before is kept.</source>
         <translation>重做该项；先前得到的结果保留。</translation>
+    </message>
+</context>
+<context>
+    <name>TipPicture</name>
+    <message>
+        <source>Picture of the tip</source>
+        <translation>测头图片</translation>
+    </message>
+    <message>
+        <source>No picture</source>
+        <translation>无图片</translation>
     </message>
 </context>
 <context>
@@ -4349,6 +4602,49 @@
     </message>
 </context>
 <context>
+    <name>VerificationRow</name>
+    <message>
+        <source>Close it as abandoned? All that is kept of it stays.</source>
+        <translation>作为放弃结束？已保存的内容均保留。</translation>
+    </message>
+    <message>
+        <source>Continue</source>
+        <translation>继续</translation>
+    </message>
+    <message>
+        <source>Continue the verification of {0}</source>
+        <translation>继续 {0} 的验证</translation>
+    </message>
+    <message>
+        <source>Close it</source>
+        <translation>结束</translation>
+    </message>
+    <message>
+        <source>Close the verification of {0}</source>
+        <translation>结束 {0} 的验证</translation>
+    </message>
+    <message>
+        <source>Keep</source>
+        <translation>保留</translation>
+    </message>
+    <message>
+        <source>Keep the verification of {0}</source>
+        <translation>保留 {0} 的验证</translation>
+    </message>
+    <message>
+        <source>Damaged: {0}</source>
+        <translation>已损坏：{0}</translation>
+    </message>
+    <message>
+        <source>d MMM yyyy, hh:mm</source>
+        <translation>yyyy年M月d日 hh:mm</translation>
+    </message>
+    <message>
+        <source>verification, {0} of {1} tasks</source>
+        <translation>验证，已完成 {0} / {1} 项任务</translation>
+    </message>
+</context>
+<context>
     <name>VerifyPage</name>
     <message>
         <source>Verify</source>
@@ -4447,6 +4743,10 @@
         <translation>各项</translation>
     </message>
     <message>
+        <source>Pen</source>
+        <translation>光笔</translation>
+    </message>
+    <message>
         <source>Live image</source>
         <translation>实时图像</translation>
     </message>
@@ -4500,6 +4800,10 @@
     <message>
         <source>Postures</source>
         <translation>姿态</translation>
+    </message>
+    <message>
+        <source>Witness</source>
+        <translation>监视点</translation>
     </message>
     <message>
         <source>left out</source>
@@ -4596,6 +4900,10 @@
     <message>
         <source>Another posture</source>
         <translation>换一个姿态</translation>
+    </message>
+    <message>
+        <source>Touch the cone upright</source>
+        <translation>光笔竖直，触测锥孔</translation>
     </message>
     <message>
         <source>The other end</source>
@@ -4734,6 +5042,10 @@
         <translation>固定点的散布为 {of_point:.4f} mm，而各次标定的测头仅散布 {of_tip:.4f} mm。测头是稳定的：锥孔或相机在触测之间移动，测头没有停稳在锥孔中，或每次触测的图像太少。</translation>
     </message>
     <message>
+        <source>A name, the images of the camera or a file is missing. Choose what the steps say, and go on with the verification then.</source>
+        <translation>缺少名称、相机图像或文件。请按各步骤的提示选择，然后继续验证。</translation>
+    </message>
+    <message>
         <source>A pen is written as .csv or .json, but {name} ends in neither. Choose such a name.</source>
         <translation>光笔以 .csv 或 .json 保存，但 {name} 的结尾两者都不是。请选择这样的名称。</translation>
     </message>
@@ -4744,6 +5056,10 @@
     <message>
         <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
         <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个有证书的标准长度。</translation>
+    </message>
+    <message>
+        <source>All images of one camera had been held up on their way, so that the last pairs are of moments {moved:.0f} ms apart. From now on they are paired rightly. Images that do not fit are left out of the result: look at them in Review, or begin the swing again.</source>
+        <translation>一台相机的所有图像都在传输途中被延误，因此最近的图像对实际相差 {moved:.0f} ms。从现在起配对正确。不相符的图像不会计入结果：请在“复核”中查看，或重新开始摆动。</translation>
     </message>
     <message>
         <source>All of them were taken, so the tip lies between both.</source>
@@ -4776,6 +5092,14 @@
     <message>
         <source>Another program uses the simulated camera {serial}. Close that program, or wait a few seconds.</source>
         <translation>另一个程序正在使用模拟相机 {serial}。请关闭该程序，或稍等几秒。</translation>
+    </message>
+    <message>
+        <source>Another verification is under way. Finish it or start over, then go on with the interrupted one.</source>
+        <translation>另一次验证正在进行。请先完成或重新开始，再继续中断的验证。</translation>
+    </message>
+    <message>
+        <source>Another window has the verification of {file}. Go on with it there, or close that window and try again.</source>
+        <translation>另一窗口正在进行 {file} 的验证。请在那里继续，或关闭该窗口后重试。</translation>
     </message>
     <message>
         <source>Aravis is not installed. It drives GigE Vision and USB3 Vision cameras on Linux: apt-get install libaravis-0.8-0</source>
@@ -4870,6 +5194,10 @@
         <translation>链 {chain} 的第 {number} 个条目被改动过。</translation>
     </message>
     <message>
+        <source>Entry {number} of the chain {chain} was there when the archive was closed, and is not any more: entries were removed, or the archive was replaced.</source>
+        <translation>链 {chain} 的第 {number} 条在档案关闭时存在，现已不存在：有条目被删除，或档案被替换。</translation>
+    </message>
+    <message>
         <source>Entry {number} put no tip in force. Choose one that did.</source>
         <translation>条目 {number} 未使任何测头数据生效。请选择使测头数据生效的条目。</translation>
     </message>
@@ -4888,6 +5216,10 @@
     <message>
         <source>Harvesters is not installed. With the GenTL producer of its vendor it drives any GenICam camera: {python} -m pip install harvesters genicam</source>
         <translation>未安装 Harvesters。它通过厂商的 GenTL 生产者驱动任何 GenICam 相机：{python} -m pip install harvesters genicam</translation>
+    </message>
+    <message>
+        <source>Has the camera moved? Touch the cone {needed} times with the pen upright, and lift the tip in between: {n_touches} of {needed}. Visit {visit} of {n_visits}.</source>
+        <translation>相机是否移动？请使光笔竖直，触测锥孔 {needed} 次，每次之间抬起测头：{n_touches} / {needed}。第 {visit} / {n_visits} 次监视。</translation>
     </message>
     <message>
         <source>Hold it so that the camera sees its LEDs.</source>
@@ -5142,6 +5474,10 @@
         <translation>下一步：清洁测头和标准件，夹紧标准件和相机，然后重新验证。</translation>
     </message>
     <message>
+        <source>Next: hold the pen alike at each visit, take more images of a touch, or bring the camera nearer.</source>
+        <translation>下一步：每次触测监视点时以相同姿态握持光笔，增加每次触测的图像数，或将相机移近。</translation>
+    </message>
+    <message>
         <source>Next: look at the pen, fix the LED, and measure the LEDs again.</source>
         <translation>下一步：检查光笔，固定该 LED，并重新测量各 LED。</translation>
     </message>
@@ -5220,6 +5556,10 @@
     <message>
         <source>None of the {n_images} images shows the board {board}. The whole board must be in the image, sharp, with a bright rim round it; check its kind and count.</source>
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
+    </message>
+    <message>
+        <source>Nothing can be kept in the data folder {folder}: {reason}</source>
+        <translation>数据文件夹 {folder} 中无法保存任何内容：{reason}</translation>
     </message>
     <message>
         <source>Nothing is chosen to be touched. Choose the fixed point, the ring or the length.</source>
@@ -5336,10 +5676,6 @@
     <message>
         <source>The LEDs stand in a line within {off_line:.2f} mm over {extent:.0f} mm, so a turn about it could not be seen. At least one LED must stand {needed:.1f} mm off the line.</source>
         <translation>LED 在 {extent:.0f} mm 长度内偏离直线不超过 {off_line:.2f} mm，因此看不出绕该直线的转动。至少有一个 LED 须偏离直线 {needed:.1f} mm。</translation>
-    </message>
-    <message>
-        <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database.</source>
-        <translation>无法识别档案库服务器的地址。其格式为 postgresql://user:password@host/database。</translation>
     </message>
     <message>
         <source>The archive cannot be exported to {file}: {reason}. Free some space, or choose another folder.</source>
@@ -5474,10 +5810,6 @@
         <translation>摆动期间锥孔相对相机移动了 {distance:.4f} mm。请将两者夹紧，待相机预热后重做。该影响已计入不确定度。</translation>
     </message>
     <message>
-        <source>The diameter of the ball is not known, which a ring touched in its bore or from outside needs. Enter it where the tip is named.</source>
-        <translation>测球直径未知，而在孔内或外圆触测圆环时需要它。请在填写测头名称处输入。</translation>
-    </message>
-    <message>
         <source>The difference from the tip that was in force before is accepted up to {gate:g} times U (k = 2) of the difference along each axis, with which an unchanged tip is accepted in 95 % of all cases; beyond it, or where that tip cannot be read, is CHECK. A CHECK is put in force only with a reason, a REPEAT not at all.</source>
         <translation>与此前生效的测头之差，各轴均不超过该差值 U (k = 2) 的 {gate:g} 倍时予以接受；测头未变时，按此准则接受的概率为 95 %。超出此值，或无法读取此前的测头时，判为“需检查”。判为“需检查”的测头须注明理由才能生效，判为“重做”的不得生效。</translation>
     </message>
@@ -5528,10 +5860,6 @@
     <message>
         <source>The fixed point is done: this touch of the cone does not count. Touch the ring.</source>
         <translation>固定点已完成：这次对锥孔的触测不计入。请触测圆环。</translation>
-    </message>
-    <message>
-        <source>The folder {folder} cannot be made or read: {reason}. Choose another folder.</source>
-        <translation>文件夹 {folder} 无法创建或读取：{reason}。请选择其他文件夹。</translation>
     </message>
     <message>
         <source>The folder {folder} cannot be made: {reason}. Make sure that it is yours to write.</source>
@@ -5978,16 +6306,8 @@
         <translation>文件 {file} 已存在。请为导出文件另取名称。</translation>
     </message>
     <message>
-        <source>There is no archive {file}. Check the data folder.</source>
-        <translation>档案库 {file} 不存在。请检查数据文件夹。</translation>
-    </message>
-    <message>
         <source>There is no camera {place}{why}. Check its power, its cable and its address, then search again.</source>
         <translation>没有相机 {place}{why}。请检查电源、线缆和地址，然后重新搜索。</translation>
-    </message>
-    <message>
-        <source>There is no supervisor&apos;s password yet. Lay one down with the limits.</source>
-        <translation>尚无主管密码。请与限值一起规定。</translation>
     </message>
     <message>
         <source>There is no {kind} {id} in the library. Add it first.</source>
@@ -6222,8 +6542,16 @@
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
     </message>
     <message>
+        <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database, with %40 for an @ in the password.</source>
+        <translation>无法读取档案服务器的地址。其格式为 postgresql://user:password@host/database，口令中的 @ 写作 %40。</translation>
+    </message>
+    <message>
         <source>The adjustment did not settle in {n_steps} steps: the views are too alike, or of another board than was said. Add views with the board tilted by 20 to 40 degrees to each side, and reaching into each corner of the image; if there are some, count and measure its squares again.</source>
         <translation>平差在 {n_steps} 步内未收敛:视图过于相似,或标定板与所述不符。请补充标定板向各侧倾斜 20 至 40 度、并到达图像各角的视图;若已有这样的视图,请重新清点并测量其方格。</translation>
+    </message>
+    <message>
+        <source>The archive {name} is held by another program, for more than {seconds} s now. Let that one finish, or end it, and try again.</source>
+        <translation>档案 {name} 被另一程序占用已超过 {seconds} s。请等该程序完成或将其结束，然后重试。</translation>
     </message>
     <message>
         <source>The axis of the stylus is uncertain by {uncertainty:.1f} degrees, at most {needed:.1f} are of use: the pen was tilted while it was spun. Hold the stylus upright between two fingers and turn only.</source>
@@ -6236,6 +6564,22 @@
     <message>
         <source>The camera moved: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much, which its U counts.</source>
         <translation>相机移动过：视野中固定的灯在光笔处偏移了 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。所测各点偏差与此相当，已计入其 U。</translation>
+    </message>
+    <message>
+        <source>The diameter of the ball is not known, which a ring or a length touched at its faces needs. Enter it where the tip is named.</source>
+        <translation>测球直径未知，而触测圆环或长度的表面时需要它。请在命名测头处输入。</translation>
+    </message>
+    <message>
+        <source>The folder {folder} cannot be made or read: {reason}</source>
+        <translation>文件夹 {folder} 无法创建或读取：{reason}</translation>
+    </message>
+    <message>
+        <source>The pen leans otherwise than at the first visit, so this touch does not count. Hold it as then: what is not known of the pen then moves all visits alike.</source>
+        <translation>光笔的倾斜与首次触测监视点时不同，此次触测不计入。请保持与当时相同的姿态：这样光笔的未知误差对各次触测的影响相同。</translation>
+    </message>
+    <message>
+        <source>The picture {path} is not the one that was kept. Keep it again.</source>
+        <translation>图片 {path} 已不是当初保存的那张。请重新保存。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -6338,6 +6682,18 @@
         <translation>平移似乎以米为单位：若按毫米计，其长度只有 {typical:.3f} mm（中位数）。需要毫米：请将 tx、ty、tz 乘以 1000。</translation>
     </message>
     <message>
+        <source>The verification was begun with another file of the camera or of the LEDs than is chosen now. Choose that file, and go on with it.</source>
+        <translation>该验证开始时使用的相机文件或 LED 文件与当前选择的不同。请选择当时的文件，然后继续。</translation>
+    </message>
+    <message>
+        <source>The verification was of {result}, and another result is in force for tip {tip} of pen {pen} by now. Close the verification, and begin another one.</source>
+        <translation>该验证针对 {result}，而光笔 {pen} 的测头 {tip} 现已有其他结果生效。请结束该验证并重新开始。</translation>
+    </message>
+    <message>
+        <source>The video {path} cannot be decoded within {most:.0f} MB. Save its frames as images.</source>
+        <translation>视频 {path} 无法在 {most:.0f} MB 内存内解码。请将其各帧另存为图像。</translation>
+    </message>
+    <message>
         <source>The video {path} cannot be opened, or holds no frames. Check that it plays, or save its frames as images.</source>
         <translation>视频 {path} 无法打开，或没有帧。请检查能否播放，或把各帧保存为图像。</translation>
     </message>
@@ -6348,6 +6704,10 @@
     <message>
         <source>The video {path} is coded as {codec}, which is not read here. Save it with FFV1 or MJPG, or save its frames as images.</source>
         <translation>视频 {path} 的编码为 {codec}，此处不支持。请以 FFV1 或 MJPG 编码保存，或将各帧另存为图像。</translation>
+    </message>
+    <message>
+        <source>The witness stays within {distance:.4f} mm, but U of it is {uncertainty:.4f} mm, more than the limit of {limit:.4f} mm: a move of that size would not show.</source>
+        <translation>监视点的位移不超过 {distance:.4f} mm，但其 U 为 {uncertainty:.4f} mm，大于限值 {limit:.4f} mm：这样大小的位移无法察觉。</translation>
     </message>
     <message>
         <source>The {what} of recorded images cannot be changed. Choose a live camera.</source>
@@ -6390,12 +6750,20 @@
         <translation>{what} {path} 不是文本：第 {line} 行含有控制字符 {character}。请检查是否选对了文件，或另存为 UTF-8。</translation>
     </message>
     <message>
+        <source>There is no archive {file}, or nothing was entered in it yet. Check the data folder.</source>
+        <translation>没有档案 {file}，或其中尚无任何条目。请检查数据文件夹。</translation>
+    </message>
+    <message>
         <source>There is no display to open a window on. Start the program at a screen, or give a command; lightpen --help lists them.</source>
         <translation>没有可以打开窗口的显示器。请在屏幕前启动程序，或给出命令；用 lightpen --help 查看命令。</translation>
     </message>
     <message>
         <source>There is no folder, video or image at {place}. Check the name.</source>
         <translation>{place} 处没有文件夹、视频或图像。请检查名称。</translation>
+    </message>
+    <message>
+        <source>There is no supervisor&apos;s password yet. Type one at Start, where all limits of the station are.</source>
+        <translation>尚无主管密码。请在“开始”步骤的全部限值处设置。</translation>
     </message>
     <message>
         <source>This computer is too slow: {n_missed} of {n_offered} images were not measured. Close other programs, or the swing takes longer.</source>
@@ -6504,6 +6872,10 @@
     <message>
         <source>file of LED centres</source>
         <translation>LED 中心文件</translation>
+    </message>
+    <message>
+        <source>file of a verification under way</source>
+        <translation>进行中的验证的文件</translation>
     </message>
     <message>
         <source>file of the tip library</source>
@@ -6626,6 +6998,10 @@
         <translation>已剔除</translation>
     </message>
     <message>
+        <source>the LED centres, which are off alike whenever the pen leans alike. Focus the lens, light the LEDs evenly, and state how far off they are left</source>
+        <translation>LED 中心，光笔姿态相同时其偏差也相同。请对焦镜头，使 LED 发光均匀，并给出剩余的偏差</translation>
+    </message>
+    <message>
         <source>the LED file. Measure the LEDs better, and state how well</source>
         <translation>LED 文件。请更精确地测量 LED，并给出其不确定度</translation>
     </message>
@@ -6682,12 +7058,12 @@
         <translation>光笔的 {axis} 轴</translation>
     </message>
     <message>
-        <source>the scale of the LED file. State its uncertainty in the file, and measure where the pen is used</source>
-        <translation>LED 文件的尺度。请在文件中给出其不确定度，并在使用光笔的环境中测量</translation>
-    </message>
-    <message>
         <source>the program failed on it</source>
         <translation>程序处理出错</translation>
+    </message>
+    <message>
+        <source>the scale of the LED file. Have the LEDs measured by a better length, and state how well, or swing in two cones at a known distance</source>
+        <translation>LED 文件的尺度。请用更准确的长度标准测量 LED 并给出其不确定度，或在间距已知的两个锥孔中摆动</translation>
     </message>
     <message>
         <source>the scatter of the poses, and that it hangs together from pose to pose</source>
@@ -6848,6 +7224,10 @@
     <message>
         <source>{entry} in {name} must hold {needed} numbers, none of them negative: of fx fy cx cy and the {n_coefficients} distortion coefficients. Correct or remove it.</source>
         <translation>{name} 中的 {entry} 必须含 {needed} 个非负数：fx fy cx cy 以及 {n_coefficients} 个畸变系数。请改正或删除。</translation>
+    </message>
+    <message>
+        <source>{file} is damaged: the verification that it is of cannot be gone on with. The images of its touches stay where they are.</source>
+        <translation>{file} 已损坏：无法继续它所属的验证。其触测图像保留在原处。</translation>
     </message>
     <message>
         <source>{folder} holds images of a swing, but no {name}. Restore this file from a copy, or move the folder away.</source>
@@ -7598,6 +7978,10 @@
     <message>
         <source>Images are</source>
         <translation>图像来源</translation>
+    </message>
+    <message>
+        <source>What stands as [U+...] is the Unicode number of a character that the fonts of this paper do not have.</source>
+        <translation>以 [U+...] 表示的是本记录字体所缺字符的 Unicode 编码。</translation>
     </message>
     <message>
         <source>Temperature of the pen</source>
@@ -8455,6 +8839,13 @@
     <message>
         <source>Cone {0}</source>
         <translation>锥孔{0}</translation>
+    </message>
+</context>
+<context>
+    <name>words</name>
+    <message>
+        <source>, </source>
+        <translation>，</translation>
     </message>
 </context>
 </TS>
