@@ -2042,8 +2042,8 @@
         <translation>未知</translation>
     </message>
     <message>
-        <source>Touch both ends of a length</source>
-        <translation>触测长度的两端</translation>
+        <source>Touch both ends</source>
+        <translation>触测长度两端</translation>
     </message>
     <message>
         <source>Certified length</source>
@@ -4804,10 +4804,6 @@
     <message>
         <source>Witness</source>
         <translation>监视点</translation>
-    </message>
-    <message>
-        <source>left out</source>
-        <translation>不做</translation>
     </message>
     <message>
         <source>now</source>

@@ -261,7 +261,7 @@ class LengthStrip(TaskStrip):
             self._surface.setItemText(index, name)
         self._length.setSpecialValueText(self.tr("not known"))
         return (
-            self.tr("Touch both ends of a length"),
+            self.tr("Touch both ends"),
             self.tr("Certified length"),
             self.tr("Its U (k = 2)"),
             self.tr("Touched"),

@@ -102,7 +102,7 @@ class VerifyWords(QObject):
         return text
 
     def tab(self, kind: TaskKind, status: VerificationStatus) -> str:
-        """Return the name of a task, and how far it is."""
+        """Return the name of a task, and how far it is if it is to be done."""
         name = {
             TaskKind.FIXED_POINT: self.tr("Fixed point"),
             TaskKind.CIRCLE: self.tr("Ring"),
@@ -115,7 +115,7 @@ class VerifyWords(QObject):
         if found is not None:
             far = grade_text(found.assessment.grade)
         elif not is_chosen:
-            far = self.tr("left out")
+            return name
         elif kind is status.task:
             far = self.tr("now")
         else:
