@@ -1,6 +1,5 @@
 """From images to observations: the LED centres of every image, and what was dropped."""
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -29,7 +28,6 @@ from lightpen.model.pen import Pen
 from lightpen.sentences import Sentence, sentence
 
 LABELLED_AT_ONCE = 64  # images; labelling is vectorised over them
-SEARCH_MEMORY = 250_000_000  # bytes that all threads take
 SEARCH_MEMORY_A_PIXEL = 5  # bytes: 16 bits, twice, and what is saturated
 
 Report = Callable[[float], None]
@@ -125,7 +123,7 @@ def observe_images(
     labelled: list[tuple[_Searched, Sighting]] = []
     n_images = len(source.names)
     search = partial(_search, camera=camera, mask=mask)
-    for image in look_at_all(source, search, n_threads or _most_threads(camera)):
+    for image in look_at_all(source, search, SEARCH_MEMORY_A_PIXEL, n_threads):
         searched.append(image)
         n_done = len(labelled) + len(searched)
         if len(searched) == LABELLED_AT_ONCE or n_done == n_images:
@@ -181,11 +179,6 @@ def leave_out(
         if kept[index] is Reason.NONE:
             kept[index] = reason
     return replace(observations, reasons=tuple(kept))
-
-
-def _most_threads(camera: Camera) -> int:
-    of_an_image = SEARCH_MEMORY_A_PIXEL * camera.width * camera.height
-    return max(min(os.cpu_count() or 1, SEARCH_MEMORY // of_an_image), 1)
 
 
 def _search(

@@ -1,6 +1,7 @@
 """Images from a folder, a pattern or a video, decoded one by one."""
 
 import glob
+import os
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ from lightpen.arrays import Image
 from lightpen.errors import FileError
 from lightpen.formats.decoding import keep_freed_memory, read_image
 from lightpen.formats.files import printable, unreadable
+from lightpen.formats.memory_room import MemoryRoom
 from lightpen.formats.video_process import count_frames, frame_loaders
 from lightpen.sentences import sentence
 
@@ -21,6 +23,7 @@ SUFFIXES = (".png", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg", ".pgm", ".webp")
 VIDEO_SUFFIXES = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".mpg", ".mpeg", ".webm")
 IMAGE_FOLDER = "images"
 IN_FLIGHT = 4  # images per thread that may wait in memory
+WORK_MEMORY = 250_000_000  # bytes that all threads take
 
 Seen = TypeVar("Seen")
 
@@ -46,7 +49,10 @@ class ImageSource:
 
 
 def look_at_all(
-    source: ImageSource, look: Callable[[Callable[[], Image]], Seen], n_threads: int
+    source: ImageSource,
+    look: Callable[[Callable[[], Image]], Seen],
+    memory_a_pixel: int,
+    n_threads: int | None = None,
 ) -> Iterator[Seen]:
     """Look at all images in threads, and yield what each shows in their order.
 
@@ -56,12 +62,28 @@ def look_at_all(
     ----------
     look : callable
         Takes the loader of an image; what it raises ends the looking.
+    memory_a_pixel : int
+        bytes that looking takes; so many threads look at once as have `WORK_MEMORY`.
+    n_threads : int, optional
+        At most; by default as many as there are processors.
     """
     keep_freed_memory()
+    room = MemoryRoom(WORK_MEMORY)
+
+    def look_in_room(load: Callable[[], Image]) -> Seen:
+        def loaded() -> Image:
+            image = load()
+            room.note(memory_a_pixel * image.size)
+            return image
+
+        with room.one():
+            return look(loaded)
+
+    n_threads = n_threads or os.cpu_count() or 1
     with ThreadPoolExecutor(n_threads) as executor:
         waiting: deque[Future[Seen]] = deque()
         for load in source.open():
-            waiting.append(executor.submit(look, load))
+            waiting.append(executor.submit(look_in_room, load))
             if len(waiting) >= IN_FLIGHT * n_threads:
                 yield waiting.popleft().result()
         while waiting:

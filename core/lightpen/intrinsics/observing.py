@@ -1,6 +1,5 @@
 """From images to views of a board, and why it is not seen where it is not."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,6 +17,7 @@ from lightpen.intrinsics.sightings import count_corners, find_points, for_search
 from lightpen.intrinsics.views import Views
 from lightpen.sentences import Sentence, sentence
 
+MEMORY_A_PIXEL = 5  # bytes: 16 bits, its 8, and what is made of them
 EXAMINED = 3  # images in which a board is looked for that is another
 OTHER_LAYOUT = {
     BoardKind.CHARUCO: BoardKind.LEGACY_CHARUCO,
@@ -79,12 +79,11 @@ def observe_board_of_rig(
         As `observe_board`.
     """
     n_images = sum(len(source.names) for source in sources)
-    n_threads = os.cpu_count() or 1
     looks: list[list[_Look]] = []
     n_done = 0
     for source in sources:
         own: list[_Look] = []
-        for seen in look_at_all(source, partial(_look, board=board), n_threads):
+        for seen in look_at_all(source, partial(_look, board=board), MEMORY_A_PIXEL):
             if own and seen.size != own[0].size:
                 raise _other_size(source.names[0], own[0], source.names[len(own)], seen)
             own.append(seen)

@@ -29,6 +29,7 @@ from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_diction
 PARTS = (5, 4), (3, 3)  # of a chessboard, that grow; small ones may stop too soon
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
 SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
+MARKED_WHOLE = 12_000_000  # px; in larger images markers are searched smaller
 ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
 REFINED = 0.4  # of the distance of neighbours: no other edge is that near
 MIN_REFINED, MAX_REFINED = 2, 11  # px to each side
@@ -133,11 +134,13 @@ def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
 def _smaller(grey: npt.NDArray[np.uint8]) -> tuple[Any, float]:
     """Return an image to be searched, and its scale."""
     scale = min(1.0, SEARCHED / max(grey.shape))
-    if scale == 1.0:
-        return grey, scale
-    return cv2.resize(
-        grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA
-    ), scale
+    return _shrunk(grey, scale), scale
+
+
+def _shrunk(grey: npt.NDArray[np.uint8], scale: float) -> Any:
+    if scale >= 1.0:
+        return grey
+    return cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
 
 
 def _whole(points: Any, scale: float) -> FloatArray:
@@ -186,7 +189,12 @@ def _is_even(points: Any, corners: tuple[int, int]) -> bool:
 def _marked(
     grey: npt.NDArray[np.uint8], board: Board, *, quick: bool
 ) -> FloatArray | None:
-    points = _by_markers(grey, board)
+    shrunk = _shrunk(grey, (MARKED_WHOLE / grey.size) ** 0.5)
+    points = _by_markers(shrunk, board)
+    if shrunk is not grey:
+        return (
+            None if points is None else _whole(points, shrunk.shape[1] / grey.shape[1])
+        )
     is_whole = points is not None and bool(np.isfinite(points).all())
     if quick or is_whole or grey.size > ENLARGED:
         return points

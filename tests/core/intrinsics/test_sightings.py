@@ -9,7 +9,7 @@ from lightpen.errors import CalibrationError, FileError
 from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.observing import observe_board
-from lightpen.intrinsics.sightings import count_corners, find_points
+from lightpen.intrinsics.sightings import MARKED_WHOLE, count_corners, find_points
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
@@ -81,6 +81,22 @@ def test_twelve_bits_tell_no_less_than_eight() -> None:
     flat = find_points(image_of(board), board)
 
     assert error_of(deep, board) < 1.1 * error_of(flat, board)
+
+
+@pytest.mark.parametrize(
+    "word", ["charuco:7x5:20:14:DICT_4X4_50", "markers:4x3:30:8:DICT_4X4_50"]
+)
+def test_markers_in_a_very_large_image_are_found_in_a_smaller_one(word: str) -> None:
+    board = parse_board(word)
+    seen = cv2.resize(image_of(board), None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+    large = np.full((4000, 6000), 60, dtype=np.uint8)
+    x, y = 1500, 1000
+    large[y : y + seen.shape[0], x : x + seen.shape[1]] = seen
+    assert large.size > MARKED_WHOLE
+    points = find_points(large, board)
+
+    assert points is not None
+    assert error_of((points - (x, y) + 0.5) / 2 - 0.5, board) < LIMITS[word]
 
 
 def test_a_charuco_board_that_is_partly_hidden_is_found() -> None:
