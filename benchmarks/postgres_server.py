@@ -5,6 +5,7 @@ import secrets
 import shutil
 import socket
 import subprocess
+import sys
 from pathlib import Path
 
 PASSWORD = "a-secret-of-the-plant"
@@ -13,6 +14,8 @@ START_S = 60.0  # on a machine that does other things besides
 
 def postgres_programs() -> Path | None:
     """Return the folder of its programs, as Debian installs them; None without any."""
+    if sys.platform == "win32":
+        return None
     programs = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
     return programs[-1].parent if programs else None
 

@@ -26,7 +26,7 @@ from installer.places import IS_WINDOWS, ROOT
 TOOLS = {
     *("hypothesis", "sortedcontainers", "filelock", "fonttools", "iniconfig"),
     *("execnet", "packaging", "pluggy", "pygments", "pytest", "pytest-qt"),
-    *("pytest-timeout", "pytest-xdist"),
+    *("pytest-timeout", "pytest-xdist", "xmlschema", "elementpath"),
 }
 USUAL = ("tests/core", "-q", "-p", "no:cacheprovider")
 PATHS_FILE = runtime.LIBRARY.replace(".zip", "._pth")

@@ -5,7 +5,6 @@ from contextlib import closing
 from datetime import date, timedelta
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from tests.core.archive.conftest import NOON, Station, accepted
@@ -18,6 +17,7 @@ from lightpen.archive.entries import Entry, Kind
 from lightpen.archive.history import known_names
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.standing import standings
+from lightpen.formats.decoding import encode_png
 from lightpen.record.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
@@ -88,7 +88,7 @@ def test_a_changed_file_of_the_library_is_found(
     tmp_path: Path, logbook: Logbook
 ) -> None:
     photo = tmp_path / "tip.png"
-    cv2.imwrite(str(photo), np.zeros((4, 4), np.uint8))
+    photo.write_bytes(encode_png(np.zeros((4, 4), np.uint8)))
     picture = keep_picture(tmp_path, photo)
     add_item(tmp_path, ListedTip(id="T-10", picture=picture), ANN, NOON)
     logbook.enter_owed()

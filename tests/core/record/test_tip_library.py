@@ -3,12 +3,12 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from msgspec import structs
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
+from lightpen.formats.decoding import encode_png
 from lightpen.record.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
@@ -181,7 +181,7 @@ def test_a_file_of_a_later_version_is_refused(tmp_path: Path) -> None:
 
 def test_a_picture_is_kept_by_its_hash_in_the_data_folder(tmp_path: Path) -> None:
     photo = tmp_path / "tip.png"
-    cv2.imwrite(str(photo), np.zeros((4, 4), np.uint8))
+    photo.write_bytes(encode_png(np.zeros((4, 4), np.uint8)))
 
     picture = keep_picture(tmp_path / "data", photo)
     assert (tmp_path / "data" / picture.place).read_bytes() == photo.read_bytes()

@@ -2,7 +2,6 @@
 
 import pickle
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -171,7 +170,7 @@ def test_killed_it_is_offered_and_keeps_every_touch(
         for _ in range(n_touches):
             assert process.stdout.readline()
         assert find_interrupted(in_force) == ()  # it is under way there
-        process.send_signal(signal.SIGKILL)
+        process.kill()
         n_touches += len(process.stdout.readlines())
     state = go_on(verifying())
 
