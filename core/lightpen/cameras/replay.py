@@ -198,15 +198,17 @@ class ReplayCamera:
 
     def _next_loader(self) -> Callable[[], Image]:
         """Return the loader of the next image and set the time of the one after."""
-        loaders = self._loaders or iter(())
+        loaders, asked_ns = self._loaders or iter(()), self._clock.now_ns()
         loader = next(loaders, None)
         if loader is None and self._loops:
             self._loaders = self._open_source()
             loader = next(self._loaders, None)
         if loader is None:
             raise EndOfImages
+        # The decoder of a video takes a while to start; no image makes up for it.
+        now_ns = self._clock.now_ns()
         on_schedule = self._next_due_ns + round(1e9 / self._frame_rate)
-        self._next_due_ns = max(on_schedule, self._clock.now_ns())
+        self._next_due_ns = max(on_schedule + now_ns - asked_ns, now_ns)
         return loader
 
     def _decode(self, loader: Callable[[], Image]) -> Frame:
