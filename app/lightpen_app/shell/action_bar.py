@@ -68,13 +68,19 @@ class ActionBar(Translated, QFrame):
         self._main.setAccessibleDescription(action.why_not)
         self._why_not.setText(action.why_not)
         self._why_not.setVisible(bool(action.why_not))
+        self._refresh_status()
         self._back.setVisible(can_go_back)
 
     def set_status(self, text: str) -> None:
         """Show a sentence in the status line, or none."""
         self._status.setText(text)
         self._status.setAccessibleName(text)
-        self._status.setVisible(bool(text))
+        self._refresh_status()
+
+    def _refresh_status(self) -> None:
+        """Show the status, but not the same sentence twice."""
+        text = self._status.text()
+        self._status.setVisible(bool(text) and text != self._why_not.text())
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""

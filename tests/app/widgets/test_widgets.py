@@ -266,10 +266,87 @@ def test_a_new_state_is_announced_once_it_is_seen(qtbot: QtBot) -> None:
 
     banner.set_value(State("WAITING", "Show the pen."))
     banner.show()
+    qtbot.waitUntil(lambda: said == ["WAITING. Show the pen."])
     banner.set_value(State("WAITING", "10 of 10 LEDs"))
     banner.set_value(State("PASS", "U (k = 2) of the tip is 0.002 mm."))
 
-    assert said == ["WAITING. Show the pen.", "PASS. U (k = 2) of the tip is 0.002 mm."]
+    passed = "PASS. U (k = 2) of the tip is 0.002 mm."
+    qtbot.waitUntil(lambda: said == ["WAITING. Show the pen.", passed])
+
+
+def test_what_stands_only_in_passing_is_not_announced(qtbot: QtBot) -> None:
+    banner = StateBanner()
+    qtbot.addWidget(banner)
+    said: list[str] = []
+    banner.announced.connect(said.append)
+
+    banner.set_value(State("IN FORCE", "The tip of another swing."))
+    banner.show()
+    banner.set_value(State("CHECK", "U is above the limit."))
+
+    qtbot.waitUntil(lambda: bool(said))
+    assert said == ["CHECK. U is above the limit."]
+
+
+def test_a_number_beyond_the_limits_becomes_the_nearest_limit(qtbot: QtBot) -> None:
+    field = NumberField("", (3, 300), 0)
+    qtbot.addWidget(field)
+    field.setValue(60)
+    field.show()
+
+    field.selectAll()
+    qtbot.keyClicks(field, "400")
+    field.clearFocus()
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+
+    assert field.value() == 300
+
+
+def test_a_reason_bar_keeps_enter_while_there_is_no_reason(qtbot: QtBot) -> None:
+    window = KeyWindow()
+    qtbot.addWidget(window)
+    bar = ReasonBar(window)
+    window.show()
+    bar.ask()
+
+    qtbot.keyClick(bar.findChild(EnterEdit), Qt.Key.Key_Return)
+
+    assert not window.keys
+    assert bar.isVisible()
+
+
+def test_the_wheel_chooses_nothing_in_passing(qtbot: QtBot) -> None:
+    choice = SourcePanel().findChildren(ChoiceField)[0]
+    qtbot.addWidget(choice.window())
+    before = choice.currentIndex()
+
+    turn_wheel(choice)
+
+    assert choice.currentIndex() == before
+
+
+class KeyWindow(QWidget):
+    """Notes the keys that nothing in it has taken."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.keys: list[int] = []
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self.keys.append(event.key())
+
+
+def turn_wheel(widget: QWidget) -> None:
+    """Turn the mouse wheel by one step over a widget."""
+    middle = QPointF(widget.rect().center())
+    event = QWheelEvent(
+        *(middle, QPointF(widget.mapToGlobal(middle.toPoint()))),
+        *(QPoint(), QPoint(0, -120)),
+        *(Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier),
+        *(Qt.ScrollPhase.NoScrollPhase, False),
+    )
+    QApplication.sendEvent(widget, event)
 
 
 def test_words_stay_large_enough_to_be_read(qtbot: QtBot) -> None:

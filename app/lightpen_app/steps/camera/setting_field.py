@@ -10,7 +10,7 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.number_field import NumberField
 
-FIELD_WIDTH = 12 * GRID  # px, at least
+FIELD_WIDTH = 13 * GRID  # px, at least: of "30.00 ms"
 
 
 class SettingField(NumberField):
