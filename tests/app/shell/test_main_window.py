@@ -321,6 +321,17 @@ def test_a_new_page_has_the_focus_on_its_first_control(shell: Shell) -> None:
     assert QApplication.focusWidget() is shell.pages[1].field
 
 
+def test_a_button_that_vanishes_leaves_the_focus_to_no_other_button(
+    shell: Shell,
+) -> None:
+    page = shell.pages[0]
+    page.button.setFocus()
+
+    page.button.hide()
+
+    assert QApplication.focusWidget() is page.field
+
+
 def test_every_control_has_a_name_for_screen_readers(shell: Shell) -> None:
     for button in shell.window.findChildren(QPushButton):
         assert button.accessibleName() or button.text()

@@ -1,9 +1,18 @@
 """What the smaller widgets say, by word and sign as well as by colour."""
 
 import pytest
-from PySide6.QtCore import QLocale, QRectF
-from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
+from PySide6.QtCore import QLocale, QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QGuiApplication,
+    QImage,
+    QKeyEvent,
+    QPainter,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
+from typing_extensions import override
 
 from lightpen.detection.inspection import Exposure
 from lightpen_app.look.signs import Sign, draw_sign
@@ -11,6 +20,8 @@ from lightpen_app.look.theme import DARK, TextSize, Tone
 from lightpen_app.look.words import BREAK, breakable, unbroken
 from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.steps.camera.source_panel import SourcePanel
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.operator_view import (
@@ -20,7 +31,9 @@ from lightpen_app.widgets.operator_view import (
     OperatorView,
     other_screen,
 )
+from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.posture_dial import DialValue
+from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
 
@@ -309,15 +322,16 @@ def test_a_reason_bar_keeps_enter_while_there_is_no_reason(qtbot: QtBot) -> None
     window.show()
     bar.ask()
 
-    qtbot.keyClick(bar.findChild(EnterEdit), Qt.Key.Key_Return)
+    qtbot.keyClick(bar.findChildren(EnterEdit)[0], Qt.Key.Key_Return)
 
     assert not window.keys
     assert bar.isVisible()
 
 
 def test_the_wheel_chooses_nothing_in_passing(qtbot: QtBot) -> None:
-    choice = SourcePanel().findChildren(ChoiceField)[0]
-    qtbot.addWidget(choice.window())
+    panel = SourcePanel()
+    qtbot.addWidget(panel)
+    choice = panel.findChildren(ChoiceField)[0]
     before = choice.currentIndex()
 
     turn_wheel(choice)
