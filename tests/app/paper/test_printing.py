@@ -186,6 +186,7 @@ def test_the_pdf_holds_all_that_an_archive_asks_of_it(
     # See-through colours are what PDF/A-1 forbids above all.
     assert {*re.findall(rb"/ca ([\d.]+)", pdf)} <= {b"1.0", b"1"}
     assert b"/SMask " not in pdf.replace(b"/SMask /None", b"")
+    assert b"CMYK" not in pdf.replace(b"/CSpcmyk", b"").replace(b"/PCSpcmyk", b"")
     assert len(pdf) < 2_000_000
     assert b"<rdf:li>Ann</rdf:li>" in pdf
 
