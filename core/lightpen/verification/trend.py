@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lightpen.archive.database import Database
-from lightpen.archive.entries import IN_FORCE_BY, Written
+from lightpen.archive.entries import Kind, Written
 from lightpen.archive.history import TipState, lines
 from lightpen.archive.queries import Wanted
 from lightpen.arrays import FloatArray
@@ -26,6 +26,8 @@ LIMIT = "max_uncertainty_mm"  # among the settings of an entry
 @dataclass(frozen=True, eq=False)
 class Trend:
     """The calibrations of a tip that were accepted and not taken back.
+
+    One whose tip was put in force again stands for itself once.
 
     Attributes
     ----------
@@ -71,7 +73,7 @@ def trend_of(database: Database, wanted: Wanted) -> Trend:
     wanted : Wanted
         With a pen and a tip; entries of all kinds but calibrations are left out.
     """
-    newest = lines(database, replace(wanted, kinds=IN_FORCE_BY), 0, LONGEST)
+    newest = lines(database, replace(wanted, kinds=(Kind.ACCEPTED,)), 0, LONGEST)
     entries = tuple(
         each.entry
         for each in reversed(newest)
@@ -125,12 +127,15 @@ def repeatability_of(
 
     Parameters
     ----------
+    entries : tuple of Written
+        Those that put a tip in force again are left out: nothing was measured anew.
     tolerance, reference
         Of a study of the capability, as `measure_repeatability` takes them.
     """
-    if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
+    measured = [e for e in entries if e.entry.event.kind is not Kind.RESTORED]
+    if len(measured) < MIN_TIPS or len({_subject(each) for each in measured}) > 1:
         return None
-    in_order = sorted(entries, key=lambda each: each.entry.since)
+    in_order = sorted(measured, key=lambda each: each.entry.since)
     tips = [tip_of(each) for each in in_order]
     return measure_repeatability(tips, limits, tolerance=tolerance, reference=reference)
 
