@@ -236,6 +236,7 @@ class CameraPage(Rearranged, Page):
         self._source.set_value(now.source)
         if now.source != self._looked_beside:
             self._look_beside(now.source)
+            self._show_connection()  # what was lacking is another thing now
         self._offer_beside()
         self._intrinsics.set_value(now.camera_file)
         self._intrinsics.set_image_size(now.image_size)
