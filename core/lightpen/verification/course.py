@@ -39,7 +39,7 @@ from lightpen.verification.session import (
     with_found,
 )
 from lightpen.verification.session_keeping import SessionKeeping
-from lightpen.verification.session_state import SessionState
+from lightpen.verification.session_state import SessionState, with_drift
 from lightpen.verification.status import (
     Reading,
     SessionHappening,
@@ -204,7 +204,7 @@ class VerificationCourse:
         self._become(transition)
 
     def read(self, task: TaskKind, place: str, *, is_still: bool) -> None:
-        """Do a task with recorded images.
+        """Do a task with recorded images; a witness that was read before counts in it.
 
         Parameters
         ----------
@@ -214,9 +214,11 @@ class VerificationCourse:
             Whether the pen is held still through the images of a touch; else each
             image is a touch.
         """
-        tip, setup = self._status.tip, self._status.setup
-        if self._task.is_there or tip is None or setup is None:
+        tip, setup, state = self._status.tip, self._status.setup, self._status.state
+        if self._task.is_there or tip is None or setup is None or state is None:
             return
+        if self._keeping.has_read(TaskKind.DRIFT):
+            setup = with_drift(setup, state.drift)
         rules = read_rules(is_still, setup.choices.n_frames)
         work = partial(read_runs, task, place, tip, setup, rules)
         images = ReadImages(task, place, is_still)
@@ -247,14 +249,15 @@ class VerificationCourse:
 
     def _on_gone_on(self, path: Path, before: GoneOn) -> None:
         self._give_up()
+        self._live.begin(before.lamps)
+        witness = self._live.witness(before.setup)
         try:
-            self._keeping.take_over(path, before)
+            self._keeping.take_over(path, before, witness)
         except FileError as error:
             self._on_runs_unread(error.sentence)
             return
         self._troubles.end()
         self._choices = before.setup.choices
-        self._live.begin(LampWatch())
         self._publish(
             VerificationStatus(
                 tip=before.tip,
@@ -263,6 +266,7 @@ class VerificationCourse:
                 aim=before.tip.aim,
                 began=before.under_way.began,
                 files=before.files,
+                witness=witness,
                 is_here=self._status.is_here,
                 refusal=self._why_not(before.tip),
             )

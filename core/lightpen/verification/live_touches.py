@@ -1,13 +1,11 @@
 """Live images of touches: kept as they are taken, and looked at for fixed lamps."""
 
-from dataclasses import replace
-
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
 from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
 from lightpen.verification.session import SessionTransition, advance, rules_of
-from lightpen.verification.session_state import SessionSetup, SessionState
+from lightpen.verification.session_state import SessionSetup, SessionState, with_drift
 from lightpen.verification.touch_images import TouchImages, is_held_on
 from lightpen.verification.touching import TouchPhase
 from lightpen.verification.witness import LampWatch, LampWitness
@@ -54,11 +52,11 @@ class LiveTouches:
             self._lamps = self._lamps.with_frame(frame, sighting, aim)
         together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
         name = self._name(frame, together, setup, state)
-        transition = advance(self._with_drift(setup, state), state, name, together)
+        transition = advance(self._drifted(setup, state), state, name, together)
         self._images.follow(state, transition)
         return transition
 
-    def _with_drift(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
+    def _drifted(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
         """Return it with how far the camera has moved, where that is asked for next."""
         task = state.task(setup)
         if task is None:
@@ -66,8 +64,7 @@ class LiveTouches:
         rules = rules_of(setup, task)
         if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
             return setup
-        witness = self.witness(setup)
-        return setup if witness is None else replace(setup, drift=witness.share)
+        return with_drift(setup, self.witness(setup))
 
     def _name(
         self, frame: Frame, seen: Sighting, setup: SessionSetup, state: SessionState
