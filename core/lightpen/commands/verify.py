@@ -25,7 +25,6 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
-from lightpen.commands.verifications import read_drift
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.pen_files import read_pen
@@ -48,6 +47,7 @@ from lightpen.verification.places import (
     read_viewers,
     touch_place,
 )
+from lightpen.verification.read_back import read_drift
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,

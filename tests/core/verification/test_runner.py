@@ -21,7 +21,6 @@ from lightpen.archive.check import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.commands.verifications import read_fixed_point, read_scale
 from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
@@ -41,6 +40,7 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
+from lightpen.verification.read_back import read_fixed_point, read_scale
 from lightpen.verification.status import SessionHappening
 from lightpen.verification.touch_images import CONCLUDED
 
@@ -96,7 +96,7 @@ def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
     point, _, length, _ = at_it.status.files
 
-    assert read_fixed_point(point).shape == (4, 3)
+    assert read_fixed_point(point).points.shape == (4, 3)
     assert read_scale(length).factor == pytest.approx(1.0, abs=1e-3)
 
 
