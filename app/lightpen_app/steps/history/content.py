@@ -190,7 +190,7 @@ class HistoryContent(Translated, QWidget):
         entries = [line.entry for line in self._table.selected()]
         selected = [entry for entry in entries if entry is not None]
         self._selection.set_limits(self._workbench.choices.limits)
-        self._selection.set_value(selected, self._trend.entries)
+        self._selection.set_value(selected, self._trend)
 
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._workbench.set_due_rule(rule)

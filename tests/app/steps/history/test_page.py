@@ -39,6 +39,7 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
+from lightpen.verification.keeping import keep_verification
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
 from lightpen_app.paper.preview import PaperWindow
@@ -341,6 +342,40 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert panel.words()[1] == "Repeatability of the 2 that are selected"
     assert "The tip lies 2.0000 mm from" in panel.words()[2]
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
+
+
+def test_it_is_told_what_scatter_of_tip_and_fixed_point_points_to(desk: Desk) -> None:
+    desk.enter(3)  # at x of 0, 1 and 2 mm
+    steady = {
+        "program": {"name": "lightpen", "version": "1"},
+        "created": NOON.isoformat(),
+        "verification": "fixed point",
+        "pen": "LP-04",
+        "tip": "T-10",
+        "calibrated": {
+            "points_cam_mm": [[0, 0, 999.99], [0, 0, 1000], [0, 0, 1000.01]]
+        },
+        "expected_std_mm": [0.002, 0.002, 0.008],
+    }
+    keep_verification(desk.workbench.folder, steady, is_simulated=False)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel = desk.child(SelectionPanel)
+    desk.until(lambda: panel.repeatability())
+
+    words = " ".join(panel.words())
+    assert "The tip scatters by 1.0000 mm over the calibrations" in words
+    assert "something moved with the pen between the calibrations" in words
+    assert "Next: seat the tip firmly" in words
+    assert "A fixed point touched 3 times with the tip, 2026-01-02" in words
+    assert "0.0000, 0.0000, 0.0100 mm" in words
+    desk.enter(2, tip="T-11", first=3)
+    desk.page.entered()
+    desk.until(lambda: len(desk.column(TIP)) == 6)
+    desk.select(0, 1)
+    desk.until(lambda: "Repeatability of the 2 that are selected" in panel.words())
+    assert "A fixed point" not in " ".join(panel.words())
 
 
 def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
