@@ -105,8 +105,10 @@ class Calibration:
         Tip, cone and rotations, with all else as the bundle adjustment has it.
     bundle : Bundle
         The bundle adjustment: everything that the files may have wrong.
+    stated : Priors
+        What the files state, and what is assumed in its place.
     priors : Priors
-        What it took from the files, as stated or assumed.
+        The same without what the images contradict.
     assumptions : Assumptions
         What stood in for what the files do not state.
     growth : float
@@ -130,6 +132,7 @@ class Calibration:
     rms: FloatArray
     joint: JointFit
     bundle: Bundle
+    stated: Priors
     priors: Priors
     assumptions: Assumptions
     growth: float
@@ -331,6 +334,7 @@ def calibrate_rig(
         rms=_rms_of_moments(cameras),
         joint=joint,
         bundle=bundle,
+        stated=priors,
         priors=adjusted.priors,
         assumptions=assumptions,
         growth=growth,

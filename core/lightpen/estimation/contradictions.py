@@ -166,7 +166,7 @@ def find_contradictions(
     Returns
     -------
     contradictions : tuple of Contradiction
-        By the fit as it is.
+        By the fit as it is, the worst first.
     priors : Priors
         Without what was contradicted.
     """
@@ -179,7 +179,7 @@ def find_contradictions(
         denied, extrinsics = max(each, key=_most)
         files.append((denied, replace(priors, extrinsics=extrinsics)))
     found, freed = max(files, key=_most)
-    return tuple(found), freed
+    return tuple(sorted(found, key=lambda each: -each.deviations)), freed
 
 
 def find_pen_contradictions(

@@ -418,7 +418,7 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
     return {
         "intrinsics": intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
-        "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
+        "scale_uncertainty_before": np.sqrt(calibration.stated.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
         "temperature_uncertainty_assumed": calibration.priors.temperature.assumed,
         "pen_growth": calibration.growth,

@@ -611,6 +611,14 @@
         <translation>作为新条目</translation>
     </message>
     <message>
+        <source>Record on paper...</source>
+        <translation>纸质记录...</translation>
+    </message>
+    <message>
+        <source>Look at it, save it as PDF or print it</source>
+        <translation>查看、存为 PDF 或打印</translation>
+    </message>
+    <message>
         <source>No entry is chosen.</source>
         <translation>未选择条目。</translation>
     </message>
@@ -649,6 +657,14 @@
     <message>
         <source>It is in force.</source>
         <translation>该数据正在生效。</translation>
+    </message>
+    <message>
+        <source>Only a tip that was accepted has a record on paper.</source>
+        <translation>只有已接受的测头才有纸质记录。</translation>
+    </message>
+    <message>
+        <source>Its result is at the station that it is of.</source>
+        <translation>其结果保存在所属工位。</translation>
     </message>
 </context>
 <context>
@@ -1108,6 +1124,10 @@
         <translation>光笔 {1} 的测头 {0} 已按当时的标定重新生效。</translation>
     </message>
     <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
+    </message>
+    <message>
         <source>Entries of another station</source>
         <translation>另一工位的条目</translation>
     </message>
@@ -1349,6 +1369,45 @@
     </message>
 </context>
 <context>
+    <name>InterruptedControl</name>
+    <message>
+        <source>The swing is being read.</source>
+        <translation>正在读取摆动。</translation>
+    </message>
+    <message>
+        <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
+        <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
+        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
+    </message>
+    <message>
+        <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
+        <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing is being discarded.</source>
+        <translation>正在放弃摆动。</translation>
+    </message>
+    <message>
+        <source>Discarded. The images stay in {0}.</source>
+        <translation>已放弃。图像保留在 {0}。</translation>
+    </message>
+    <message>
+        <source>The verification is being read.</source>
+        <translation>正在读取验证。</translation>
+    </message>
+    <message>
+        <source>The verification is being closed.</source>
+        <translation>正在结束验证。</translation>
+    </message>
+    <message>
+        <source>Closed as abandoned; see History.</source>
+        <translation>已作为放弃结束，见“历史”。</translation>
+    </message>
+</context>
+<context>
     <name>InterruptedPanel</name>
     <message>
         <source>Interrupted: {0}</source>
@@ -1475,6 +1534,10 @@
     <message>
         <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera, set the region to the whole sensor, or switch off binning.</source>
         <translation>相机送来 {0}，标定文件是为 {1} 做的。请选择此相机的文件，把区域设为整个传感器，或关闭像素合并。</translation>
+    </message>
+    <message>
+        <source>Checked by the swing: file and camera agree.</source>
+        <translation>已由摆动检查：文件与相机一致。</translation>
     </message>
     <message>
         <source>no date</source>
@@ -3599,6 +3662,10 @@
         <source>Stated U / mm</source>
         <translation>给出的 U / mm</translation>
     </message>
+    <message>
+        <source>A fixed point touched {0} times with the tip, {1}: scatter along u, v, w {2} mm, {3} mm to be expected.</source>
+        <translation type="unfinished"></translation>
+    </message>
 </context>
 <context>
     <name>SettingsPanel</name>
@@ -3918,44 +3985,8 @@
         <translation>无法显示上次标定。</translation>
     </message>
     <message>
-        <source>The swing is being read.</source>
-        <translation>正在读取摆动。</translation>
-    </message>
-    <message>
-        <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
-        <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
-    </message>
-    <message>
-        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
-        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
-    </message>
-    <message>
-        <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
-        <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
-    </message>
-    <message>
-        <source>The verification is being read.</source>
-        <translation>正在读取验证。</translation>
-    </message>
-    <message>
-        <source>The verification is being closed.</source>
-        <translation>正在结束验证。</translation>
-    </message>
-    <message>
-        <source>Closed as abandoned; see History.</source>
-        <translation>已作为放弃结束，见“历史”。</translation>
-    </message>
-    <message>
         <source>A swing is under way.</source>
         <translation>正在摆动。</translation>
-    </message>
-    <message>
-        <source>The swing is being discarded.</source>
-        <translation>正在放弃摆动。</translation>
-    </message>
-    <message>
-        <source>Discarded. The images stay in {0}.</source>
-        <translation>已放弃。图像保留在 {0}。</translation>
     </message>
 </context>
 <context>
@@ -5034,10 +5065,6 @@
         <translation>控制图写为 .csv 或 .svg，而 {name} 不以二者结尾。请选择这样的文件名。</translation>
     </message>
     <message>
-        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, the tip did not rest in the cone, or each touch was of too few images.</source>
-        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定的测头仅散布 {of_tip:.4f} mm。测头是稳定的：锥孔或相机在触测之间移动，测头没有停稳在锥孔中，或每次触测的图像太少。</translation>
-    </message>
-    <message>
         <source>A name, the images of the camera or a file is missing. Choose what the steps say, and go on with the verification then.</source>
         <translation>缺少名称、相机图像或文件。请按各步骤的提示选择，然后继续验证。</translation>
     </message>
@@ -5048,10 +5075,6 @@
     <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
-    </message>
-    <message>
-        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
-        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个有证书的标准长度。</translation>
     </message>
     <message>
         <source>All images of one camera had been held up on their way, so that the last pairs are of moments {moved:.0f} ms apart. From now on they are paired rightly. Images that do not fit are left out of the result: look at them in Review, or begin the swing again.</source>
@@ -5168,10 +5191,6 @@
     <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
-    </message>
-    <message>
-        <source>Entry {number} of station {station} is not the one that follows here. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
-        <translation>工位 {station} 的第 {number} 个条目与此处应接续的条目不符。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
         <source>Entry {number} of the archive {archive} is damaged. Restore the archive from a copy.</source>
@@ -6090,10 +6109,6 @@
         <translation>圆环半径未知。请输入证书半径。</translation>
     </message>
     <message>
-        <source>The record of entry {number} of station {station} is missing or was changed. Get the entries from their station again.</source>
-        <translation>工位 {station} 第 {number} 个条目的标定数据缺失或被改动过。请从该工位重新获取这些条目。</translation>
-    </message>
-    <message>
         <source>The record of {entry} is missing.</source>
         <translation>{entry}的标定数据缺失。</translation>
     </message>
@@ -6526,6 +6541,10 @@
         <translation>测球直径不可能是 {diameter:g} mm：须大于 0 且不超过 {most:g} mm。请测量；若未知则留空。</translation>
     </message>
     <message>
+        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, or the tip did not rest in the cone.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>A limit of {limit:g} mm for the change is not possible: above 0 and up to {most:g} mm are.</source>
         <translation>变化限值不可能是 {limit:g} mm：须大于 0 且不超过 {most:g} mm。</translation>
     </message>
@@ -6534,8 +6553,32 @@
         <translation>与其他各点相距 {distance:.1f} mm 的一次接触不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
     </message>
     <message>
+        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
+    </message>
+    <message>
+        <source>Next: go on with this pen and its LED file.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next: let the pen take the temperature of the room, and measure a certified length.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next: tighten the tip, look at the LEDs of the pen, calibrate it again, and verify the new result.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next: use the tip of the newest calibration.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
+        <source>Next: use what was touched between the visits.</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database, with %40 for an @ in the password.</source>
@@ -6576,6 +6619,10 @@
     <message>
         <source>The picture {path} is not the one that was kept. Keep it again.</source>
         <translation>图片 {path} 已不是当初保存的那张。请重新保存。</translation>
+    </message>
+    <message>
+        <source>The record of {entry} is missing or was changed. Get the entries from their station again.</source>
+        <translation>{entry}的标定数据缺失或被改动过。请从其工位重新获取这些条目。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -6798,6 +6845,10 @@
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
     </message>
     <message>
+        <source>What is kept here does not go on with {entry}. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
+        <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
+    </message>
+    <message>
         <source>Where the tip has a limit of its own for its change, the distance from the tip that was in force before (as found) to the tip that is accepted (as left) is compared with it by simple acceptance; beyond it is CHECK.</source>
         <translation>若测头自有变化限值，则将此前有效的测头（标定前状态）与所接受测头（标定后状态）之间的距离按简单接受与之比较；超出则为“需检查”。</translation>
     </message>
@@ -6860,6 +6911,10 @@
     <message>
         <source>distortion coefficient {name}</source>
         <translation>畸变系数 {name}</translation>
+    </message>
+    <message>
+        <source>entry {number} of the station {station}</source>
+        <translation>工位 {station} 的第 {number} 个条目</translation>
     </message>
     <message>
         <source>exposure</source>
@@ -7132,6 +7187,10 @@
     <message>
         <source>unreadable</source>
         <translation>无法读取</translation>
+    </message>
+    <message>
+        <source>verification</source>
+        <translation type="unfinished"></translation>
     </message>
     <message>
         <source>what stays the same in all poses: the scale of the tracker and of the pen, a tip that is worn or does not seat</source>
@@ -7590,6 +7649,10 @@
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
     </message>
     <message>
+        <source>{path} is not what verify {kind} wrote, or was changed since. Give what its option --json wrote.</source>
+        <translation type="unfinished"></translation>
+    </message>
+    <message>
         <source>{path} is of several cameras or two cones; only the record of one camera and one cone is enough by itself. Calibrate from the images.</source>
         <translation>{path} 来自多台相机或两个锥孔；只有单相机、单锥孔的标定数据本身才足以重新计算。请用图像标定。</translation>
     </message>
@@ -7922,6 +7985,10 @@
     <message>
         <source>This tip was not accepted.</source>
         <translation>该测头未被接受。</translation>
+    </message>
+    <message>
+        <source>This tip of an earlier calibration was put in force again, with the reason: {0}</source>
+        <translation>该测头为较早一次标定的结果，已重新生效，理由：{0}</translation>
     </message>
     <message>
         <source>The tip was accepted.</source>

@@ -119,6 +119,8 @@ def test_a_file_without_distortion_never_passes_and_is_named() -> None:
         _, result = calibrated(file, seed)
         assert judge(result, LIMITS).grade is not Grade.PASS
         assert any("k1" in name for name in names(result))
+        deviations = [each.deviations for each in result.contradictions]
+        assert deviations == sorted(deviations, reverse=True)
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,25 @@
-"""Verifications read back from their JSON, where another command builds on them."""
+"""Verifications read back from their JSON, where something else builds on them."""
 
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
-from msgspec import Struct
+from msgspec import Meta, Struct
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
 from lightpen.formats.files import MEGABYTE, read_bytes
-from lightpen.formats.own_json import DamagedError, Vector, has_checksum, parse_json
+from lightpen.formats.own_json import (
+    DamagedError,
+    Moment,
+    Vector,
+    has_checksum,
+    parse_json,
+)
 from lightpen.sentences import sentence
+from lightpen.verification.fixed_point import MIN_TOUCHES
 from lightpen.verification.length import Scale
+from lightpen.verification.repeatability import TouchedPoint
 
 VERIFICATION = sentence("file.verification", "verification")
 LIMIT = 64 * MEGABYTE
@@ -20,11 +28,13 @@ T = TypeVar("T")
 
 
 class _Scatter(Struct):
-    points_cam_mm: list[Vector]
+    points_cam_mm: Annotated[list[Vector], Meta(min_length=MIN_TOUCHES)]
 
 
 class _FixedPoint(Struct):
+    created: Moment
     calibrated: _Scatter
+    expected_std_mm: Vector
 
 
 class _Scale(Struct):
@@ -41,10 +51,33 @@ class _Drift(Struct):
     standard_uncertainty_share_mm: Vector
 
 
-def read_fixed_point(path: Path) -> FloatArray:
-    """Read the points of a fixed point that was verified, (N, 3), mm."""
-    found = _read(path, _FixedPoint, "fixed-point")
-    return np.array(found.calibrated.points_cam_mm, dtype=np.float64)
+def read_fixed_point(path: Path) -> TouchedPoint:
+    """Read a fixed point that was verified."""
+    return _touched(_read(path, _FixedPoint, "fixed-point"))
+
+
+def fixed_point_in(record: str) -> TouchedPoint | None:
+    """Return the fixed point that a record is of; None where it is of something else.
+
+    Parameters
+    ----------
+    record : str
+        Its JSON, which was checked before.
+    """
+    try:
+        return _touched(
+            parse_json(record.encode("utf-8", "surrogateescape"), _FixedPoint)
+        )
+    except DamagedError:
+        return None
+
+
+def _touched(found: _FixedPoint) -> TouchedPoint:
+    return TouchedPoint(
+        np.array(found.calibrated.points_cam_mm, dtype=np.float64),
+        np.array(found.expected_std_mm, dtype=np.float64),
+        found.created,
+    )
 
 
 def read_scale(path: Path) -> Scale:
