@@ -136,6 +136,16 @@ class Bundle:
         apart = np.linalg.norm(places[:, None] - places, axis=2)
         return float(apart.max())
 
+    @property
+    def cone_moves(self) -> FloatArray:
+        """What the cone of each image moved by, as fitted, (N, 3), mm.
+
+        As the pen leant and in the course of the swing.
+        """
+        at = self.columns
+        by_form = self.values[at.seat[0].start : at.drift.stop].reshape(-1, N_CONE)
+        return np.asarray(self.unknowns.forms[:, : len(by_form)] @ by_form)
+
     def part(self, *kinds: slice) -> FloatArray:
         """Return what stands in tip and cone for some unknowns, (6, 6).
 

@@ -334,15 +334,19 @@ def _block_scatter(
 ) -> tuple[FloatArray | None, float, bool]:
     """Return the covariance from blocks, its ratio to the noise's, and significance.
 
-    A jitter of the seat is a share of its own: the scatter is expected to hold it.
+    What the cone moved by as the pen leant and in time is a share of its own and taken
+    out, and so is a jitter of the seat: the scatter is expected to hold it.
     """
     n_images = len(joint.information)
     n_blocks = min(MAX_BLOCKS, n_images // MIN_BLOCK_SIZE)
     if n_blocks < 3:
         return None, 1.0, False
     noise = joint.covariance
+    by_cone = joint.information[..., N_CONE:]
+    moved = np.einsum("nik,nk->ni", by_cone, bundle.cone_moves[:n_images])
+    gradients = joint.gradients - moved
     scores = np.array(
-        [part.sum(axis=0) for part in np.array_split(joint.gradients, n_blocks)]
+        [part.sum(axis=0) for part in np.array_split(gradients, n_blocks)]
     )
     scores -= scores.mean(axis=0)
     scatter = scores.T @ scores * n_blocks / (n_blocks - 1)
@@ -350,7 +354,6 @@ def _block_scatter(
     ratio = float(np.trace(noise @ scatter)) / 6
     jitter = bundle.components.jitter.covariance
     if jitter is not None:
-        by_cone = joint.information[..., N_CONE:]
         shaken = np.einsum("nik,kl,njl->ij", by_cone, jitter, by_cone, optimize=True)
         ratio /= 1 + float(np.trace(noise @ shaken)) / 6
     n_free = 6 * (n_blocks - 1)
