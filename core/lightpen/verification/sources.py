@@ -193,10 +193,14 @@ def touches_of(
         raise CalibrationError(
             sentence(
                 "verification.never-still",
-                "{run}: the pen was held still nowhere for {n_frames} images. Hold it "
-                "still on each point, or take each image for a touch.",
+                "{run}: the pen was held still nowhere for {n_all} images, {n_settling} "
+                "to settle and {n_frames} that count. Hold it still longer on each "
+                "point, ask for fewer images of a touch, or take each image for a "
+                "touch.",
                 run=name,
-                n_frames=rules.n_settling + rules.n_frames,
+                n_all=rules.n_settling + rules.n_frames,
+                n_settling=rules.n_settling,
+                n_frames=rules.n_frames,
             )
         )
     touches = measure_touches(instrument, held)

@@ -3664,7 +3664,7 @@
     </message>
     <message>
         <source>A fixed point touched {0} times with the tip, {1}: scatter along u, v, w {2} mm, {3} mm to be expected.</source>
-        <translation type="unfinished"></translation>
+        <translation>用该测头触测固定点 {0} 次（{1}）：沿 u、v、w 的散布为 {2} mm，预期为 {3} mm。</translation>
     </message>
 </context>
 <context>
@@ -6525,6 +6525,10 @@
         <translation>{path} 既不是摆动记录，也不是标定结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
     </message>
     <message>
+        <source>{run}: the pen was held still nowhere for {n_all} images, {n_settling} to settle and {n_frames} that count. Hold it still longer on each point, ask for fewer images of a touch, or take each image for a touch.</source>
+        <translation>{run}：光笔没有在任何位置静止保持 {n_all} 幅图像（{n_settling} 幅用于稳定，{n_frames} 幅计入）。请在每个点上保持静止更久，减少每次触测的图像数，或将每幅图像作为一次触测。</translation>
+    </message>
+    <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
         <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
@@ -6542,7 +6546,7 @@
     </message>
     <message>
         <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, or the tip did not rest in the cone.</source>
-        <translation type="unfinished"></translation>
+        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定间测头的散布仅 {of_tip:.4f} mm。测头是稳定的：触测之间锥孔或相机移动过，或测头未落稳在锥孔中。</translation>
     </message>
     <message>
         <source>A limit of {limit:g} mm for the change is not possible: above 0 and up to {most:g} mm are.</source>
@@ -6554,7 +6558,7 @@
     </message>
     <message>
         <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved.</source>
-        <translation type="unfinished"></translation>
+        <translation>所有 LED 按同一比例变化（{growth:+.0f} ppm）：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相互远离。没有单个 LED 移位。</translation>
     </message>
     <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
@@ -6562,23 +6566,23 @@
     </message>
     <message>
         <source>Next: go on with this pen and its LED file.</source>
-        <translation type="unfinished"></translation>
+        <translation>下一步：继续使用此光笔及其 LED 文件。</translation>
     </message>
     <message>
         <source>Next: let the pen take the temperature of the room, and measure a certified length.</source>
-        <translation type="unfinished"></translation>
+        <translation>下一步：让光笔达到室温，并测量一段已认证的长度。</translation>
     </message>
     <message>
         <source>Next: tighten the tip, look at the LEDs of the pen, calibrate it again, and verify the new result.</source>
-        <translation type="unfinished"></translation>
+        <translation>下一步：拧紧测头，检查光笔的 LED，重新标定，并验证新的结果。</translation>
     </message>
     <message>
         <source>Next: use the tip of the newest calibration.</source>
-        <translation type="unfinished"></translation>
+        <translation>下一步：使用最近一次标定的测头。</translation>
     </message>
     <message>
         <source>Next: use what was touched between the visits.</source>
-        <translation type="unfinished"></translation>
+        <translation>下一步：使用各次复测之间触测的结果。</translation>
     </message>
     <message>
         <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database, with %40 for an @ in the password.</source>
@@ -7190,7 +7194,7 @@
     </message>
     <message>
         <source>verification</source>
-        <translation type="unfinished"></translation>
+        <translation>验证</translation>
     </message>
     <message>
         <source>what stays the same in all poses: the scale of the tracker and of the pen, a tip that is worn or does not seat</source>
@@ -7650,7 +7654,7 @@
     </message>
     <message>
         <source>{path} is not what verify {kind} wrote, or was changed since. Give what its option --json wrote.</source>
-        <translation type="unfinished"></translation>
+        <translation>{path} 不是 verify {kind} 写出的文件，或此后被更改。请给出其选项 --json 写出的文件。</translation>
     </message>
     <message>
         <source>{path} is of several cameras or two cones; only the record of one camera and one cone is enough by itself. Calibrate from the images.</source>
@@ -7719,10 +7723,6 @@
     <message>
         <source>{run}: the LED positions do not fit the images: {rms:.1f} px, {usual} px or less is usual. Check that the images are of this pen and this camera.</source>
         <translation>{run}：LED 位置与图像不符：{rms:.1f} px，通常不超过 {usual} px。请检查图像是否属于这支光笔和这台相机。</translation>
-    </message>
-    <message>
-        <source>{run}: the pen was held still nowhere for {n_frames} images. Hold it still on each point, or take each image for a touch.</source>
-        <translation>{run}：光笔没有在任何一处保持不动达 {n_frames} 幅图像。请在每个点上保持不动，或把每幅图像当作一次触测。</translation>
     </message>
     <message>
         <source>{text} is no board. Name it in a form such as {forms}; lengths are in mm.</source>
