@@ -170,7 +170,7 @@ class Calibration:
             )
             if images.path is not None and images.path.is_followed
         ]
-        is_certain = self.bundle.components.drift.is_significant
+        is_certain = self.bundle.counted.drift.is_significant
         return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
     @property
@@ -179,7 +179,7 @@ class Calibration:
 
         0 where they show no significant errors, or the file states its uncertainty.
         """
-        found = self.bundle.components.leds
+        found = self.bundle.counted.leds
         return found.sigma if found.is_significant else 0.0
 
 

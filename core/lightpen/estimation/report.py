@@ -262,7 +262,7 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
 
 def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     """Return what is told of a tip that did not rest where the model has it."""
-    bundle, found = calibration.bundle, calibration.bundle.components
+    bundle, found = calibration.bundle, calibration.bundle.counted
     warnings = []
     jitter = found.jitter.covariance
     # Ball and cone that are as round as assumed move the tip by so much as well.
