@@ -3360,6 +3360,10 @@
         <translation>测头已接受。</translation>
     </message>
     <message>
+        <source>Check the settings</source>
+        <translation>检查设置</translation>
+    </message>
+    <message>
         <source>Accept...</source>
         <translation>接受...</translation>
     </message>
@@ -5477,8 +5481,20 @@
         <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
     </message>
     <message>
+        <source>Next: check the LED file, then repeat.</source>
+        <translation>下一步：检查 LED 文件，然后重做。</translation>
+    </message>
+    <message>
         <source>Next: check the intrinsics file and the LED file, then repeat.</source>
         <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: check the intrinsics file, then repeat.</source>
+        <translation>下一步：检查内参文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: check the rig file, then repeat.</source>
+        <translation>下一步：检查相机组文件，然后重做。</translation>
     </message>
     <message>
         <source>Next: clamp cone and camera, then repeat the swing.</source>
@@ -5507,6 +5523,10 @@
     <message>
         <source>Next: see that it is the tip that is named, clean and tight, then repeat.</source>
         <translation>下一步：确认测头与所填写的一致、清洁且已拧紧，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: see to the cause that is named, then repeat.</source>
+        <translation>下一步：处理所指出的原因，然后重做。</translation>
     </message>
     <message>
         <source>Next: use the tip.</source>
@@ -6173,6 +6193,10 @@
         <translation>测头未满足限值。{why}只有主管说明理由后才能接受。</translation>
     </message>
     <message>
+        <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped, and that the intrinsics file is of this camera, lens and focus.</source>
+        <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧，以及内参文件属于该相机、镜头和对焦设置。</translation>
+    </message>
+    <message>
         <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
         <translation>{tip} 中的测头是用 LED 文件 {its_pen} 标定的，而 {pen} 不是该文件：测头属于标定时所用的光笔和 LED 位置。请给出该文件，或用此文件标定测头。</translation>
     </message>
@@ -6695,10 +6719,6 @@
     <message>
         <source>The tip did not come to rest in the same place: it moved by {distance:.4f} mm (standard deviation) from image to image. Clean tip and cone, look for wear, and press the tip in. It is in the uncertainty.</source>
         <translation>测头没有停在同一位置：各图像之间移动 {distance:.4f} mm（标准差）。请清洁测头和锥孔，检查磨损，并将测头压入。该影响已计入不确定度。</translation>
-    </message>
-    <message>
-        <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped.</source>
-        <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
     </message>
     <message>
         <source>The tip is that of the first, which are more.</source>
