@@ -28,8 +28,8 @@ from lightpen.record.unfinished import discard_swing
 from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
-from lightpen.swing.entries import Entries
 from lightpen.swing.intake import Intake
+from lightpen.swing.logbook_entries import LogbookEntries
 from lightpen.swing.moment import seen_by_rig
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
@@ -79,7 +79,7 @@ class SwingCourse:
         self._archive = archive
         self._listener = listener
         self._now = now
-        self._entries = Entries(logbook, start, self._tell_trouble)
+        self._entries = LogbookEntries(logbook, start, self._tell_trouble)
         self._status = SwingStatus()
         self._attendance = Attendance()
         self._intake: Intake | None = None

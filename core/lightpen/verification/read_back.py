@@ -16,12 +16,14 @@ from lightpen.formats.own_json import (
     has_checksum,
     parse_json,
 )
-from lightpen.sentences import sentence
+from lightpen.sentences import Sentence, sentence
 from lightpen.verification.fixed_point import MIN_TOUCHES
 from lightpen.verification.length import Scale
 from lightpen.verification.repeatability import TouchedPoint
 
-VERIFICATION = sentence("file.verification", "verification")
+FIXED_POINT = sentence("file.fixed-point", "verified fixed point")
+LENGTH = sentence("file.length", "verified length")
+DRIFT = sentence("file.drift", "measured drift of the camera")
 LIMIT = 64 * MEGABYTE
 
 T = TypeVar("T")
@@ -53,7 +55,7 @@ class _Drift(Struct):
 
 def read_fixed_point(path: Path) -> TouchedPoint:
     """Read a fixed point that was verified."""
-    return _touched(_read(path, _FixedPoint, "fixed-point"))
+    return _touched(_read(path, _FixedPoint, FIXED_POINT))
 
 
 def fixed_point_in(record: str) -> TouchedPoint | None:
@@ -82,7 +84,7 @@ def _touched(found: _FixedPoint) -> TouchedPoint:
 
 def read_scale(path: Path) -> Scale:
     """Read the scale that a verified length gives the pen."""
-    scale = _read(path, _Length, "length").scale
+    scale = _read(path, _Length, LENGTH).scale
     return Scale(
         scale.factor, scale.expanded_uncertainty, scale.expanded_uncertainty_before
     )
@@ -90,22 +92,22 @@ def read_scale(path: Path) -> Scale:
 
 def read_drift(path: Path) -> FloatArray:
     """Read the standard uncertainty that a drift is for what was touched meanwhile."""
-    found = _read(path, _Drift, "drift")
+    found = _read(path, _Drift, DRIFT)
     return np.array(found.standard_uncertainty_share_mm, dtype=np.float64)
 
 
-def _read(path: Path, shape: type[T], kind: str) -> T:
-    data = read_bytes(path, VERIFICATION, LIMIT)
+def _read(path: Path, shape: type[T], what: Sentence) -> T:
+    data = read_bytes(path, what, LIMIT)
     try:
         has_checksum(data)
         return parse_json(data, shape)
     except DamagedError as error:
         raise FileError(
             sentence(
-                "cli.no-verification",
-                "{path} is not what verify {kind} wrote, or was changed since. Give "
-                "what its option --json wrote.",
+                "verification.other-file",
+                "{path} is no {what}, or was changed since it was written. Give the "
+                "JSON as it was written.",
                 path=str(path),
-                kind=kind,
+                what=what,
             )
         ) from error

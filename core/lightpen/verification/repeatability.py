@@ -34,7 +34,6 @@ CONTROL = 3.0  # standard deviations
 BY_CHANCE = 2.58  # standard deviations of a logarithm of variances: 99 %
 SHARE_OF_TOLERANCE = 0.2
 CAPABLE = 1.33
-RODE_WITH_PEN = "repeatability.rode-with-pen"
 TIGHTEN = sentence(
     "repeatability.tighten",
     "Next: tighten the tip, look at the LEDs of the pen, calibrate it again, and "
@@ -230,7 +229,7 @@ def _points_to(tip: FloatArray, n_tips: int, touched: TouchedPoint) -> Sentence 
     n_free, n_free_point = 3 * (n_tips - 1), 3 * (len(touched.points) - 1)
     if _is_larger(of_tip, of_point, 2 / n_free + 2 / n_free_point):
         return sentence(
-            RODE_WITH_PEN,
+            "repeatability.rode-with-pen",
             "The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point "
             "touched with it by only {of_point:.4f} mm. An error of the calibration "
             "would move both alike: so something moved with the pen between the "
@@ -273,7 +272,8 @@ def _assessment(
 ) -> Conformity:
     axis = int(np.argmax(deviation))
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
-    has_ridden = points_to is not None and points_to.code == RODE_WITH_PEN
+    ridden = "repeatability.rode-with-pen"
+    has_ridden = points_to is not None and points_to.code == ridden
     if deviation[axis] > limits.repeatability:
         return refused(
             points_to

@@ -6461,6 +6461,10 @@
         <translation>英寸</translation>
     </message>
     <message>
+        <source>measured drift of the camera</source>
+        <translation>相机漂移测量记录</translation>
+    </message>
+    <message>
         <source>metres</source>
         <translation>米</translation>
     </message>
@@ -6517,6 +6521,14 @@
         <translation>向上</translation>
     </message>
     <message>
+        <source>verified fixed point</source>
+        <translation>固定点验证记录</translation>
+    </message>
+    <message>
+        <source>verified length</source>
+        <translation>长度验证记录</translation>
+    </message>
+    <message>
         <source>{file} is no exported archive, or not as it was exported: line {line}. Export it again, with this version of the program.</source>
         <translation>{file} 不是导出的档案库，或与导出时不符：第 {line} 行。请用此版本的程序重新导出。</translation>
     </message>
@@ -6547,6 +6559,10 @@
     <message>
         <source>{path} is neither a recorded swing nor a result. Open the folder of a swing, a file in it, or a file in the folder results.</source>
         <translation>{path} 既不是摆动记录，也不是标定结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
+    </message>
+    <message>
+        <source>{path} is no {what}, or was changed since it was written. Give the JSON as it was written.</source>
+        <translation>{path} 不是{what}，或写出后被更改。请给出写出时的 JSON 文件。</translation>
     </message>
     <message>
         <source>{run}: the pen was held still nowhere for {n_all} images, {n_settling} to settle and {n_frames} that count. Hold it still longer on each point, ask for fewer images of a touch, or take each image for a touch.</source>
@@ -7213,10 +7229,6 @@
         <translation>无法读取</translation>
     </message>
     <message>
-        <source>verification</source>
-        <translation>验证</translation>
-    </message>
-    <message>
         <source>what stays the same in all poses: the scale of the tracker and of the pen, a tip that is worn or does not seat</source>
         <translation>在所有位姿中保持不变的误差：跟踪仪和光笔的尺度、测头磨损或未就位</translation>
     </message>
@@ -7671,10 +7683,6 @@
     <message>
         <source>{path} is not as it was recorded (wrong checksum). Restore it from a copy.</source>
         <translation>{path} 与记录时不同（校验和错误）。请用备份恢复。</translation>
-    </message>
-    <message>
-        <source>{path} is not what verify {kind} wrote, or was changed since. Give what its option --json wrote.</source>
-        <translation>{path} 不是 verify {kind} 写出的文件，或此后被更改。请给出其选项 --json 写出的文件。</translation>
     </message>
     <message>
         <source>{path} is of several cameras or two cones; only the record of one camera and one cone is enough by itself. Calibrate from the images.</source>

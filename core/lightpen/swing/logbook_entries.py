@@ -9,7 +9,7 @@ from lightpen.swing.serial_queue import Start, Task
 from lightpen.swing.status import SwingStatus
 
 
-class Entries:
+class LogbookEntries:
     """Enters what becomes of swings; without a logbook, files alone tell of it."""
 
     def __init__(
