@@ -108,10 +108,10 @@ class Look:
         return f"{step}-{self.language}-{self.appearance}-{size}.png"
 
 
-LOOKS = tuple(
+LOOKS = tuple(  # one appearance after the other: to change it takes long
     Look(language, appearance, size)
-    for language in Language
     for appearance in (Appearance.DARK, Appearance.LIGHT)
+    for language in Language
     for size in SIZES
 )
 

@@ -45,6 +45,19 @@ with RecordWriter.resume(open_record(Path(sys.argv[1]))):
 """
 
 
+WATCHED = """
+import sys
+from pathlib import Path
+from lightpen.cli import main
+
+status = main(sys.argv[2:])
+told = Path("/proc/self/status")
+if told.exists():
+    Path(sys.argv[1]).write_bytes(told.read_bytes())
+sys.exit(status)
+"""
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Let one more process work than there are cores: some tests wait, for a camera."""
@@ -330,6 +343,31 @@ def record(
 
 
 @pytest.fixture(scope="session")
+def swing_full(shared_data: Path, once: MakeOnce) -> Path:
+    """Return where a process of its own has calibrated from the 300 images, once.
+
+    There is the JSON, with the paper's nominal tip, and, where the system is Linux,
+    what it tells of the process at its end, as `status`.
+    """
+    folder = shared_data / "swing-full"
+
+    def calibrate(place: Path) -> None:
+        words = (
+            *("calibrate", folder / "images"),
+            *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
+            *("--nominal-tip", "0", "-90", "-25"),
+            *("--json", place / "calibration.json"),
+        )
+        subprocess.run(
+            [sys.executable, "-c", WATCHED, place / "status", *words],
+            stdout=subprocess.DEVNULL,
+            check=True,
+        )
+
+    return once("swing-full", calibrate)
+
+
+@pytest.fixture(scope="session")
 def stated() -> dict[str, Any]:
     """Return the record of a good calibration, as its JSON has it; only read it.
 
@@ -370,15 +408,10 @@ def swung(once: MakeOnce) -> Callable[..., Path]:
     Each record is made once; copy it before you change it.
     """
 
-    def recorded(
-        n_images: int = 20,
-        mask: Sequence[Sequence[float]] = (),
-        *,
-        by_two: bool = False,
-    ) -> Path:
+    def recorded(n_images: int = 20, *, by_two: bool = False) -> Path:
         place = once(
-            f"swung {n_images} {mask} {by_two}",
-            lambda place: _record_swing(place / "swing", n_images, mask, by_two=by_two),
+            f"swung {n_images} {by_two}",
+            lambda place: _record_swing(place / "swing", n_images, by_two=by_two),
         )
         return place / "swing"
 
@@ -437,13 +470,9 @@ def _how_small(file: Path) -> tuple[bool, bool]:
     return len(place) > 1, place[:1] != ("app",)
 
 
-def _record_swing(
-    folder: Path, n_images: int, mask: Sequence[Sequence[float]], *, by_two: bool
-) -> None:
+def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     """Record a guided swing of the simulated pen, seen with a quarter of the pixels."""
     from dataclasses import replace
-
-    import numpy as np
 
     from lightpen.cameras.clock import SkippingClock
     from lightpen.cameras.protocol import CameraSettings
@@ -471,7 +500,6 @@ def _record_swing(
         names=Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0),
         camera_file=CameraFile.read(files.camera),
         pen_file=PenFile.read(files.pen),
-        mask=np.array(mask, dtype=np.float64).reshape(-1, 3),
         limits=SwingLimits(max_uncertainty=1e-6, min_images=n_images),
     )
     clock = SkippingClock()

@@ -916,13 +916,14 @@ def write(path: Path, image: Any) -> None:
 )  # fmt: skip
 def test_a_corrupt_image_is_dropped_and_named_and_the_rest_used(
     name: str, spoil: Callable[[bytes], bytes], swing: Swing, images: Path,
-    script: Run, tmp_path: Path,
+    lightpen: Run, tmp_path: Path, capfd: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     corrupt, file = images / "frame_0020.png", tmp_path / "out.json"
     corrupt.write_bytes(spoil(corrupt.read_bytes()))
-    outcome = swing.calibrate(script, "--json", file, images=images)
+    outcome = swing.calibrate(lightpen, "--json", file, images=images)
     assert_tip(outcome, swing)
-    assert outcome.stderr == ""  # no complaints of the image library
+    assert outcome.stderr == ""
+    assert capfd.readouterr().err == ""  # no complaints of the image library
     assert "frame_0020.png" in outcome.stdout
     frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
     assert [frame["file"] for frame in frames if not frame["used"]] == [corrupt.name]

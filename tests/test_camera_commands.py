@@ -155,4 +155,7 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
     )
 
     assert status == 1
-    assert "contradict the camera file" in capsys.readouterr().err
+    printed = capsys.readouterr()
+    assert "contradict the camera file" in printed.err
+    fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
+    assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)

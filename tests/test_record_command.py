@@ -156,9 +156,9 @@ def test_taking_out_and_putting_back_gives_the_tip_of_before(
 
 
 def test_the_mask_of_the_record_is_in_force(
-    calibrated: Calibrated, swung: Callable[..., Path]
+    calibrated: Calibrated, folder: Path, rewrite_header: Callable[..., None]
 ) -> None:
-    folder = swung(N_IMAGES, ((612.0, 512.0, 90.0),))
+    rewrite_header(folder, mask_px=[[612.0, 512.0, 90.0]])
     found = source(open_record(folder))
     masked = observe_images(found.images, found.camera, found.pen, mask=found.masks[0])
     bare = observe_images(found.images, found.camera, found.pen)

@@ -11,24 +11,13 @@ import numpy as np
 import pytest
 
 Run = Callable[..., CompletedProcess[str]]
-Once = Callable[[str, Callable[[Path], object]], Path]
 N_RUNS = 8
 
 
 @pytest.fixture(scope="session")
-def tip(shared_data: Path, lightpen: Run, once: Once) -> Path:
+def tip(swing_full: Path) -> Path:
     """Return the calibration of `swing-full`, with the paper's nominal tip."""
-    folder = shared_data / "swing-full"
-
-    def make(place: Path) -> None:
-        outcome = lightpen(
-            *("calibrate", folder / "images"),
-            *("--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"),
-            *("--nominal-tip", "0", "-90", "-25", "--json", place / "tip.json"),
-        )
-        assert outcome.returncode == 0, outcome.stderr
-
-    return once("tip of swing-full to verify", make) / "tip.json"
+    return swing_full / "calibration.json"
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ NAMES = Names(
     ball_diameter=10.0,
 )  # fmt: skip
 TICK_MS = 100
-WATCHED_S, UNWATCHED_S = 5.0, 0.5  # spent on each page, s
+WATCHED_S, UNWATCHED_S = 5.0, 0.1  # spent on each page, s
 LONGEST_S = 300.0  # on a page, s; a slow machine takes a minute for the swing
 
 

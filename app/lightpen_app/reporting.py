@@ -4,15 +4,13 @@ import os
 import sys
 from pathlib import Path
 
-from lightpen.archive.entered import entry_of_file
 from lightpen.formats.files import write_whole
 from lightpen.record.exports import save_new
-from lightpen.record.retraced import retrace
-from lightpen.record.statement import read_statement
 from lightpen_app.application import has_display, make_application
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import load_fonts
 from lightpen_app.paper.printing import paper_of, paper_stem, pdf_of
+from lightpen_app.paper.showing import read_calibration_file
 
 
 def write_paper(result: Path, out: Path | None, language: str) -> Path:
@@ -39,17 +37,15 @@ def write_paper(result: Path, out: Path | None, language: str) -> Path:
     UsageError
         The file holds no calibration, or not all that is put on paper.
     """
-    statement = read_statement(result)
-    retraced = retrace(statement.calibration)
-    entered = entry_of_file(result, statement.sha256)
+    found = read_calibration_file(result)
     if not has_display():
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
     application = make_application(sys.argv[:1])
     languages = LanguageSwitch(application)
     languages.set_language(Language(language))
     load_fonts()
-    pdf = pdf_of(paper_of(statement, retraced, entered))
+    pdf = pdf_of(paper_of(found.statement, found.retraced, found.entered))
     if out is None:
-        return save_new(Path(), f"{paper_stem(statement)}.pdf", pdf)
+        return save_new(Path(), f"{paper_stem(found.statement)}.pdf", pdf)
     write_whole(out, pdf)
     return out

@@ -137,7 +137,10 @@ def seen(dressed: QApplication) -> Iterator[Seen]:
 
 
 def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
-    """Yield what room the step that is shown has in each language and width."""
+    """Yield what room the step that is shown has in each language and width.
+
+    In the appearance that it was drawn in last: to change it takes long.
+    """
     window = stage.wizard.window
 
     def room() -> Room:
@@ -145,7 +148,7 @@ def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
 
     for language in Language:
         for size in SIZES:
-            stage.set_look(SCREENS.Look(language, Appearance.DARK, size))
+            stage.set_look(SCREENS.Look(language, Appearance.LIGHT, size))
             rooms = [stage.still(room)]
             for tabs in window.page().findChildren(QTabWidget):
                 for index in range(tabs.count()):

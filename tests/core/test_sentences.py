@@ -100,8 +100,13 @@ def has_words(node: ast.expr) -> bool:
     return any(re.search("[A-Za-z]", text) for text in texts)
 
 
-ALL_SAID = {path: said_in(source) for path, source in SOURCES.items()}
-EVERYTHING = [said for found in ALL_SAID.values() for said in found]
+@cache
+def all_said() -> dict[Path, list[Said]]:
+    return {path: said_in(source) for path, source in SOURCES.items()}
+
+
+def everything() -> list[Said]:
+    return [said for found in all_said().values() for said in found]
 
 
 def test_values_are_put_into_the_template() -> None:
@@ -147,18 +152,18 @@ def test_a_sentence_that_is_put_together_is_noticed() -> None:
 
 
 def test_a_code_names_one_template() -> None:
-    assert len(EVERYTHING) > 250
-    counts = Counter(said.code for said in EVERYTHING)
+    assert len(everything()) > 250
+    counts = Counter(said.code for said in everything())
     assert [code for code, count in counts.items() if count > 1] == []
     assert [code for code in counts if not re.fullmatch(CODE, code)] == []
 
 
 def test_every_message_of_a_swing_is_said() -> None:
-    assert {said.code for said in EVERYTHING} >= set(Code)
+    assert {said.code for said in everything()} >= set(Code)
 
 
 def test_every_field_of_a_template_has_a_value() -> None:
-    assert [said for said in EVERYTHING if not said.fields <= said.values] == []
+    assert [said for said in everything() if not said.fields <= said.values] == []
 
 
 def test_a_field_without_a_value_is_noticed() -> None:
@@ -182,7 +187,7 @@ def test_words_without_a_template_are_noticed() -> None:
 def test_only_the_command_line_names_its_options() -> None:
     named = [
         said.template
-        for path, found in ALL_SAID.items()
+        for path, found in all_said().items()
         for said in found
         if path not in COMMAND_LINE and re.search(OF_THE_COMMAND_LINE, said.template)
     ]
@@ -199,4 +204,4 @@ def test_a_template_that_names_an_option_is_noticed() -> None:
 
 
 def test_what_to_type_answers_something_that_is_said() -> None:
-    assert set(ADVICE) <= {said.code for said in EVERYTHING}
+    assert set(ADVICE) <= {said.code for said in everything()}

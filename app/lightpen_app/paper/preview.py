@@ -25,7 +25,9 @@ class PaperWindow(Translated, QWidget):
     Parameters
     ----------
     place : SavePlace
-        Where PDFs are saved, and under which name.
+        Where PDFs are saved.
+    stem : str
+        What the name of its PDF begins with.
 
     Signals
     -------
@@ -39,13 +41,18 @@ class PaperWindow(Translated, QWidget):
     failed = Signal(str)
 
     def __init__(
-        self, paper: Paper, place: SavePlace, parent: QWidget | None = None
+        self,
+        paper: Paper,
+        place: SavePlace,
+        stem: str,
+        parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent, Qt.WindowType.Window)
         self.setObjectName("paper")
         self.resize(100 * GRID, 110 * GRID)
         self._paper = paper
         self._place = place
+        self._stem = stem
         self._saving: Job | None = None
 
         # Widgets
@@ -106,7 +113,7 @@ class PaperWindow(Translated, QWidget):
         dialog.setNameFilter("PDF (*.pdf)")
         dialog.setDefaultSuffix("pdf")
         dialog.setDirectory(str(self._place.folder()))
-        dialog.selectFile(f"{self._place.stem()}.pdf")
+        dialog.selectFile(f"{self._stem}.pdf")
         dialog.fileSelected.connect(lambda path: self.write(Path(path)))
         dialog.open()
 

@@ -26,6 +26,9 @@ from lightpen_app.paper.pages import Margins, Paper, lay_out, paint_page
 from lightpen_app.paper.pieces import DOTS_AN_INCH
 from lightpen_app.paper.sections import all_sections, title_text, translate
 
+# Qt names it among the colours of each page and draws in none of it; PDF/A-1 has no
+# place for it beside colours of a screen. Of equal length, as a PDF counts its bytes.
+CMYK, IN_ITS_PLACE = b"/DeviceCMYK", b"/DeviceRGB "
 NUMBER_LENGTH = 12  # digits of the SHA-256 that name a record
 A4 = QPageLayout(
     QPageSize(QPageSize.PageSizeId.A4),
@@ -62,7 +65,7 @@ def pdf_of(paper: Paper) -> bytes:
     writer.setCreator("Lightpen")
     paint_on(paper, writer)
     buffer.close()
-    return bytes(buffer.data().data())
+    return bytes(buffer.data().data()).replace(CMYK, IN_ITS_PLACE)
 
 
 def paint_on(paper: Paper, device: QPagedPaintDevice) -> None:

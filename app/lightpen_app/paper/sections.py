@@ -82,6 +82,13 @@ def _verdict(statement: Statement) -> Piece:
     lines = [worded_anew(statement.why.text)]
     if statement.accepted is None:
         lines.append(translate("paper", "This tip was not accepted."))
+    elif statement.restores is not None:
+        told = translate(
+            "paper",
+            "This tip of an earlier calibration was put in force again, with the "
+            "reason: {0}",
+        )
+        lines.append(told.format(statement.reason))
     elif statement.grade is Grade.PASS:
         lines.append(translate("paper", "The tip was accepted."))
     else:

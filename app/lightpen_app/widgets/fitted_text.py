@@ -1,5 +1,6 @@
 """Text as large as its place allows, up to the size that the distance asks for."""
 
+from functools import lru_cache
 from math import ceil
 
 from PySide6.QtCore import QRectF, QSize, Qt
@@ -110,20 +111,29 @@ def fitted_size(
     text: str, box: QRectF, largest: float, *, bold: bool, flags: int = WRAPPED
 ) -> float:
     """Return the largest font size up to a limit at which text fits a box, px."""
-    low, high = 6, max(6, round(largest))
+    return _fitted(text, box.width(), box.height(), round(largest), bold, flags)
+
+
+@lru_cache(maxsize=256)  # the same words are painted again with every image
+def _fitted(
+    text: str, width: float, height: float, largest: int, bold: bool, flags: int
+) -> int:
+    low, high = 6, max(6, largest)
     while low < high:
         middle = (low + high + 1) // 2
-        if _fits(text, box, middle, bold=bold, flags=flags):
+        metrics = QFontMetricsF(font(middle, bold=bold))
+        if _fits(text, metrics, width, height, flags):
             low = middle
         else:
             high = middle - 1
     return low
 
 
-def _fits(text: str, box: QRectF, size: int, *, bold: bool, flags: int) -> bool:
-    metrics = QFontMetricsF(font(size, bold=bold))
+def _fits(
+    text: str, metrics: QFontMetricsF, width: float, height: float, flags: int
+) -> bool:
     widest_word = max(map(metrics.horizontalAdvance, text.split()), default=0)
-    if widest_word > box.width() and flags & WRAPPED and text.isascii():
+    if widest_word > width and flags & WRAPPED and text.isascii():
         return False
-    needed = metrics.boundingRect(QRectF(0, 0, box.width(), 1e6), flags, text)
-    return needed.height() <= box.height() and needed.width() <= box.width() + 1
+    needed = metrics.boundingRect(QRectF(0, 0, width, 1e6), flags, text)
+    return needed.height() <= height and needed.width() <= width + 1

@@ -13,6 +13,7 @@ from PySide6.QtGui import (
     QPainterPath,
     QPaintEvent,
     QPen,
+    QPixmap,
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -121,6 +122,8 @@ class PostureDial(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._value = DialValue()
+        self._ground = QPixmap()
+        self._ground_shows: tuple[object, ...] = ()
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
@@ -165,17 +168,9 @@ class PostureDial(Translated, QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         colors = colors_of(self.palette())
         middle, rim, bar = self._places()
-        draw_camera(
-            painter,
-            QRectF(0, 0, self.width(), bar.top()),
-            Stand(middle, rim, self._value.heading - math.pi / 2),
-            self.tr("camera"),
-            QColor(colors.muted),
-        )
+        painter.drawPixmap(0, 0, self._drawn_ground(colors))
         target = self._value.target
         marked = _Field(*field_of(target)) if target else None
-        for place in _fields():
-            self._draw_field(painter, middle, rim, place, colors)
         if marked:
             outline = _outline(middle, rim, marked, self._value.heading)
             painter.setBrush(Qt.BrushStyle.NoBrush)
@@ -183,6 +178,35 @@ class PostureDial(Translated, QWidget):
             painter.drawPath(outline)
         self._draw_posture(painter, middle, rim, colors)
         self._draw_turn(painter, bar, colors)
+
+    def _drawn_ground(self, colors: Colors) -> QPixmap:
+        """Return camera and fields, which change less often than the posture."""
+        value, scale, camera = self._value, self.devicePixelRatio(), self.tr("camera")
+        shows = (
+            *(self.size().toTuple(), scale, colors, camera, value.heading),
+            *(value.counts.tobytes(), value.needed.tobytes()),
+            *(value.n_upright, value.n_upright_needed),
+        )
+        if shows == self._ground_shows:
+            return self._ground
+        ground = QPixmap(self.size() * scale)
+        ground.setDevicePixelRatio(scale)
+        ground.fill(Qt.GlobalColor.transparent)
+        painter = QPainter(ground)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        middle, rim, bar = self._places()
+        draw_camera(
+            painter,
+            QRectF(0, 0, self.width(), bar.top()),
+            Stand(middle, rim, value.heading - math.pi / 2),
+            camera,
+            QColor(colors.muted),
+        )
+        for place in _fields():
+            self._draw_field(painter, middle, rim, place, colors)
+        painter.end()
+        self._ground, self._ground_shows = ground, shows
+        return ground
 
     def _places(self) -> tuple[QPointF, float, QRectF]:
         """Return the middle of the dial, its radius, and the bar of the turn, px."""

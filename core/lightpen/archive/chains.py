@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from typing import Any
 from uuid import uuid4
 
@@ -10,13 +10,16 @@ from sqlalchemy import Column, Connection, Row, func, insert, select, update
 
 from lightpen.archive.database import Database
 from lightpen.archive.entries import (
+    EPOCH,
     NOTHING_BEFORE,
     Event,
     Head,
     Kind,
     Written,
     chained,
+    named_entry,
     read_entry,
+    since_us,
     text_sha256,
 )
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
@@ -24,7 +27,6 @@ from lightpen.errors import ArchiveError
 from lightpen.formats.own_json import DamagedError
 from lightpen.sentences import Sentence, sentence
 
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 SET_ASIDE = (Kind.REFUSED, Kind.ABANDONED)
 _AT_HOME = select(CHAINS.c.chain).where(CHAINS.c.is_own)
 # Of an entry that is to be read.
@@ -243,6 +245,7 @@ def columns_of(entry: Written) -> dict[str, Any]:
         "concerns": event.concerns or "",
         "record_sha256": event.record_sha256 or "",
         "text": entry.text,
+        "at_us": since_us(event.at),
     }
 
 
@@ -262,11 +265,6 @@ def sound_entry(row: Row[Any]) -> Written | None:
     except DamagedError:
         return None
     return entry if columns_of(entry) == columns else None
-
-
-def since_us(moment: datetime) -> int:
-    """Return a moment as the column has it."""
-    return (moment - EPOCH) // timedelta(microseconds=1)
 
 
 def searchable(text: str) -> str:
@@ -377,10 +375,9 @@ def _named(entries: Sequence[Written], records: Mapping[str, str]) -> dict[str, 
             raise ArchiveError(
                 sentence(
                     "archive.record-missing",
-                    "The record of entry {number} of station {station} is missing or "
-                    "was changed. Get the entries from their station again.",
-                    number=each.entry.number,
-                    station=each.entry.event.names.station,
+                    "The record of {entry} is missing or was changed. Get the entries "
+                    "from their station again.",
+                    entry=_named_entry(each),
                 )
             )
         named[wanted] = text
@@ -390,12 +387,15 @@ def _named(entries: Sequence[Written], records: Mapping[str, str]) -> dict[str, 
 def _forked(entry: Written) -> Sentence:
     return sentence(
         "archive.forked",
-        "Entry {number} of station {station} is not the one that follows here. A data "
-        "folder was copied and both copies were gone on with, or entries were "
-        "changed. Check both archives.",
-        number=entry.entry.number,
-        station=entry.entry.event.names.station,
+        "What is kept here does not go on with {entry}. A data folder was copied and "
+        "both copies were gone on with, or entries were changed. Check both archives.",
+        entry=_named_entry(entry),
     )
+
+
+def _named_entry(entry: Written) -> Sentence:
+    place = entry.entry
+    return named_entry(place.chain, place.number, place.event.names.station)
 
 
 def read_row(database: Database, row: Row[Any]) -> Written:

@@ -10,7 +10,13 @@ from sqlalchemy import Row, exists, select, text
 
 from lightpen.archive.chains import chain_at_home, heads, records_of, sound_entry
 from lightpen.archive.database import Database, is_open, look_into
-from lightpen.archive.entries import NOTHING_BEFORE, Head, text_sha256
+from lightpen.archive.entries import (
+    NOTHING_BEFORE,
+    SHORT,
+    Head,
+    named_entry,
+    text_sha256,
+)
 from lightpen.archive.files_check import FilesCheck
 from lightpen.archive.seal import is_sealed_otherwise, lost_heads, read_seal
 from lightpen.archive.tables import CHAINS, ENTRIES, RECORDS
@@ -19,7 +25,6 @@ from lightpen.sentences import Sentence, sentence
 
 BATCH = 200  # rows that are read at one time
 SOUND = "ok"  # SQLite's word for a file without damage
-SHORT = 8  # characters by which a chain is named
 
 Report = Callable[[float], None]
 
@@ -264,7 +269,7 @@ def _lost_records(database: Database) -> Iterator[Sentence]:
         yield sentence(
             "archive.record-lost",
             "The record of {entry} is missing.",
-            entry=_named(row.chain, row.number),
+            entry=named_entry(row.chain, row.number),
         )
 
 
@@ -274,17 +279,8 @@ def _entries_of(database: Database, record: str) -> tuple[Sentence, ...]:
     )
     with database.reading() as connection:
         rows = connection.execute(vouching).all()
-    found = tuple(_named(row.chain, row.number) for row in rows)
+    found = tuple(named_entry(row.chain, row.number) for row in rows)
     return found or (sentence("archive.no-entry", "no entry"),)
-
-
-def _named(chain: str, number: int) -> Sentence:
-    return sentence(
-        "archive.entry",
-        "entry {number} of the chain {chain}",
-        number=number,
-        chain=chain[:SHORT],
-    )
 
 
 def _changed(chain: str, number: int) -> Sentence:

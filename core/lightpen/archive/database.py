@@ -36,13 +36,14 @@ from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
+from lightpen.archive import earlier
 from lightpen.archive.uses import Uses
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
 from lightpen.formats.files import printable
 from lightpen.record.numbered_files import make_folder
 from lightpen.sentences import sentence
 
-VERSION = "1"  # of the tables, as the last of the migrations says
+VERSION = "2"  # of the tables, as the last of the migrations says
 VERSION_TABLE = "archive_version"
 MIGRATIONS = Path(__file__).with_name("migrations")
 MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrates
@@ -246,7 +247,13 @@ def _without_password(url: URL) -> str:
 def _read_only(path: Path) -> Database:
     mode = "mode=ro" if is_open(path) else "immutable=1"
     place = f"{path.absolute().as_uri()}?{mode}"
-    engine = _sqlite_engine(lambda: _connected(place))
+
+    def connect() -> sqlite3.Connection:
+        connection = _connected(place)
+        earlier.show_as_now(connection)
+        return connection
+
+    engine = _sqlite_engine(connect)
     return Database(engine, printable(str(path)), path)
 
 
@@ -286,7 +293,7 @@ def _require_known(database: Database) -> str | None:
             found = _found_version(connection)
             if found is None and inspect(connection).get_table_names():
                 raise _of_other_program(database.name)
-        if found not in (None, VERSION):
+        if found not in (None, VERSION, *earlier.VERSIONS):
             raise _of_later_version(database.name)
     except ArchiveError:
         database.close()

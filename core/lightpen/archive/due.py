@@ -8,9 +8,9 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import select
 
-from lightpen.archive.chains import searchable, since_us
+from lightpen.archive.chains import searchable
 from lightpen.archive.database import Database
-from lightpen.archive.entries import Kind, Written
+from lightpen.archive.entries import Kind, Written, since_us
 from lightpen.archive.history import known_names
 from lightpen.archive.queries import calibrating, last_accepted, of_chain
 from lightpen.archive.tables import ENTRIES

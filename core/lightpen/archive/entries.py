@@ -17,15 +17,19 @@ from typing import Annotated, TypeAlias
 
 from msgspec import Meta, Struct, to_builtins
 
+from lightpen.formats.files import printable
 from lightpen.formats.own_json import Digest, Moment, Vector, parse_json, require_usual
 from lightpen.model.origin import Origin
 from lightpen.record.assumed import Plain
 from lightpen.record.names import Names
 from lightpen.record.outcome import TrialOutcome
 from lightpen.record.results import Since, Why
+from lightpen.sentences import Sentence, sentence
 
 NOTHING_BEFORE = "0" * 64  # in place of a hash, in the first entry of a chain
 TICK = timedelta(microseconds=1)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+SHORT = 8  # characters by which a chain is named
 
 Chain: TypeAlias = Annotated[str, Meta(pattern="^[0-9a-f]{32}$")]
 
@@ -215,6 +219,44 @@ def read_entry(text: str) -> Written:
     """
     data = text.encode("utf-8", "surrogateescape")
     return Written(parse_json(data, Entry), text, text_sha256(text))
+
+
+def since_us(moment: datetime) -> int:
+    """Return a moment as databases have it, in us since 1970."""
+    return (moment - EPOCH) // TICK
+
+
+def at_us(text: object, otherwise: int) -> int:
+    """Return when an entry was by its own clock, as `since_us`.
+
+    Parameters
+    ----------
+    text : object
+        Of the entry.
+    otherwise : int
+        What is returned of a text that is damaged.
+    """
+    try:
+        return since_us(datetime.fromisoformat(json.loads(str(text))["event"]["at"]))
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError):
+        return otherwise
+
+
+def named_entry(chain: str, number: int, station: str = "") -> Sentence:
+    """Return what an entry is called: by its station where one is known."""
+    if station:
+        return sentence(
+            "archive.entry-of-station",
+            "entry {number} of the station {station}",
+            number=number,
+            station=printable(station),
+        )
+    return sentence(
+        "archive.entry",
+        "entry {number} of the chain {chain}",
+        number=number,
+        chain=chain[:SHORT],
+    )
 
 
 def text_sha256(text: str) -> str:

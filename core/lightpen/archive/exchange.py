@@ -3,13 +3,15 @@
 Whichever way they go, they are copied chain by chain in their order, and what is there
 already is passed over: a copy that was cut off is simply made again.
 
-An exported archive is text. Its first line names the format, the last says how many
-entries there are, and each line between holds one entry with its record.
+An exported archive is text. Its first line names the format, and each of the others
+holds one entry with its record, but for the last: it says how many entries there are,
+and the checksum of all lines before it.
 """
 
 import json
 import os
 from collections.abc import Iterator
+from hashlib import sha256
 from itertools import groupby, islice
 from pathlib import Path
 
@@ -31,7 +33,7 @@ from lightpen.formats.files import MEGABYTE, opened, printable, strerror
 from lightpen.formats.own_json import DamagedError, parse_json
 from lightpen.sentences import sentence
 
-FORMAT = 1
+FORMAT = 2
 WHAT = sentence("file.exported-archive", "exported archive")
 DELIVERED = 20  # entries at one time: some MB, which a slow line carries in time
 LIMIT = 10**6 * MEGABYTE  # it is read line by line
@@ -48,6 +50,7 @@ class _Line(Struct):
 
 class _End(Struct):
     n_entries: int
+    sha256: str
 
 
 def deliver(database: Database, chain: str, server: Database) -> Copied:
@@ -76,14 +79,16 @@ def export_entries(database: Database, path: Path) -> int:
     FileError
         It cannot be written.
     """
-    n_entries = 0
+    n_entries, checksum = 0, sha256()
     try:
         with path.open("xb") as stream:
-            stream.write(_line({"lightpen_archive": FORMAT}))
-            for line in _lines(database):
-                stream.write(_line(line))
-                n_entries += 1
-            stream.write(_line({"n_entries": n_entries}))
+            for content in _contents(database):
+                line = _line(content)
+                stream.write(line)
+                checksum.update(line)
+                n_entries += "entry" in content
+            end = {"n_entries": n_entries, "sha256": checksum.hexdigest()}
+            stream.write(_line(end))
             stream.flush()
             os.fsync(stream.fileno())
     except FileExistsError as error:
@@ -132,7 +137,8 @@ def import_entries(database: Database, path: Path) -> Copied:
     return Copied(n_new, n_known)
 
 
-def _lines(database: Database) -> Iterator[dict[str, str | None]]:
+def _contents(database: Database) -> Iterator[dict[str, object]]:
+    yield {"lightpen_archive": FORMAT}
     for head in heads(database):
         for entry in entries_of(database, head.chain):
             name = entry.entry.event.record_sha256
@@ -152,15 +158,18 @@ def _read(path: Path) -> Iterator[tuple[Written, str | None]]:
     n_read = 0
     with opened(path, WHAT, LIMIT) as stream:
         try:
-            if parse_json(stream.readline(), _Head).lightpen_archive != FORMAT:
-                raise DamagedError("It is of a later version.")
+            first = stream.readline()
+            if parse_json(first, _Head).lightpen_archive != FORMAT:
+                raise DamagedError("It is of another version.")
+            checksum = sha256(first)
             for line in stream:
                 if line.startswith(b'{"n_entries"'):
-                    if parse_json(line, _End).n_entries != n_read:
-                        raise DamagedError("Lines are missing.")
+                    if parse_json(line, _End) != _End(n_read, checksum.hexdigest()):
+                        raise DamagedError("Lines are missing or changed.")
                     return
                 found = parse_json(line, _Line)
                 yield read_entry(found.entry), found.record
+                checksum.update(line)
                 n_read += 1
             raise DamagedError("Its end is missing.")
         except DamagedError as error:

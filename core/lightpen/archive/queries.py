@@ -14,9 +14,9 @@ from sqlalchemy import (
     tuple_,
 )
 
-from lightpen.archive.chains import READ, read_row, searchable, since_us
+from lightpen.archive.chains import READ, read_row, searchable
 from lightpen.archive.database import Database
-from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, Written
+from lightpen.archive.entries import IN_FORCE_BY, Entry, Kind, Written, since_us
 from lightpen.archive.tables import ENTRIES
 
 IN_ORDER = (ENTRIES.c.since_us, ENTRIES.c.chain, ENTRIES.c.number)
@@ -30,7 +30,7 @@ class Wanted:
     Attributes
     ----------
     begin, end : datetime or None
-        Entries since the one, and before the other.
+        Entries since the one, and before the other, each by its own clock.
     is_simulated : bool or None
         Whether of simulated pens.
     """
@@ -164,7 +164,7 @@ def condition_of(wanted: Wanted) -> ColumnElement[bool]:
     if wanted.is_simulated is not None:
         condition &= ENTRIES.c.is_simulated == wanted.is_simulated
     if wanted.begin is not None:
-        condition &= ENTRIES.c.since_us >= since_us(wanted.begin)
+        condition &= ENTRIES.c.at_us >= since_us(wanted.begin)
     if wanted.end is not None:
-        condition &= ENTRIES.c.since_us < since_us(wanted.end)
+        condition &= ENTRIES.c.at_us < since_us(wanted.end)
     return condition

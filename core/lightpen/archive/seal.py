@@ -5,6 +5,9 @@ has bytes that belong to neither. As long as nothing was entered since, the file
 as it was sealed, bit by bit. Whatever was entered since, the archive must still hold
 the last entries of then: so one whose last entries were taken out, with all that tells
 of them, is found, and one that was replaced by an older copy of itself.
+
+The first seals had one hash of all that. They are read as what they are, and the next
+time the archive is closed it is sealed as now.
 """
 
 from pathlib import Path
@@ -15,7 +18,7 @@ from sqlalchemy import select
 
 from lightpen.archive.chains import heads
 from lightpen.archive.database import Database, is_open
-from lightpen.archive.entries import Chain, Head
+from lightpen.archive.entries import Chain, Head, text_sha256
 from lightpen.archive.tables import ENTRIES
 from lightpen.errors import FileError
 from lightpen.estimation.report import json_bytes
@@ -42,13 +45,13 @@ class Seal(Struct, frozen=True):
 
     Attributes
     ----------
-    heads : tuple of SealedHead
-        Of all chains.
+    heads : tuple of SealedHead, or str
+        Of all chains; of the first seals one hash of them all.
     sha256 : str
         Of the file.
     """
 
-    heads: tuple[SealedHead, ...]
+    heads: tuple[SealedHead, ...] | Digest
     sha256: Digest
 
 
@@ -107,15 +110,18 @@ def read_seal(archive: Path) -> Seal | None:
 def lost_heads(database: Database, seal: Seal) -> tuple[SealedHead, ...]:
     """Return the last entries of then that an archive does not hold any more.
 
+    One of the first seals does not name them.
+
     Raises
     ------
     ArchiveError
         It cannot be read.
     """
+    heads_then = () if isinstance(seal.heads, str) else seal.heads
     with database.reading() as connection:
         return tuple(
             head
-            for head in seal.heads
+            for head in heads_then
             if head.number
             and connection.execute(
                 select(ENTRIES.c.sha256).where(
@@ -136,12 +142,19 @@ def is_sealed_otherwise(archive: Path, ends: tuple[Head, ...], seal: Seal) -> bo
     """
     if is_open(archive):
         return False
-    return seal.heads == sealed_heads(ends) and seal.sha256 != sha256(archive)
+    now = sealed_heads(ends)
+    same = _hash_of(now) if isinstance(seal.heads, str) else now
+    return seal.heads == same and seal.sha256 != sha256(archive)
 
 
 def sealed_heads(ends: tuple[Head, ...]) -> tuple[SealedHead, ...]:
     """Return how far chains have come, as a seal tells it."""
     return tuple(SealedHead(head.chain, head.number, head.sha256) for head in ends)
+
+
+def _hash_of(ends: tuple[SealedHead, ...]) -> str:
+    told = (f"{head.chain} {head.number} {head.sha256}" for head in ends)
+    return text_sha256(" ".join(told))
 
 
 def _tells_of_change(database: Database, archive: Path) -> bool:

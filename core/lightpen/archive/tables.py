@@ -44,6 +44,7 @@ ENTRIES = Table(
     Column("concerns", String(64), nullable=False),
     Column("record_sha256", String(64), nullable=False),
     Column("text", Text, nullable=False),
+    Column("at_us", BigInteger, nullable=False),  # by its own clock
     Index("archive_of_tip", "pen", "tip", "is_simulated", "kind", "since_us"),
     Index("archive_in_order", "since_us", "chain", "number"),
     Index("archive_of_station", "station", "since_us", "chain", "number"),
@@ -51,6 +52,7 @@ ENTRIES = Table(
     Index("archive_of_result", "chain", "result"),
     Index("archive_of_entry", "concerns"),
     Index("archive_by_hash", "sha256"),
+    Index("archive_by_clock", "at_us", "since_us", "chain", "number"),
 )
 
 RECORDS = Table(

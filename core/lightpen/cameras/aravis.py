@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from ctypes import byref, c_double, c_int, c_int64, c_size_t, c_uint
 from ipaddress import ip_address
-from threading import Lock
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,13 @@ from lightpen.sentences import Sentence, sentence
 N_BUFFERS = 16  # images on their way; each is given back as soon as it is copied
 WAITING = 1 << 24  # bytes of packets that wait to be read, or fewer where so many may
 
-# Where this program may open packet sockets, Aravis 0.8 lets in the packets of all
-# cameras until it has set the filter of one: images of another that streams already are
-# taken for the camera's own, which are thrown away as late where their numbers are
-# lower. So only the first stream has one; it is the best where the machine is loaded.
-_STARTING = Lock()
-_STREAMS: set[int] = set()
+# Where this program may open packet sockets, which lose least on a loaded machine,
+# Aravis 0.8 opens one for each stream and lets in whatever packets pass this machine
+# until it has set the filter of its camera. It takes them for images, and throws away
+# the camera's own as late where their numbers are lower.
+RECEIVED = b"n_received_packets"
+TRIES = 3  # after which the stream does without one
+STRAYING_S = 0.03  # some times what a packet waits in a packet socket until it is read
 
 
 class AravisFeatures:
@@ -186,15 +187,14 @@ class AravisDevice:
     def start(self) -> None:
         """Let images come."""
         aravis, camera = self._open_ones()
-        with _STARTING, self._told():
+        with self._told():
             payload = aravis.camera_get_payload(camera)
             if aravis.camera_is_gv_device(camera):
-                option = NO_PACKET_SOCKET if _STREAMS else ANY_SOCKET
-                aravis.camera_gv_set_stream_options(camera, option)
-            self._stream = stream = aravis.camera_create_stream(camera, None, None)
-            _STREAMS.add(stream)
-            if aravis.camera_is_gv_device(camera):
+                self._stream = stream = self._gige_stream(aravis, camera)
                 aravis.set_property(stream, b"socket-buffer-size", WAITING, None)
+            else:
+                stream = aravis.camera_create_stream(camera, None, None)
+                self._stream = stream
             for _ in range(N_BUFFERS):
                 aravis.stream_push_buffer(stream, aravis.buffer_new_allocate(payload))
             aravis.camera_start_acquisition(camera)
@@ -246,7 +246,22 @@ class AravisDevice:
         stream, self._stream = self._stream, None
         if self._aravis is not None and stream is not None:
             self._aravis.unref(stream)
-            _STREAMS.discard(stream)
+
+    def _gige_stream(self, aravis: Aravis, camera: int) -> int:
+        """Return a stream into which no packet strayed that is not the camera's."""
+        with suppress(AravisError):  # as a program that crashed let them come
+            aravis.camera_stop_acquisition(camera)
+        aravis.camera_gv_set_stream_options(camera, ANY_SOCKET)
+        stream: int
+        for _ in range(TRIES):
+            stream = aravis.camera_create_stream(camera, None, None)
+            sleep(STRAYING_S)
+            if aravis.stream_get_info_uint64_by_name(stream, RECEIVED) == 0:
+                return stream
+            aravis.unref(stream)
+        aravis.camera_gv_set_stream_options(camera, NO_PACKET_SOCKET)
+        stream = aravis.camera_create_stream(camera, None, None)
+        return stream
 
     def _searched(self, aravis: Aravis) -> str:
         """Return by what Aravis opens the camera with this serial number."""

@@ -123,6 +123,9 @@ class Aravis:
             *(pointer, text, POINTER(c_uint)),
         )
 
+        self.stream_get_info_uint64_by_name = plain(
+            "stream_get_info_uint64_by_name", c_uint64, pointer, text
+        )
         self.stream_push_buffer = plain("stream_push_buffer", None, pointer, pointer)
         self.stream_timeout_pop_buffer = plain(
             "stream_timeout_pop_buffer", pointer, pointer, c_uint64

@@ -8,9 +8,9 @@ from datetime import date, datetime, time, timedelta
 from pathlib import Path
 
 from lightpen.archive.chains import own_chain
-from lightpen.archive.check import SHORT, check_file
+from lightpen.archive.check import check_file
 from lightpen.archive.database import Database, look_into, open_file, open_server
-from lightpen.archive.entries import Kind
+from lightpen.archive.entries import SHORT, Kind
 from lightpen.archive.exchange import deliver, export_entries, import_entries
 from lightpen.archive.history import Line, lines
 from lightpen.archive.late_logbook import SERVER

@@ -80,7 +80,7 @@ def _text(calibration: Calibration, stated: list[float]) -> str:
     camera = fitted.state.rig.cameras[0]
     u = COVERAGE_FACTOR * np.sqrt(np.diag(fitted.covariance)[place])
     before = COVERAGE_FACTOR * np.sqrt(
-        np.diag(calibration.priors.cameras[0].covariance)
+        np.diag(calibration.stated.cameras[0].covariance)
     )
     lines = [
         f"{'':8}{'file':>14}{'U (k = 2)':>12}{'with the swing':>16}{'U (k = 2)':>12}"

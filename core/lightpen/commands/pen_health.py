@@ -11,7 +11,6 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.commands.verifications import read_scale
 from lightpen.errors import UsageError
 from lightpen.formats.camera_files import read_camera
 from lightpen.formats.files import sha256
@@ -21,6 +20,7 @@ from lightpen.record.calibrations import CalibrationFile, read_calibration
 from lightpen.sentences import sentence
 from lightpen.verification.led_file import improve_pen
 from lightpen.verification.pen_health import GROWN, MOVED, examine_pen
+from lightpen.verification.read_back import read_scale
 from lightpen.verification.records import pen_health_entries, verification_record
 from lightpen.verification.texts import improved_pen_text, pen_health_text
 

@@ -18,7 +18,6 @@ from lightpen.commands.console import (
     shown,
     write_record,
 )
-from lightpen.commands.verifications import read_fixed_point
 from lightpen.detection.observations import observe_centers
 from lightpen.errors import UsageError
 from lightpen.estimation.calibrate import calibrate
@@ -33,6 +32,7 @@ from lightpen.record.calibrations import read_calibration
 from lightpen.sentences import sentence
 from lightpen.verification.charts import write_chart
 from lightpen.verification.pen_health import require_one_pen
+from lightpen.verification.read_back import read_fixed_point
 from lightpen.verification.records import repeatability_entries, verification_record
 from lightpen.verification.repeatability import TipEstimate, measure_repeatability
 from lightpen.verification.texts import repeatability_text
@@ -103,7 +103,7 @@ def _repeatability(options: argparse.Namespace) -> None:
         limits,
         tolerance=options.tolerance,
         reference=None if options.reference is None else np.array(options.reference),
-        fixed_point=(
+        touched=(
             None
             if options.fixed_point is None
             else read_fixed_point(options.fixed_point)

@@ -25,7 +25,6 @@ from lightpen.commands.console import (
     write_record,
 )
 from lightpen.commands.pen_health import add_verify_pen
-from lightpen.commands.verifications import read_drift
 from lightpen.estimation.instrument import Instrument
 from lightpen.formats.hashes import all_hashed, hashed
 from lightpen.formats.pen_files import read_pen
@@ -48,6 +47,7 @@ from lightpen.verification.places import (
     read_viewers,
     touch_place,
 )
+from lightpen.verification.read_back import read_drift
 from lightpen.verification.records import (
     articulation_entries,
     circle_entries,
@@ -58,7 +58,12 @@ from lightpen.verification.records import (
     touch_entries,
     verification_record,
 )
-from lightpen.verification.sources import TouchRun, instrument_of, touch_run
+from lightpen.verification.sources import (
+    TouchRun,
+    instrument_of,
+    touch_run,
+    witness_of,
+)
 from lightpen.verification.texts import (
     articulation_text,
     circle_text,
@@ -70,6 +75,7 @@ from lightpen.verification.texts import (
 from lightpen.verification.tip_in_force import cone_before
 from lightpen.verification.touch import NO_DRIFT, Touch, on_surface
 from lightpen.verification.touching import FAST, PRECISE, SETTLING, TouchRules
+from lightpen.verification.witness import LampWitness, judged_with, witness_entries
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
@@ -250,6 +256,8 @@ class _Measured:
         Of the calibration; None before another camera.
     drift : (3,) array
         Standard uncertainty of a point by a camera that moved meanwhile, mm.
+    witness : LampWitness or None
+        What fixed lamps in view tell of the camera.
     """
 
     calibration: CalibrationFile
@@ -261,6 +269,7 @@ class _Measured:
     nominal_tip: FloatArray | None
     cone_cam: FloatArray | None
     drift: FloatArray
+    witness: LampWitness | None
 
     @property
     def touches(self) -> list[tuple[str, Sequence[Touch]]]:
@@ -351,6 +360,7 @@ def _touches(options: argparse.Namespace) -> None:
         touches = [on_surface(touch, radius) for touch in touches]
     rejected = [each for run in measured.runs for each in run.rejected]
     print(shown(touches_text(touches, measured.instrument, rejected)))
+    _tell_witness(measured)
     if options.json is not None:
         entries = [touch_entries(touch, measured.instrument) for touch in touches]
         _write(options, measured, "touches", {"touches": entries}, None)
@@ -383,6 +393,8 @@ def _measure(
     nominal = getattr(options, "nominal_tip", None)
     for known in (pen.nominal_tip, calibration.nominal_tip):
         nominal = known if nominal is None else nominal
+    witness = witness_of(runs, instrument, _limits(options))
+    moved = NO_DRIFT if drift is None else read_drift(drift)
     return _Measured(
         calibration=calibration,
         instrument=instrument,
@@ -392,7 +404,8 @@ def _measure(
         pen_file=pen_file,
         nominal_tip=None if nominal is None else np.array(nominal, dtype=np.float64),
         cone_cam=cone_before(calibration, viewers),
-        drift=NO_DRIFT if drift is None else read_drift(drift),
+        drift=moved if witness is None else np.maximum(moved, witness.share),
+        witness=witness,
     )
 
 
@@ -424,14 +437,23 @@ def _tell(
 ) -> None:
     """Print a verification, and write its record if that is wanted."""
     rejected = [each for run in measured.runs for each in run.rejected]
-    print(shown(text(found, rejected)))
+    judged = judged_with(found.assessment, measured.witness)
+    print(shown(text(replace(found, assessment=judged), rejected)))
+    _tell_witness(measured, judged)
     if not measured.calibration.has_checksum:
         print(
             "The calibration was written by a version that kept no checksum: whether "
             "it was changed since is not known."
         )
     if options.json is not None:
-        _write(options, measured, kind, entries, found.assessment)
+        _write(options, measured, kind, entries, judged)
+
+
+def _tell_witness(measured: _Measured, judged: Conformity | None = None) -> None:
+    """Print what fixed lamps tell, unless it is the verdict."""
+    told = None if measured.witness is None else measured.witness.assessment
+    if told is not None and told is not judged:
+        print(shown(str(told.reason)))
 
 
 def _write(
@@ -445,7 +467,11 @@ def _write(
     limits = asdict(_limits(options))
     record = verification_record(
         kind,
-        {**entries, "rejected": rejected_entries(rejected)},
+        {
+            **entries,
+            "rejected": rejected_entries(rejected),
+            "witness": witness_entries(measured.witness),
+        },
         assessment,
         {name: limits[name] for name in limits if hasattr(options, f"limit_{name}")},
         {

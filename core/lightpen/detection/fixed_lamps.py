@@ -70,12 +70,22 @@ def fixed_lamps(masked: FloatArray, sightings: Sequence[Sighting]) -> FloatArray
     (N, K, 2) array
         Of lamps that nearly all images show; NaN where one does not.
     """
+    return lamps_among(masked, list(map(other_lights, sightings)))
+
+
+def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
+    """Return where images show lamps that stay, by lights that are no LEDs.
+
+    Parameters
+    ----------
+    lights : sequence of (S, 2) array
+        In each of the N images, px; all else as of `fixed_lamps`.
+    """
     paths = [
         _path(path[:, None], np.nanmedian(path, axis=0))
         for path in np.swapaxes(masked, 0, 1)
         if np.isfinite(path[:, 0]).any()
     ]
-    lights = [_foreign(sighting) for sighting in sightings]
     padded = np.full((len(lights), max(map(len, lights), default=0), 2), np.nan)
     for row, each in zip(padded, lights, strict=True):
         row[: len(each)] = each
@@ -92,13 +102,7 @@ def fixed_lamps(masked: FloatArray, sightings: Sequence[Sighting]) -> FloatArray
     return np.stack(found, axis=1) if found else np.zeros((len(lights), 0, 2))
 
 
-def _are_same(path: FloatArray, other: FloatArray) -> bool:
-    """Return whether two lamps, each in nearly all images, are one."""
-    apart = np.linalg.norm(path - other, axis=1)
-    return bool(np.nanmedian(apart) <= STAYS)
-
-
-def _foreign(sighting: Sighting) -> FloatArray:
+def other_lights(sighting: Sighting) -> FloatArray:
     """Return the centres of clean spots that are no LEDs, (S, 2), px."""
     spots, labels = sighting.spots, sighting.labels
     if spots is None or labels is None:
@@ -106,6 +110,12 @@ def _foreign(sighting: Sighting) -> FloatArray:
     clean = _are_clean(spots)
     clean[labels.spot[labels.spot >= 0]] = False
     return np.asarray(spots.centers[clean])
+
+
+def _are_same(path: FloatArray, other: FloatArray) -> bool:
+    """Return whether two lamps, each in nearly all images, are one."""
+    apart = np.linalg.norm(path - other, axis=1)
+    return bool(np.nanmedian(apart) <= STAYS)
 
 
 def _are_clean(spots: Spots) -> BoolArray:

@@ -22,7 +22,12 @@ from lightpen.estimation.contradictions import (
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import Forms, drift_forms, inverse, lean_forms
+from lightpen.estimation.unknowns import (
+    Forms,
+    drift_forms,
+    inverse,
+    lean_forms,
+)
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
@@ -89,22 +94,28 @@ def adjust(
     forms = Forms(lean_forms(state.rotations), drift_forms(len(pixels), shifts))
     fit = partial(fit_bundle, pixels, state, forms=forms, places=places)
 
+    def measured(priors: Priors, factor: float) -> tuple[Bundle, Correlation]:
+        bundle = fit(priors, inflation=factor)
+        return bundle, measure_correlation(bundle, pixels)
+
     def all_allowed(
         factor: float,
     ) -> tuple[Bundle, tuple[Contradiction, ...], Priors, Correlation]:
-        bundle = fit(priors, inflation=factor)
+        bundle, correlation = measured(priors, factor)
         found: tuple[Contradiction, ...] = ()
         freed = priors
         for _ in range(1 if rig.n_cameras == 1 else MAX_DENIED):
-            denied, freed = find_contradictions(rig, bundle, freed)
+            denied, freed = find_contradictions(rig, bundle, freed, correlation.excess)
             if not denied:
                 break
             found += denied
-            bundle = fit(freed, inflation=factor)
-        of_pen, freed = find_pen_contradictions(state.pen, bundle, freed)
+            bundle, correlation = measured(freed, factor)
+        of_pen, freed = find_pen_contradictions(
+            state.pen, bundle, freed, correlation.excess
+        )
         if of_pen:
-            bundle = fit(freed, inflation=factor)
-        return bundle, found + of_pen, freed, measure_correlation(bundle, pixels)
+            bundle, correlation = measured(freed, factor)
+        return bundle, found + of_pen, freed, correlation
 
     factor = 1.0
     allowed, contradictions, freed, correlation = all_allowed(factor)
@@ -116,6 +127,9 @@ def adjust(
     bundle = allowed
     if held is not freed:
         bundle = fit(held, inflation=factor)
+    if correlation.components is not None:
+        bundle = replace(bundle, counted=correlation.components)
+        allowed = replace(allowed, counted=correlation.components)
     return Adjustment(bundle, allowed, freed, contradictions, correlation)
 
 

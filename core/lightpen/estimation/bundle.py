@@ -19,6 +19,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -65,6 +66,10 @@ class Bundle:
         With the cameras and the pen as the images and the files together have them.
     values : (p,) array
         Deviations from the files; tip and cone are 0.
+    components : Components
+        By which LEDs, seat and drift were fitted.
+    counted : Components
+        The same as U holds them: without what noise that lasts explains.
     residuals : (N, C, L, 2) array
         Observed minus modelled centres, px, the seat included; NaN where not seen.
     used : (N, C, L) array of bool
@@ -90,6 +95,7 @@ class Bundle:
     state: BundleState
     values: FloatArray
     components: Components
+    counted: Components
     residuals: FloatArray
     used: BoolArray
     sigma: float
@@ -100,6 +106,13 @@ class Bundle:
     doubted_jitter: FloatArray
     weight_sigma: float
     covariance: FloatArray
+
+    @cached_property
+    def counted_prior(self) -> FloatArray:
+        """What is known before the images as U holds it, (p, p)."""
+        if self.counted is self.components:
+            return self.prior_information
+        return self.unknowns.prior_information(self.counted)
 
     @property
     def columns(self) -> Columns:
@@ -123,6 +136,16 @@ class Bundle:
         apart = np.linalg.norm(places[:, None] - places, axis=2)
         return float(apart.max())
 
+    @property
+    def cone_moves(self) -> FloatArray:
+        """What the cone of each image moved by, as fitted, (N, 3), mm.
+
+        As the pen leant and in the course of the swing.
+        """
+        at = self.columns
+        by_form = self.values[at.seat[0].start : at.drift.stop].reshape(-1, N_CONE)
+        return np.asarray(self.unknowns.forms[:, : len(by_form)] @ by_form)
+
     def part(self, *kinds: slice) -> FloatArray:
         """Return what stands in tip and cone for some unknowns, (6, 6).
 
@@ -133,6 +156,14 @@ class Bundle:
         for at in kinds:
             own[at, at] = known[at, at]
         return self.carried(own)
+
+    def counted_part(self, at: slice) -> FloatArray:
+        """Return what stands in tip and cone for LEDs or a drift, as counted, (6, 6).
+
+        They were fitted as if they were as large as the components have it.
+        """
+        gain = self.covariance[:6, at] @ self.prior_information[at, at]
+        return np.asarray(gain @ inverse(self.counted_prior[at, at]) @ gain.T)
 
     def carried(self, information: FloatArray) -> FloatArray:
         """Return the covariance of tip and cone by errors of that information, (6, 6).
@@ -248,6 +279,7 @@ def fit_bundle(
                 state=state,
                 values=values,
                 components=components,
+                counted=components,
                 residuals=residuals,
                 used=used,
                 sigma=sigma,

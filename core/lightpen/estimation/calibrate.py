@@ -105,8 +105,10 @@ class Calibration:
         Tip, cone and rotations, with all else as the bundle adjustment has it.
     bundle : Bundle
         The bundle adjustment: everything that the files may have wrong.
+    stated : Priors
+        What the files state, and what is assumed in its place.
     priors : Priors
-        What it took from the files, as stated or assumed.
+        The same without what the images contradict.
     assumptions : Assumptions
         What stood in for what the files do not state.
     growth : float
@@ -130,6 +132,7 @@ class Calibration:
     rms: FloatArray
     joint: JointFit
     bundle: Bundle
+    stated: Priors
     priors: Priors
     assumptions: Assumptions
     growth: float
@@ -167,7 +170,7 @@ class Calibration:
             )
             if images.path is not None and images.path.is_followed
         ]
-        is_certain = self.bundle.components.drift.is_significant
+        is_certain = self.bundle.counted.drift.is_significant
         return max([*by_lamps, self.bundle.drift if is_certain else 0.0])
 
     @property
@@ -176,7 +179,7 @@ class Calibration:
 
         0 where they show no significant errors, or the file states its uncertainty.
         """
-        found = self.bundle.components.leds
+        found = self.bundle.counted.leds
         return found.sigma if found.is_significant else 0.0
 
 
@@ -331,6 +334,7 @@ def calibrate_rig(
         rms=_rms_of_moments(cameras),
         joint=joint,
         bundle=bundle,
+        stated=priors,
         priors=adjusted.priors,
         assumptions=assumptions,
         growth=growth,

@@ -21,6 +21,7 @@ from lightpen.sentences import Sentence, sentence
 
 LIMIT = 3.0  # standard deviations
 VAGUE = 0.2  # of a value, U (k = 2): centres alone may want a negative diameter
+ROUNDING = 1e-6  # of a variance
 RELEASED = 10.0  # times the deviation: what a contradicted prior still says
 
 FOCAL_LENGTH = sentence("file.focal-length", "focal length")
@@ -149,32 +150,40 @@ class _Entry:
 
 
 def find_contradictions(
-    rig: Rig, bundle: Bundle, priors: Priors
+    rig: Rig, bundle: Bundle, priors: Priors, excess: FloatArray | None = None
 ) -> tuple[tuple[Contradiction, ...], Priors]:
     """Find what the images say against the file of a camera, or of the rig.
 
     Of several files that are contradicted it is the one that is so most, and of a rig's
     the one number: it may be what moves the others.
 
+    Parameters
+    ----------
+    excess : (p, p) array, optional
+        By what the covariance of the fitted values is larger than the fit has it, as
+        noise lasts.
+
     Returns
     -------
     contradictions : tuple of Contradiction
-        By the fit as it is.
+        By the fit as it is, the worst first.
     priors : Priors
         Without what was contradicted.
     """
-    files = [_of_camera(rig, c, bundle, priors) for c in range(rig.n_cameras)]
+    files = [_of_camera(rig, c, bundle, priors, excess) for c in range(rig.n_cameras)]
     if priors.extrinsics is not None:
         place, stated = bundle.columns.extrinsics, priors.extrinsics
-        each = [_denied([entry], bundle, place, stated) for entry in _places(rig)]
+        each = [
+            _denied([entry], bundle, place, stated, excess) for entry in _places(rig)
+        ]
         denied, extrinsics = max(each, key=_most)
         files.append((denied, replace(priors, extrinsics=extrinsics)))
     found, freed = max(files, key=_most)
-    return tuple(found), freed
+    return tuple(sorted(found, key=lambda each: -each.deviations)), freed
 
 
 def find_pen_contradictions(
-    pen: Pen, bundle: Bundle, priors: Priors
+    pen: Pen, bundle: Bundle, priors: Priors, excess: FloatArray | None = None
 ) -> tuple[tuple[Contradiction, ...], Priors]:
     """Find what the images say against the discs and the scale of the LED file.
 
@@ -195,7 +204,7 @@ def find_pen_contradictions(
     def denied(
         entry: _Entry, place: slice, stated: Prior
     ) -> tuple[list[Contradiction], Prior]:
-        found, freed = _denied([entry], bundle, place, stated)
+        found, freed = _denied([entry], bundle, place, stated, excess)
         if any(each.wanted_uncertainty > VAGUE * each.stated for each in found):
             return [], stated
         return found, freed
@@ -214,11 +223,13 @@ def _most(denied: tuple[list[Contradiction], object]) -> float:
 
 
 def _of_camera(
-    rig: Rig, c: int, bundle: Bundle, priors: Priors
+    rig: Rig, c: int, bundle: Bundle, priors: Priors, excess: FloatArray | None
 ) -> tuple[list[Contradiction], Priors]:
     """Return what is contradicted of a camera's file, and the priors without it."""
     place, cameras = bundle.columns.cameras[c], list(priors.cameras)
-    denied, cameras[c] = _denied(_entries(rig.cameras[c]), bundle, place, cameras[c])
+    denied, cameras[c] = _denied(
+        _entries(rig.cameras[c]), bundle, place, cameras[c], excess
+    )
     name = rig.names[c] if rig.names else ""
     named = [replace(each, camera=name) for each in denied]
     return named, replace(priors, cameras=tuple(cameras))
@@ -230,24 +241,32 @@ def _known_digits(value: float, uncertainty: float) -> float:
 
 
 def _denied(
-    entries: list[_Entry], bundle: Bundle, place: slice, stated: Prior
+    entries: list[_Entry],
+    bundle: Bundle,
+    place: slice,
+    stated: Prior,
+    excess: FloatArray | None,
 ) -> tuple[list[Contradiction], Prior]:
     """Return what is contradicted of unknowns, and their prior that lets go of it."""
     # As it was fitted with: what a file has as exact is let be off by rounding.
     prior = inverse(bundle.prior_information[place, place])
     posterior = bundle.covariance[place, place]
+    lasting = np.zeros_like(posterior) if excess is None else excess[place, place]
     found = []
     for entry in entries:
         before = float(entry.by @ prior @ entry.by)
         after = float(entry.by @ posterior @ entry.by)
         learned = before - after
-        if learned <= 1e-6 * before:
+        if learned <= ROUNDING * before:
             continue
         change = float(entry.by @ bundle.values[place])
-        deviations = abs(change) / np.sqrt(learned)
+        by_noise = float(entry.by @ lasting @ entry.by)
+        deviations = abs(change) / np.sqrt(max(learned + by_noise, ROUNDING * before))
         if deviations <= LIMIT:
             continue
-        own = before * after / learned  # variance by the images alone
+        # Variance by the images alone.
+        gain = learned / before
+        own = max((after + by_noise / gain) / gain, ROUNDING * before)
         wanted = entry.value + entry.size * change * before / learned
         found.append(
             Contradiction(

@@ -136,7 +136,7 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
     bundle, pen = calibration.bundle, calibration.instrument.pen
     n_images = len(joint.rotations)
     basis, jitter = bundle.unknowns.basis, bundle.components.jitter
-    leds = bundle.components.leds
+    leds = bundle.counted.leds
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
     if pen.led_covariance is not None and leds is NONE:
         led_covariance = pen.led_covariance

@@ -2,28 +2,34 @@
 
 Errors of a centre that last longer than the time between two images do not average
 out as independent ones do. They are taken as a first-order autoregression of each
-coordinate of each LED. Its coefficient is read from the residuals; what the fit has
-taken out of them makes it look smaller than it is, by an amount that simulated
-residuals of the same fit tell (indirect inference [1]_). The covariance of what is
-fitted then holds the products of all pairs of images, weighted by their correlation.
+coordinate of each LED. How likely each coefficient is tells the restricted likelihood
+of all images by generalised least squares [1]_, with what is likeliest beside it of the
+variance of the noise and of errors of LEDs, seat and drift: noise that lasts looks like
+those, and is not to be counted twice. The covariance of what is fitted holds the
+products of all pairs of images, weighted by their correlation, on average over the
+coefficients.
 
 References
 ----------
-.. [1] C. Gourieroux, A. Monfort, E. Renault, "Indirect inference", J. Applied
-   Econometrics 8 (1993) S85-S118.
+.. [1] D. A. Harville, "Maximum likelihood approaches to variance component estimation
+   and to related problems", J. American Statistical Association 72 (1977) 320-338.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
+from lightpen.detection.pose import NOISE_FLOOR
 from lightpen.estimation.bundle import Z_99, Bundle
-from lightpen.estimation.linearised import N_CONE, eliminate, views_at
+from lightpen.estimation.image_rows import Whitened, rows_of, summed_products
+from lightpen.estimation.linearised import eliminate, views_at
+from lightpen.estimation.unknowns import Components, inverse
 
 TRIED = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 0.99])
-N_DRAWS = 8
-SEED = 20130604
+NEGLIGIBLE = 1e-3  # how likely a coefficient is that is left out
+NOISE_PASSES = 2  # in which its variance is found beside the components
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,85 +45,19 @@ class Correlation:
         Covariance of tip and cone from noise, mm^2.
     factor : float
         What it is larger by than that of independent images, on average.
+    components : Components or None
+        Of LEDs, seat and drift, beside noise that hangs together so; None where it
+        does not.
+    excess : (p, p) array or None
+        By what the covariance of the values of the fit is larger than as it weighed
+        the noise; None likewise.
     """
 
     coefficient: float
     noise: FloatArray
     factor: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """The linear model of a fit, LED by LED, in units of ``weight_sigma``.
-
-    M is the number of coordinates of an image.
-
-    Attributes
-    ----------
-    eliminated : (N, M, q) array
-        By the unknowns of each image.
-    left : (N, q, q) array
-        Inverse of their normal matrix.
-    projected : (N, M, p) array
-        By the common unknowns, less what those of the image take up.
-    covariance : (p, p) array
-    """
-
-    eliminated: FloatArray
-    left: FloatArray
-    projected: FloatArray
-    covariance: FloatArray
-
-    def residuals_of(self, noise: FloatArray) -> FloatArray:
-        """Return what the fit leaves of noise (B, N, M)."""
-        taken_up = np.einsum("nmp,bnm->bp", self.projected, noise) @ self.covariance
-        through = np.swapaxes(self.eliminated, 1, 2)
-        alone = np.einsum("nqm,bnm->bnq", through, noise)
-        alone = np.einsum("nmq,nqr,bnr->bnm", self.eliminated, self.left, alone)
-        return np.asarray(
-            noise - alone - np.einsum("nmp,bp->bnm", self.projected, taken_up)
-        )
-
-
-def _rows_of(bundle: Bundle, pixels: FloatArray) -> _Rows:
-    """Return the linear model of a fit to pixels (N, C, L, 2), LED by LED."""
-    unknowns, used = bundle.unknowns, bundle.used
-    n_images, _, n_leds = used.shape
-    mixing = unknowns.mixing
-    by_leds = mixing[-3 * n_leds :].reshape(n_leds, 3, -1)
-    views = views_at(bundle.state, pixels)
-    row, turns, cones, common = N_CONE, [], [], []
-    for c, view in enumerate(views):
-        k = view.own.shape[-1]
-        J = (
-            np.einsum("nlik,lkp->nlip", view.led, by_leds, optimize=True)
-            + view.cone @ mixing[:N_CONE]
-            + view.own @ mixing[row : row + k]
-            + view.diameter[..., None] * mixing[-3 * n_leds - 1]
-        )
-        row += k
-        shifted = view.cone[..., None, :] * unknowns.forms[:, None, None, :, None]
-        mask = used[:, c, :, None, None]
-        forms = shifted.reshape(*shifted.shape[:3], -1)
-        common.append(np.where(mask, np.concatenate([J, forms], axis=3), 0.0))
-        turns.append(np.where(mask, view.turn, 0.0))
-        cones.append(np.where(mask, view.cone, 0.0))
-
-    def flat(parts: list[FloatArray]) -> FloatArray:
-        rows = np.stack(parts, axis=1) / bundle.weight_sigma
-        return rows.reshape(n_images, -1, rows.shape[-1])
-
-    jitter = bundle.components.jitter.covariance
-    T, J = flat(turns), flat(common)
-    if jitter is not None:
-        T = np.concatenate([T, flat(cones)], axis=2)
-    left = eliminate(views, used, bundle.weight_sigma, jitter).left
-    return _Rows(
-        eliminated=T,
-        left=left,
-        projected=J - T @ (left @ (np.swapaxes(T, 1, 2) @ J)),
-        covariance=bundle.covariance,
-    )
+    components: Components | None
+    excess: FloatArray | None
 
 
 def lag1(residuals: FloatArray, used: BoolArray) -> float:
@@ -147,53 +87,83 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     seen = lag1(bundle.residuals, used)
     pairs = 2 * int((used[1:] & used[:-1]).sum())
     if seen <= Z_99 / np.sqrt(max(pairs, 1)):
-        return Correlation(0.0, independent, 1.0)
-    rows = _rows_of(bundle, pixels)
-    coefficient, share = _corrected(seen, rows, used)
-    variance = float(np.sum(np.where(used[..., None], bundle.residuals, 0.0) ** 2))
-    variance /= 2 * int(used.sum()) * share * bundle.weight_sigma**2
-    noise = variance * bundle.carried(_summed(rows.projected, coefficient))
+        return Correlation(0.0, independent, 1.0, None, None)
+    views = views_at(bundle.state, pixels)
+    jitter = bundle.components.jitter.covariance
+    left = eliminate(views, used, bundle.weight_sigma, jitter).left
+    rows = rows_of(bundle.unknowns, views, used, bundle.weight_sigma, left)
+    through = rows.projected @ bundle.covariance
+    known = (bundle.sigma / bundle.weight_sigma) ** 2
+    shaken = None if jitter is None else jitter / known
+    models: list[_NoiseModel] = []
+    near = bundle.components
+    for whitened in rows.whitened(TRIED, shaken):
+        models.append(_noise_model(bundle, whitened, known, near))
+        near = models[-1].components
+    costs = np.array([model.cost for model in models])
+    likely = np.exp(-0.5 * (costs - costs.min())) * np.gradient(TRIED)
+    likely /= likely.sum()
+    of_values = np.zeros_like(bundle.covariance)
+    for coefficient, model, weight in zip(TRIED, models, likely, strict=True):
+        if weight > NEGLIGIBLE:
+            of_values += weight * model.variance * summed_products(through, coefficient)
+    noise = of_values[:6, :6]
+    as_weighed = bundle.information - bundle.jitter_information
+    excess = of_values - bundle.covariance @ as_weighed @ bundle.covariance
     factor = float(np.trace(np.linalg.solve(independent, noise))) / 6
-    return Correlation(coefficient, noise, max(factor, 1.0))
+    best = models[int(np.argmin(costs))]
+    return Correlation(
+        float(likely @ TRIED), noise, max(factor, 1.0), best.components, excess
+    )
 
 
-def _corrected(seen: float, rows: _Rows, used: BoolArray) -> tuple[float, float]:
-    """Return the coefficient whose residuals look like those seen.
+class _NoiseModel(NamedTuple):
+    """What is likely where noise hangs together by one coefficient.
 
-    And what the fit leaves of the variance of such noise.
+    Attributes
+    ----------
+    cost : float
+        Twice the negative logarithm of the restricted likelihood.
+    variance : float
+        Of the noise, in units of that by which LEDs were weighed.
+    components : Components
+        Of the errors beside it.
     """
-    rng = np.random.default_rng(SEED)
-    n_images = len(used)
-    draws = rng.standard_normal((N_DRAWS, n_images, *used.shape[1:], 2))
-    looks, shares = np.empty(len(TRIED)), np.empty(len(TRIED))
-    for k, coefficient in enumerate(TRIED):
-        noise = np.where(used[..., None], _autoregressive(draws, coefficient), 0.0)
-        left = rows.residuals_of(noise.reshape(N_DRAWS, n_images, -1))
-        left = left.reshape(noise.shape)
-        looks[k] = np.mean([lag1(one, used) for one in left])
-        shares[k] = float(np.mean(left**2)) / float(np.mean(used))
-    looks = np.maximum.accumulate(looks)
-    coefficient = float(np.interp(seen, looks, TRIED))
-    return coefficient, float(np.interp(coefficient, TRIED, shares))
+
+    cost: float
+    variance: float
+    components: Components
 
 
-def _autoregressive(draws: FloatArray, coefficient: float) -> FloatArray:
-    """Return noise of variance 1 from independent draws (B, N, ...)."""
-    noise = draws.copy()
-    fresh = np.sqrt(1 - coefficient**2)
-    for i in range(1, draws.shape[1]):
-        noise[:, i] = coefficient * noise[:, i - 1] + fresh * draws[:, i]
-    return noise
+def _noise_model(
+    bundle: Bundle, each: Whitened, variance: float, components: Components
+) -> _NoiseModel:
+    """Find the variance of noise that hangs together so, and the components with it.
 
-
-def _summed(projected: FloatArray, coefficient: float) -> FloatArray:
-    """Return the products of all pairs of images (N, m, p), weighted, (p, p)."""
-    past = np.empty_like(projected)
-    carried = np.zeros_like(projected[0])
-    for i, rows in enumerate(projected):
-        past[i] = carried
-        carried = coefficient * (carried + rows)
-    p = projected.shape[-1]
-    flat, before = projected.reshape(-1, p), past.reshape(-1, p)
-    cross = flat.T @ before
-    return np.asarray(flat.T @ flat + cross + cross.T)
+    The search for both begins at ``variance`` and ``components``.
+    """
+    unknowns, at = bundle.unknowns, bundle.columns
+    taken_up = bundle.values.copy()
+    for kind in (at.tip, at.cone, *at.seat, at.drift):
+        taken_up[kind] = 0.0
+    right = each.gradient + each.information @ taken_up
+    floor = (NOISE_FLOOR / bundle.weight_sigma) ** 2
+    measured, measured_right = unknowns.measured(bundle.state, taken_up)
+    for _ in range(NOISE_PASSES):
+        information = each.information / variance + measured
+        both = right / variance + measured_right
+        components = unknowns.found(information, both, components)
+        prior = unknowns.prior_information(components)
+        covariance = inverse(information + prior)
+        values = covariance @ both
+        change = values - taken_up
+        left = each.squares - 2 * float(change @ each.gradient)
+        left += float(change @ each.information @ change)
+        n_free = each.n_free - float(np.sum(covariance * information))
+        variance = max(left / max(n_free, 1.0), floor)
+    known = np.flatnonzero(np.diag(prior) > 0)
+    cost = each.n_free * np.log(variance) + each.log_volume
+    cost += np.linalg.slogdet(information + prior)[1]
+    cost -= np.linalg.slogdet(prior[np.ix_(known, known)])[1]
+    cost += left / variance + float(values @ prior @ values)
+    return _NoiseModel(float(cost), variance, components)

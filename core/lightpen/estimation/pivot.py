@@ -351,7 +351,8 @@ def _require_steadiness(fit: PivotFit) -> None:
                 "The tip did not stay in one place: it moved by {scatter:.2f} mm "
                 "(rms), {excess:.0f} times what the images alone explain. Press the "
                 "tip into the cone and repeat; check that cone and camera are "
-                "clamped.",
+                "clamped, and that the intrinsics file is of this camera, lens and "
+                "focus.",
                 scatter=scatter,
                 excess=excess,
             )

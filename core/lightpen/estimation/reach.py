@@ -245,6 +245,7 @@ def _linear_bundle(
         state=unknowns.start,
         values=covariance @ right,
         components=components,
+        counted=components,
         residuals=_by_camera(joint.residuals, n_cameras),
         used=_by_camera(joint.used, n_cameras),
         sigma=sigma,
@@ -299,6 +300,7 @@ def _with_endless_images(bundle: Bundle) -> Bundle:
     return replace(
         bundle,
         components=NO_COMPONENTS,
+        counted=NO_COMPONENTS,
         information=information,
         prior_information=prior,
         jitter_information=nothing,

@@ -262,7 +262,7 @@ def warnings_of(calibration: Calibration) -> list[Sentence]:
 
 def _seat_warnings(calibration: Calibration) -> list[Sentence]:
     """Return what is told of a tip that did not rest where the model has it."""
-    bundle, found = calibration.bundle, calibration.bundle.components
+    bundle, found = calibration.bundle, calibration.bundle.counted
     warnings = []
     jitter = found.jitter.covariance
     # Ball and cone that are as round as assumed move the tip by so much as well.
@@ -418,7 +418,7 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
     return {
         "intrinsics": intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
-        "scale_uncertainty_before": np.sqrt(calibration.priors.scale.covariance[0, 0]),
+        "scale_uncertainty_before": np.sqrt(calibration.stated.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,
         "temperature_uncertainty_assumed": calibration.priors.temperature.assumed,
         "pen_growth": calibration.growth,

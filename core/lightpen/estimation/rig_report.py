@@ -20,7 +20,7 @@ def intrinsics_record(calibration: Calibration, c: int) -> dict[str, Any]:
     camera = calibration.bundle.state.rig.cameras[c]
     place = calibration.bundle.columns.cameras[c]
     deviations = np.sqrt(np.diag(calibration.bundle.covariance)[place])
-    before = np.sqrt(np.diag(calibration.priors.cameras[c].covariance))
+    before = np.sqrt(np.diag(calibration.stated.cameras[c].covariance))
     names = ("fx", "fy", "cx", "cy", *COEFFICIENTS)
     return {
         name: {
@@ -63,7 +63,7 @@ def rig_record(calibration: Calibration) -> dict[str, Any]:
 
 
 def _place_record(calibration: Calibration, c: int) -> dict[str, Any]:
-    bundle, prior = calibration.bundle, calibration.priors.extrinsics
+    bundle, prior = calibration.bundle, calibration.stated.extrinsics
     rig = bundle.state.rig
     record: dict[str, Any] = {
         "rotation": rig.rotations[c],

@@ -213,8 +213,8 @@ def shares_of(
     at = bundle.columns
     jitter = bundle.carried(bundle.jitter_information + bundle.doubted_jitter)
     moved, by_form = _of_seat(bundle, priors.form_error)
-    drift = bundle.part(at.drift)
-    drift *= counted_drift(bundle) / _variance(bundle, at.drift)
+    drift = bundle.counted_part(at.drift)
+    drift *= counted_drift(bundle) / _counted(bundle, at.drift)
     # Centres that are off in each posture its own way.
     biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
     biased *= (priors.center_bias / bundle.sigma) ** 2
@@ -226,7 +226,7 @@ def shares_of(
         Share(ShareName.SEAT, jitter + moved),
         Share(ShareName.FORM, by_form, assumed=True),
         Share(ShareName.DRIFT, drift),
-        Share(ShareName.LEDS, bundle.part(at.leds)),
+        Share(ShareName.LEDS, bundle.counted_part(at.leds)),
         Share(ShareName.SCALE, (1 - warm) * size, priors.scale.assumed),
         Share(ShareName.TEMPERATURE, warm * size, priors.temperature.assumed),
         Share(ShareName.DISTANCE, bundle.part(at.between)),
@@ -264,7 +264,7 @@ class CountedSeat:
 
 def counted_seat(bundle: Bundle) -> tuple[CountedSeat, ...]:
     """Return what U holds of the seat by each kind of form."""
-    seat = bundle.components.seat
+    seat = bundle.counted.seat
     likely = [form.expected for form in seat]
     alike = np.eye(N_CONE)
     # Where images are many enough to see it, they tell themselves how large it is.
@@ -276,16 +276,14 @@ def counted_seat(bundle: Bundle) -> tuple[CountedSeat, ...]:
         strict=True,
     )
     return tuple(
-        CountedSeat(max(_variance(bundle, at), expected**2), directions)
+        CountedSeat(max(_counted(bundle, at), expected**2), directions)
         for at, expected, directions in kinds
     )
 
 
 def counted_drift(bundle: Bundle) -> float:
     """Return the variance of a drift over the whole of each way that U holds, mm^2."""
-    return max(
-        _variance(bundle, bundle.columns.drift), bundle.components.drift.expected**2
-    )
+    return max(_counted(bundle, bundle.columns.drift), bundle.counted.drift.expected**2)
 
 
 def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
@@ -293,7 +291,7 @@ def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]
     moved, by_form = np.zeros((6, 6)), np.zeros((6, 6))
     for at, seat in zip(bundle.columns.seat, counted_seat(bundle), strict=True):
         n_forms = (at.stop - at.start) // N_CONE
-        gain = bundle.covariance[:6, at] / _variance(bundle, at)
+        gain = bundle.covariance[:6, at] * bundle.prior_information[at.start, at.start]
         moves = gain.reshape(6, n_forms, N_CONE) @ seat.axes
         part = seat.variance * moves.reshape(6, -1) @ gain.T
         share = min(form_error**2 / seat.variance, 1.0)
@@ -313,8 +311,8 @@ def once_round(rotations: FloatArray) -> FloatArray:
     return SIDEWAYS**2 * np.eye(3) + (ALONG**2 - SIDEWAYS**2) * np.outer(along, along)
 
 
-def _variance(bundle: Bundle, at: slice) -> float:
-    return 1 / float(bundle.prior_information[at.start, at.start])
+def _counted(bundle: Bundle, at: slice) -> float:
+    return 1 / float(bundle.counted_prior[at.start, at.start])
 
 
 def compare_halves(joint: JointFit) -> Halves:
@@ -336,15 +334,19 @@ def _block_scatter(
 ) -> tuple[FloatArray | None, float, bool]:
     """Return the covariance from blocks, its ratio to the noise's, and significance.
 
-    A jitter of the seat is a share of its own: the scatter is expected to hold it.
+    What the cone moved by as the pen leant and in time is a share of its own and taken
+    out, and so is a jitter of the seat: the scatter is expected to hold it.
     """
     n_images = len(joint.information)
     n_blocks = min(MAX_BLOCKS, n_images // MIN_BLOCK_SIZE)
     if n_blocks < 3:
         return None, 1.0, False
     noise = joint.covariance
+    by_cone = joint.information[..., N_CONE:]
+    moved = np.einsum("nik,nk->ni", by_cone, bundle.cone_moves[:n_images])
+    gradients = joint.gradients - moved
     scores = np.array(
-        [part.sum(axis=0) for part in np.array_split(joint.gradients, n_blocks)]
+        [part.sum(axis=0) for part in np.array_split(gradients, n_blocks)]
     )
     scores -= scores.mean(axis=0)
     scatter = scores.T @ scores * n_blocks / (n_blocks - 1)
@@ -352,7 +354,6 @@ def _block_scatter(
     ratio = float(np.trace(noise @ scatter)) / 6
     jitter = bundle.components.jitter.covariance
     if jitter is not None:
-        by_cone = joint.information[..., N_CONE:]
         shaken = np.einsum("nik,kl,njl->ij", by_cone, jitter, by_cone, optimize=True)
         ratio /= 1 + float(np.trace(noise @ shaken)) / 6
     n_free = 6 * (n_blocks - 1)

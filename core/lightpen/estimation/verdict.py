@@ -103,6 +103,10 @@ class NextStep(StrEnum):
     CAPTURE_MORE = "capture more"
     REPEAT = "repeat"
     CHECK_FILES = "check files"
+    CHECK_CAMERA = "check camera file"
+    CHECK_LEDS = "check LED file"
+    CHECK_RIG = "check rig file"
+    SEE_TO_CAUSE = "see to the cause"
     CHECK_TIP = "check tip"
     CLAMP = "clamp"
 
@@ -124,6 +128,18 @@ _TOLD = {
     NextStep.CHECK_FILES: sentence(
         "next-step.check-files",
         "Next: check the intrinsics file and the LED file, then repeat.",
+    ),
+    NextStep.CHECK_CAMERA: sentence(
+        "next-step.check-camera", "Next: check the intrinsics file, then repeat."
+    ),
+    NextStep.CHECK_LEDS: sentence(
+        "next-step.check-leds", "Next: check the LED file, then repeat."
+    ),
+    NextStep.CHECK_RIG: sentence(
+        "next-step.check-rig", "Next: check the rig file, then repeat."
+    ),
+    NextStep.SEE_TO_CAUSE: sentence(
+        "next-step.see-to-cause", "Next: see to the cause that is named, then repeat."
     ),
     NextStep.CHECK_TIP: sentence(
         "next-step.check-tip",
@@ -150,8 +166,26 @@ class Verdict:
     @property
     def next_step(self) -> NextStep:
         """The one thing to do that answers the reason."""
-        return _NEXT_STEPS[Code(self.reason.code)]
+        causes = (_BY_CAUSE.get(part.code) for part in self.reason.parts())
+        return next(filter(None, causes), _NEXT_STEPS[Code(self.reason.code)])
 
+
+# By what a reason names, which its code alone does not tell.
+_BY_CAUSE = {
+    _ADVICE[ShareName.CAMERA].code: NextStep.CHECK_CAMERA,
+    _ADVICE[ShareName.EXTRINSICS].code: NextStep.CHECK_RIG,
+    _ADVICE[ShareName.LEDS].code: NextStep.CHECK_LEDS,
+    _ADVICE[ShareName.SCALE].code: NextStep.CHECK_LEDS,
+    _ADVICE[ShareName.DIAMETER].code: NextStep.CHECK_LEDS,
+    _ADVICE[ShareName.CENTERS].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ShareName.FORM].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ShareName.TEMPERATURE].code: NextStep.SEE_TO_CAUSE,
+    _ADVICE[ShareName.DISTANCE].code: NextStep.SEE_TO_CAUSE,
+    "warning.camera-file-contradicted": NextStep.CHECK_CAMERA,
+    "warning.camera-file-of-rig-contradicted": NextStep.CHECK_CAMERA,
+    "warning.rig-file-contradicted": NextStep.CHECK_RIG,
+    "warning.pen-file-contradicted": NextStep.CHECK_LEDS,
+}
 
 _NEXT_STEPS = {
     Code.GOOD: NextStep.ACCEPT,
@@ -160,8 +194,8 @@ _NEXT_STEPS = {
     Code.TOO_LITTLE_TILT: NextStep.CAPTURE_MORE,
     Code.HALVES_DIFFER: NextStep.REPEAT,
     Code.MANY_DROPPED: NextStep.REPEAT,
-    Code.LEDS_OFF: NextStep.CHECK_FILES,
-    Code.LED_DISPLACED: NextStep.CHECK_FILES,
+    Code.LEDS_OFF: NextStep.CHECK_LEDS,
+    Code.LED_DISPLACED: NextStep.CHECK_LEDS,
     Code.LEDS_MISFIT: NextStep.CHECK_FILES,
     Code.FILE_UNCERTAIN: NextStep.CHECK_FILES,
     Code.FILE_ASSUMED: NextStep.CHECK_FILES,

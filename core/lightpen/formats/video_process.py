@@ -6,9 +6,8 @@ asked for before anyone can look. A decoder that crashes takes no other process 
 """
 
 import signal
-import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from lightpen.errors import FileError
 from lightpen.formats import videos
 from lightpen.formats.decoding import keep_freed_memory
 from lightpen.formats.files import printable
+from lightpen.formats.memory_limit import limit_memory
 from lightpen.sentences import sentence
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def _serve(
 ) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who asked hears it, and ends this
     keep_freed_memory()
-    _limit_memory()
+    with suppress(OSError):  # a video that is sound needs none
+        limit_memory(MAX_DECODER_MEMORY)
     try:
         send(to, path, *arguments)
     except FileError as error:
@@ -110,20 +111,6 @@ def _send_frames(to: "Connection", path: Path, n_frames: int) -> None:
             to.send(load())
         except FileError as error:
             to.send(error)
-
-
-def _limit_memory() -> None:
-    """Let this process have little more memory than it has (Linux)."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    status = Path("/proc/self/status").read_text("ascii")
-    (data,) = (line for line in status.splitlines() if line.startswith("VmData:"))
-    most = int(data.split()[1]) * 1024 + MAX_DECODER_MEMORY
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    if hard == resource.RLIM_INFINITY or most < hard:
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def _loaded(frame: Image | FileError) -> Image:

@@ -252,11 +252,14 @@ class Statement:
     why : Why
         What the grade is for.
     reason : str
-        Why it was accepted though it was to be checked, in the words of who did.
+        Why it was accepted though it was to be checked, or put in force again, in the
+        words of who did.
     doubts : tuple of Why
         What else there was to look into.
     change : Since or None
         Since the tip that was in force before.
+    restores : str or None
+        Hash of the entry of the archive whose tip is in force again by it.
     is_checked : bool
         Whether a change of the file would have been noticed.
     """
@@ -271,6 +274,7 @@ class Statement:
     reason: str
     doubts: tuple[Why, ...]
     change: Since | None
+    restores: str | None
     is_checked: bool
     calibration: StatedCalibration
 
@@ -304,6 +308,7 @@ def read_statement(path: Path) -> Statement:
             reason=result.reason,
             doubts=result.doubts,
             change=result.change,
+            restores=result.restores,
             is_checked=True,
             calibration=calibration,
         )
@@ -316,6 +321,7 @@ def read_statement(path: Path) -> Statement:
         reason="",
         doubts=tuple(w for w in calibration.warnings if w.code != verdict.code),
         change=None,
+        restores=None,
         is_checked=is_checked,
         calibration=calibration,
     )

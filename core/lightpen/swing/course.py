@@ -7,8 +7,6 @@ computations made elsewhere.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,29 +16,22 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting
 from lightpen.errors import AcceptanceError, LightpenError
 from lightpen.estimation.verdict import Grade
-from lightpen.formats.decoding import encode_png
 from lightpen.messages import no_tip
 from lightpen.record.acceptance import accept
 from lightpen.record.archive import Archive
 from lightpen.record.assessment import Assessment, assess
-from lightpen.record.reading import (
-    DISCARDED,
-    Record,
-    open_record,
-    recorded_names,
-    recorded_origin,
-)
+from lightpen.record.reading import Record, open_record, recorded_names, recorded_origin
 from lightpen.record.results import Result
 from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.supervision import Signature
 from lightpen.record.unfinished import discard_swing
-from lightpen.record.writing import OtherView, RecordWriter, make_folder, note_taken_out
+from lightpen.record.writing import RecordWriter, make_folder, note_taken_out
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.attendance import Attendance
-from lightpen.swing.capture import Rule, capture_image
+from lightpen.swing.intake import Intake
+from lightpen.swing.logbook_entries import LogbookEntries
 from lightpen.swing.moment import seen_by_rig
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.recorded import pass_over, read_image
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.rules import (
     Transition,
@@ -51,10 +42,9 @@ from lightpen.swing.rules import (
     resume,
     stillness,
 )
-from lightpen.swing.serial_queue import Act, OneTask, Report, Start, Task
+from lightpen.swing.serial_queue import Act, OneTask, Report, Start
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
-from lightpen.swing.tally import Tally
 
 T = TypeVar("T")
 
@@ -89,16 +79,11 @@ class SwingCourse:
         self._archive = archive
         self._listener = listener
         self._now = now
-        self._start_task = start
-        self._logbook = logbook
-        self._catching_up: Task | None = None
+        self._entries = LogbookEntries(logbook, start, self._tell_trouble)
         self._status = SwingStatus()
         self._attendance = Attendance()
-        self._writer: RecordWriter | None = None
-        self._tally = Tally()
+        self._intake: Intake | None = None
         self._record: Record | None = None  # as it was when it was entered
-        self._n_others = 0  # images of a recording since the last that was read
-        self._known = frozenset[str]()  # checksums of images that were recorded by then
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
         self._trouble: Sentence | None = None
@@ -227,13 +212,10 @@ class SwingCourse:
         if status.is_capturing and record.folder == status.record_folder:
             return  # it goes on already
         names = recorded_names(record)
-        writer = RecordWriter.resume(record)
+        intake = Intake(record)
         self._task.drop()
         self._close_record()
-        self._writer, self._record = writer, record
-        self._n_others = 0
-        self._known = frozenset(image.sha256 for image in record.images)
-        self._tally = Tally(record.stats)
+        self._intake, self._record = intake, record
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
         self._relieve()
@@ -271,9 +253,7 @@ class SwingCourse:
             if status.setup is not None and not status.setup.is_recording:
                 self._watch(status.state, sighting, frame)
         elif status.is_capturing and setup is status.setup:
-            if stats is not None:
-                self._tally = self._tally.after(stats)
-            self._capture(status.state, sighting, frame, n_images)
+            self._capture(status.state, sighting, frame, n_images, stats)
 
     def _capture(
         self,
@@ -281,53 +261,24 @@ class SwingCourse:
         sighting: Sighting,
         frame: Frame,
         n_images: int | None,
+        stats: Stats | None,
     ) -> None:
-        setup, writer = self._status.setup, self._writer
+        setup, intake = self._status.setup, self._intake
         assert setup is not None
-        assert writer is not None
-        rule: Rule | None = None
-        if setup.is_recording:
-            if n_images is None or before.phase is Phase.PAUSED:
-                return
-            if not self._is_next(before, frame, n_images):
-                return
-            is_known = self._is_known(frame)
-            rule = partial(read_image, n_images=n_images, is_known=is_known)
-        time = frame.host_ts_ns * 1e-9
+        assert intake is not None
         try:
-            transition = capture_image(
-                *(setup, before, writer, frame.image, sighting, time),
-                *(frame.device_ts_ns, self._tally.total, rule),
-                _others(frame, sighting),
+            transition = intake.capture(
+                *(setup, before, frame, sighting, n_images, stats)
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)
             self._tell_trouble(error.sentence)
             return
+        if transition is None:
+            return
         if any(event.what is Happening.KEPT for event in transition.events):
             self._relieve()
         self._become(transition)
-
-    def _is_next(self, before: SwingState, frame: Frame, n_images: int) -> bool:
-        """Return whether it is the turn of an image of a recording.
-
-        The recording is shown over and over; each image is read once, in its order.
-        One that does not come in a whole pass cannot be read, and is passed over.
-        """
-        if frame.seq % n_images == before.progress.n_read:
-            self._n_others = 0
-            return True
-        self._n_others += 1
-        if self._n_others > n_images:
-            self._n_others = 0
-            self._become(pass_over(before, n_images))
-        return False
-
-    def _is_known(self, frame: Frame) -> bool:
-        """Return whether a recorded image was taken before an interruption."""
-        if not self._known:
-            return False
-        return sha256(encode_png(frame.image)).hexdigest() in self._known
 
     def _watch(self, before: SwingState, sighting: Sighting, frame: Frame) -> None:
         """See whether the pen is held upright and still, by which its holder agrees."""
@@ -380,12 +331,12 @@ class SwingCourse:
         status = self._status
         if status.record_folder is None or status.result is not None:
             return
-        if self._writer is None:
+        if self._intake is None:
             discard_swing(status.record_folder)
         else:
-            self._writer.conclude(DISCARDED)
+            self._intake.discard()
         self.abandon()
-        self._trying(partial(self._enter_set_aside, status))
+        self._trying(lambda: self._entries.enter_set_aside(status, self._now()))
 
     def start_over(self) -> None:
         """Set the swing aside, if its tip is not in force, and begin anew."""
@@ -422,9 +373,9 @@ class SwingCourse:
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _close_record(self) -> None:
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            writer.close()
+        intake, self._intake = self._intake, None
+        if intake is not None:
+            intake.close()
 
     # Solution
 
@@ -565,7 +516,7 @@ class SwingCourse:
             result = accept(self._archive, solution, now, reason, signature)
             status = replace(status, result=result)
             self._relieve()
-            self._trying(self._enter_owed)
+            self._trying(self._entries.enter_owed)
         except AcceptanceError:  # something else has come into force meanwhile
             record = open_record(solution.source.folder)
             assessment = assess(self._archive, record, solution)
@@ -583,46 +534,18 @@ class SwingCourse:
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)
-        self._trying(self._enter_owed)
+        self._trying(self._entries.enter_owed)
         self._publish(replace(status, taken_back=result))
-
-    # Logbook
 
     def open_logbook(self) -> None:
         """Enter what the files tell of, beside the images: it may take long."""
-        if self._logbook is not None:
-            self._catching_up = self._start_task(
-                *(self._logbook.enter_owed, self._on_caught_up, self._tell_trouble),
-                *(lambda: None, lambda fraction: None),
-            )
+        self._entries.catch_up()
 
     def shut_down(self) -> None:
         """Leave the swing as it is on the disk, and let go of the archive."""
         self.abandon()
-        if self._catching_up is not None:
-            self._catching_up.cancel()
-        if self._logbook is not None:
-            self._trying(self._logbook.close)
-
-    def _on_caught_up(self, troubles: tuple[Sentence, ...]) -> None:
-        for trouble in troubles:
-            self._tell_trouble(trouble)
-
-    def _enter_owed(self) -> None:
-        if self._logbook is not None:
-            self._logbook.enter_owed()
-
-    def _enter_set_aside(self, before: SwingStatus) -> None:
-        if self._logbook is not None:
-            solution, assessment = before.solution, before.assessment
-            self._logbook.enter_set_aside(solution, assessment, self._now())
-
-
-def _others(frame: Frame, sighting: Sighting) -> tuple[OtherView, ...]:
-    return tuple(
-        OtherView(other.image, seen.pixels, other.device_ts_ns)
-        for other, seen in zip(frame.others, sighting.others, strict=True)
-    )
+        self._entries.stop()
+        self._trying(self._entries.close)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,56 +15,43 @@ from msgspec.structs import replace as with_entries
 
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
-from lightpen.detection.rig_pose import see_together
 from lightpen.detection.sighting import Sighting
-from lightpen.errors import AcceptanceError, FileError, LightpenError
-from lightpen.estimation.verdict import Grade
+from lightpen.errors import FileError, LightpenError
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.outcome import TrialOutcome
-from lightpen.record.supervision import Signature, require_supervisor
+from lightpen.record.supervision import Signature
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import OneTask, Report, Start
+from lightpen.verification.acceptance import accepting_supervisor
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
 from lightpen.verification.conclusion import Conclusion
 from lightpen.verification.going_on import GoneOn, go_on_with
+from lightpen.verification.happenings import ending, happenings
+from lightpen.verification.live_touches import LiveTouches
+from lightpen.verification.other_choices import with_choices
 from lightpen.verification.recorded_runs import Done, read_runs
 from lightpen.verification.session import (
     SessionTransition,
-    advance,
     end_task,
-    rules_of,
     setup_of,
     touched_anew,
     with_found,
 )
 from lightpen.verification.session_keeping import SessionKeeping
-from lightpen.verification.session_state import (
-    SessionSetup,
-    SessionState,
-    without_touches,
-)
+from lightpen.verification.session_state import SessionState, with_drift
 from lightpen.verification.status import (
     Reading,
     SessionHappening,
     VerificationListener,
     VerificationStatus,
 )
-from lightpen.verification.tip_in_force import (
-    TipInForce,
-    read_tip_in_force,
-)
-from lightpen.verification.touch_images import (
-    NewRecord,
-    is_held_on,
-    new_record,
-)
-from lightpen.verification.touching import TouchHappening, TouchPhase, read_rules
-from lightpen.verification.under_way import (
-    InterruptedVerification,
-    ReadImages,
-)
-from lightpen.verification.witness import LampWatch, LampWitness
+from lightpen.verification.tip_in_force import TipInForce, read_tip_in_force
+from lightpen.verification.touch_images import NewRecord, new_record
+from lightpen.verification.touching import read_rules
+from lightpen.verification.troubles import Cause, Troubles
+from lightpen.verification.under_way import InterruptedVerification, ReadImages
+from lightpen.verification.witness import LampWatch
 
 ANOTHER = sentence(
     "verification.another-under-way",
@@ -114,11 +101,9 @@ class VerificationCourse:
         self._preparation: Preparation | None = None
         self._choices = VerificationChoices()
         self._keeping = SessionKeeping(data, self._new_record, now)
-        self._trouble: Sentence | None = None
+        self._live = LiveTouches(self._keeping.images)
+        self._troubles = Troubles(listener)
         self._task = OneTask(start, self.recover, listener.on_progress)
-        self._lamps = LampWatch()
-        self._unkept: Sentence | None = None  # why images are not kept now
-        self._unnoted: Sentence | None = None  # why it could not be gone on with
 
     @property
     def status(self) -> VerificationStatus:
@@ -131,7 +116,7 @@ class VerificationCourse:
         status = replace(self._status, reading=Reading.NOTHING, is_paused=True)
         refusal = BUG if status.tip is None else status.refusal
         self._publish(replace(status, refusal=refusal))
-        self._tell_trouble(BUG)
+        self._troubles.tell(BUG)
 
     # Commands
 
@@ -167,7 +152,7 @@ class VerificationCourse:
     def start_over(self) -> None:
         """Forget all touches, and read the tip in force anew; what is kept stays."""
         self._task.drop()
-        self._relieve()
+        self._troubles.end()
         self._give_up()
         self._publish(VerificationStatus(is_here=self._status.is_here))
         self._read_tip()
@@ -184,7 +169,7 @@ class VerificationCourse:
         try:
             self._accept(reason.strip(), signature)
         except LightpenError as error:
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence)
 
     def _accept(self, reason: str, signature: Signature | None) -> None:
         self._write()  # what is accepted is named by its files
@@ -195,24 +180,12 @@ class VerificationCourse:
         if not is_open or tip is None or found is None or began is None or not reason:
             return
         supervision = self._archive.supervision()
-        supervisor = ""
-        if supervision.is_guarded or found.grade is Grade.REPEAT:
-            if signature is None:
-                raise AcceptanceError(
-                    sentence(
-                        "verification.no-supervisor",
-                        "The tip did not keep the limits. {why} Only a supervisor can "
-                        "accept it, with a reason.",
-                        why=found.reason,
-                    )
-                )
-            require_supervisor(supervision, signature)
-            supervisor = signature.name.strip()
+        supervisor = accepting_supervisor(supervision, found, signature)
         conclusion = Conclusion(
             *(TrialOutcome.ACCEPTED, began, self._now(), found, reason, supervisor)
         )
         self._keeping.accept(tip, conclusion)
-        self._relieve()
+        self._troubles.end()
         accepted_by = supervisor or tip.names.operator
         kept = self._keeping.files
         self._publish(replace(status, files=kept, accepted_by=accepted_by))
@@ -226,12 +199,12 @@ class VerificationCourse:
         try:
             self._keeping.images.follow(status.state, transition)
         except FileError as error:
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence)
             return
         self._become(transition)
 
     def read(self, task: TaskKind, place: str, *, is_still: bool) -> None:
-        """Do a task with recorded images.
+        """Do a task with recorded images; a witness that was read before counts in it.
 
         Parameters
         ----------
@@ -241,9 +214,11 @@ class VerificationCourse:
             Whether the pen is held still through the images of a touch; else each
             image is a touch.
         """
-        tip, setup = self._status.tip, self._status.setup
-        if self._task.is_there or tip is None or setup is None:
+        tip, setup, state = self._status.tip, self._status.setup, self._status.state
+        if self._task.is_there or tip is None or setup is None or state is None:
             return
+        if self._keeping.has_read(TaskKind.DRIFT):
+            setup = with_drift(setup, state.drift)
         rules = read_rules(is_still, setup.choices.n_frames)
         work = partial(read_runs, task, place, tip, setup, rules)
         images = ReadImages(task, place, is_still)
@@ -259,10 +234,10 @@ class VerificationCourse:
         if preparation is None or under_way is None or self._task.is_there:
             return
         if status.began is not None and not status.is_done:
-            self._tell_trouble(ANOTHER)
+            self._troubles.tell(ANOTHER)
             return
         if preparation.lacks():
-            self._tell_trouble(NOT_READY)
+            self._troubles.tell(NOT_READY)
             return
         chosen = replace(under_way.choices, limits=self._choices.limits)
         again = with_entries(under_way, choices=chosen)
@@ -274,13 +249,15 @@ class VerificationCourse:
 
     def _on_gone_on(self, path: Path, before: GoneOn) -> None:
         self._give_up()
+        self._live.begin(before.lamps)
+        witness = self._live.witness(before.setup)
         try:
-            self._keeping.take_over(path, before)
+            self._keeping.take_over(path, before, witness)
         except FileError as error:
             self._on_runs_unread(error.sentence)
             return
-        self._relieve()
-        self._choices, self._lamps = before.setup.choices, LampWatch()
+        self._troubles.end()
+        self._choices = before.setup.choices
         self._publish(
             VerificationStatus(
                 tip=before.tip,
@@ -289,6 +266,7 @@ class VerificationCourse:
                 aim=before.tip.aim,
                 began=before.under_way.began,
                 files=before.files,
+                witness=witness,
                 is_here=self._status.is_here,
                 refusal=self._why_not(before.tip),
             )
@@ -320,44 +298,14 @@ class VerificationCourse:
         assert state is not None
         if status.began is None:
             self._status = replace(status, began=self._now())
-            self._lamps = LampWatch()
-        if state.touching.phase is TouchPhase.HOLDING:
-            self._lamps = self._lamps.with_frame(frame, sighting, aim)
-        together = see_together(setup.instrument.rig, setup.instrument.pen, sighting)
+            self._live.begin(LampWatch())
         try:
-            name = self._name(frame, together, setup, state)
-            transition = advance(self._with_drift(setup, state), state, name, together)
-            self._keeping.images.follow(state, transition)
+            transition = self._live.take(setup, state, frame, sighting, aim)
         except FileError as error:  # an image that is not kept does not count
-            self._unkept = error.sentence
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence, Cause.IMAGES)
             return
-        if self._unkept is not None and self._unkept is self._trouble:
-            self._relieve()
-        self._unkept = None
+        self._troubles.end_of(Cause.IMAGES)
         self._become(transition)
-
-    def _with_drift(self, setup: SessionSetup, state: SessionState) -> SessionSetup:
-        """Return it with how far the camera has moved, where that is asked for next."""
-        task, tip = state.task(setup), self._status.tip
-        if task is None or tip is None:
-            return setup
-        rules = rules_of(setup, task)
-        if len(state.touching.held) + 1 < rules.n_settling + rules.n_frames:
-            return setup
-        witness = self._witness(tip)
-        return setup if witness is None else replace(setup, drift=witness.share)
-
-    def _name(
-        self, frame: Frame, seen: Sighting, setup: SessionSetup, state: SessionState
-    ) -> str:
-        """Return the name of an image; one of a touch is kept under it."""
-        task = state.task(setup)
-        if task is None or not seen.has_pose or seen.is_blurred:
-            return str(frame.seq)
-        if not is_held_on(rules_of(setup, task), state):
-            return str(frame.seq)
-        return self._keeping.images.keep(frame, seen, task)
 
     def _new_record(self) -> NewRecord:
         """Make a record for the images of the run at hand."""
@@ -378,25 +326,19 @@ class VerificationCourse:
         before, state = self._status.state, transition.state
         finished = transition.finished
         self._status = replace(self._status, state=state)
-        happened = [_HAPPENED[event.what] for event in transition.events]
-        if before is not None and _is_known(state) and not _is_known(before):
-            happened.append(SessionHappening.KNOWN)
+        happened = happenings(before, transition)
         if finished is not None:
-            tip = self._status.tip
+            tip, setup = self._status.tip, self._status.setup
             assert tip is not None
-            witness = self._witness(tip)
+            assert setup is not None
+            witness = self._live.witness(setup)
             self._keeping.add_task(finished, tip, witness)
             self._status = replace(self._status, witness=witness)
-            happened.append(_ending(self._status))
+            happened.append(ending(self._status))
         self._keep()
         if finished is not None:
             self._conclude_done()
         self._publish(self._status, *happened)
-
-    def _witness(self, tip: TipInForce) -> LampWitness | None:
-        """Return what lamps tell of the camera."""
-        cameras = tip.instrument.rig.cameras
-        return self._lamps.witness(cameras, self._choices.limits)
 
     def _touch_again(self, state: SessionState) -> None:
         """Go on with another state, in which something is to be touched again."""
@@ -414,21 +356,11 @@ class VerificationCourse:
         status, setup, state = self._status, self._status.setup, self._status.state
         if setup is None or state is None:
             return
-        before, task = state, state.task(setup)
-        for kind in TaskKind:
-            is_found = state.found(kind) is not None
-            if is_found and _asks_otherwise(kind, setup.choices, choices):
-                state = touched_anew(state, kind)
-        setup = replace(setup, choices=choices)
-        if state.task(setup) is not task:
-            state = without_touches(state)
-        if state.task(setup) is not None and state.drift is not None:
-            state = replace(state, drift=None)  # it was not of what comes now
-        if not state.is_witnessed(setup):
-            state = replace(state, unwitnessed=())
+        before = state
+        setup, state = with_choices(setup, state, choices)
         refusal = self._why_not(status.tip)
-        self._status = replace(status, setup=setup, refusal=refusal)
-        if state is before:
+        self._status = replace(status, setup=setup, state=state, refusal=refusal)
+        if state.touching is before.touching:
             self._publish(self._status)
         else:
             self._touch_again(state)
@@ -475,16 +407,16 @@ class VerificationCourse:
         status = replace(self._status, reading=Reading.NOTHING)
         if status.state is None:
             return
-        self._relieve()
+        self._troubles.end()
         self._status = replace(status, began=status.began or self._now())
         self._touch_again(with_found(status.state, done.found))
         self._keeping.add_read(images, done, self._status)
         self._write()
         self._conclude_done()
-        self._publish(self._status, _ending(self._status))
+        self._publish(self._status, ending(self._status))
 
     def _on_runs_unread(self, why: Sentence) -> None:
-        self._tell_trouble(why)
+        self._troubles.tell(why)
         self._publish(replace(self._status, reading=Reading.NOTHING))
 
     def _start(
@@ -525,9 +457,9 @@ class VerificationCourse:
             return
         try:
             self._keeping.write()
-            self._relieve()
+            self._troubles.end()
         except LightpenError as error:
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence)
         self._status = replace(self._status, files=self._keeping.files)
 
     def _note_under_way(self) -> None:
@@ -535,13 +467,10 @@ class VerificationCourse:
         try:
             self._keeping.note(self._status, self._choices)
         except FileError as error:
-            if self._trouble is None:  # what stands in its way may be told already
-                self._unnoted = error.sentence
-                self._tell_trouble(error.sentence)
+            if not self._troubles.is_any:  # what stands in its way may be told already
+                self._troubles.tell(error.sentence, Cause.NOTE)
             return
-        if self._unnoted is not None and self._unnoted is self._trouble:
-            self._relieve()
-        self._unnoted = None
+        self._troubles.end_of(Cause.NOTE)
 
     def _publish(self, status: VerificationStatus, *events: SessionHappening) -> None:
         """Become this status, and tell of it."""
@@ -549,54 +478,6 @@ class VerificationCourse:
         self._note_under_way()
         self._listener.on_verification(status, events)
 
-    def _tell_trouble(self, trouble: Sentence) -> None:
-        self._trouble = trouble
-        self._listener.on_trouble(trouble)
-
-    def _relieve(self) -> None:
-        trouble, self._trouble = self._trouble, None
-        if trouble is not None:
-            self._listener.on_relief(trouble)
-
 
 def _verifies_like(one: Preparation, other: Preparation) -> bool:
     return one.swings_like(other) and one.source == other.source
-
-
-def _asks_otherwise(
-    kind: TaskKind, one: VerificationChoices, other: VerificationChoices
-) -> bool:
-    """Return whether what a task has found is of another artefact."""
-    artefacts = [
-        {
-            TaskKind.FIXED_POINT: (),
-            TaskKind.CIRCLE: (of.radius, of.radius_uncertainty, of.surface),
-            TaskKind.LENGTH: (
-                of.length,
-                of.length_uncertainty,
-                of.length_surface,
-            ),
-            TaskKind.ARTICULATION: (),
-            TaskKind.DRIFT: (),
-        }[kind]
-        for of in (one, other)
-    ]
-    return artefacts[0] != artefacts[1]
-
-
-def _is_known(state: SessionState) -> bool:
-    return state.touching.phase is TouchPhase.KNOWN
-
-
-def _ending(status: VerificationStatus) -> SessionHappening:
-    """Return what it is that a task is done."""
-    if status.task is not None or status.assessment is None:
-        return SessionHappening.FINISHED
-    is_refused = status.assessment.grade is Grade.REPEAT
-    return SessionHappening.FAILED if is_refused else SessionHappening.DONE
-
-
-_HAPPENED = {
-    TouchHappening.TAKEN: SessionHappening.TAKEN,
-    TouchHappening.BROKEN_OFF: SessionHappening.BROKEN_OFF,
-}

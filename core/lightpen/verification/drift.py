@@ -38,6 +38,9 @@ TOUCH_LONGER = sentence(
     "Next: hold the pen alike at each visit, take more images of a touch, or bring the "
     "camera nearer.",
 )
+USE_TOUCHES = sentence(
+    "drift.use-touches", "Next: use what was touched between the visits."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,5 +159,6 @@ def _assessment(
             distance=distance,
             uncertainty=uncertainty,
             limit=limits.drift,
-        )
+        ),
+        USE_TOUCHES,
     )

@@ -2,7 +2,7 @@
 
 What was touched is measured anew from the LED centres in the records of the touches,
 run by run, so that all is found again as it was. A touch that was not complete does not
-count. What fixed lamps told before is not taken up: they are watched anew.
+count. Fixed lamps are looked for once more in the images of these records.
 """
 
 from contextlib import suppress
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from lightpen.errors import FileError, UsageError
+from lightpen.errors import FileError, LightpenError, UsageError
 from lightpen.formats.files import printable
 from lightpen.formats.hashes import InputFile, hashed
 from lightpen.model.origin import Origin
@@ -25,6 +25,7 @@ from lightpen.swing.serial_queue import Report
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.conclusion import Conclusion, conclusion_record
 from lightpen.verification.keeping import keep_verification, verifications_folder
+from lightpen.verification.places import touch_place
 from lightpen.verification.recorded_runs import read_runs
 from lightpen.verification.session import (
     run_again,
@@ -32,7 +33,8 @@ from lightpen.verification.session import (
     touch_again,
     with_found,
 )
-from lightpen.verification.session_state import SessionSetup, SessionState
+from lightpen.verification.session_state import SessionSetup, SessionState, with_drift
+from lightpen.verification.sources import observe_place
 from lightpen.verification.tip_in_force import TipInForce, read_tip_in_force
 from lightpen.verification.touch import StillFrames, TouchFrame, measure_touches
 from lightpen.verification.touch_images import CONCLUDED, touch_image_name
@@ -43,6 +45,7 @@ from lightpen.verification.under_way import (
     UnderWayFile,
     written_since,
 )
+from lightpen.verification.witness import LampWatch, lamps_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,8 @@ class GoneOn:
         The records that are written of it.
     unwritten : tuple of TaskKind
         Tasks that are done and have no record yet.
+    lamps : LampWatch
+        What the images of the touches show of fixed lamps.
     """
 
     under_way: UnderWay
@@ -63,6 +68,7 @@ class GoneOn:
     state: SessionState
     files: tuple[Path, ...]
     unwritten: tuple[TaskKind, ...]
+    lamps: LampWatch
 
 
 def go_on_with(
@@ -89,23 +95,31 @@ def go_on_with(
     _require_same(tip, under_way)
     root = _root(data, under_way)
     setup, state = setup_of(tip, under_way.choices), SessionState()
+    n_all = len(under_way.read) + len(under_way.runs)
     for n, images in enumerate(under_way.read, start=1):
         rules = read_rules(images.is_still, under_way.choices.n_frames)
-        done = read_runs(images.task, images.place, tip, setup, rules, lambda _: None)
+        drifted = with_drift(setup, state.drift)  # which was read before
+        done = read_runs(
+            *(images.task, images.place, tip, drifted, rules), lambda _: None
+        )
         state = with_found(state, done.found)
-        report(n / (len(under_way.read) + 1))
-    for run in under_way.runs:
+        report(n / n_all)
+    lamps, cameras = LampWatch(), setup.instrument.rig.cameras
+    for n, run in enumerate(under_way.runs, start=1 + len(under_way.read)):
         record = open_record(root / TOUCHES / run.folder)
         held = _held_in(record, under_way.choices.n_frames)
+        lamps = lamps.then(_lamps_in(record, setup))
+        drifted = with_drift(setup, lamps.witness(cameras, setup.choices.limits))
         if record.verdict == CONCLUDED:
             touches = measure_touches(setup.instrument, held)
-            state = run_again(setup, state, touches, is_last=run.is_last)
+            state = run_again(drifted, state, touches, is_last=run.is_last)
         else:
-            state = touch_again(setup, state, held)
+            state = touch_again(drifted, state, held)
+        report(n / n_all)
     since = written_since(root, under_way)
     files = tuple(root / name for name in (*under_way.files, *since.files))
     unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
-    return GoneOn(under_way, tip, setup, state, files, unwritten)
+    return GoneOn(under_way, tip, setup, state, files, unwritten, lamps)
 
 
 def abandon_interrupted(
@@ -173,6 +187,14 @@ def _require_same(tip: TipInForce, under_way: UnderWay) -> None:
                 "LEDs than is chosen now. Choose that file, and go on with it.",
             )
         )
+
+
+def _lamps_in(record: Record, setup: SessionSetup) -> LampWatch:
+    """Return what the images of a record show of lamps; nothing if they are gone."""
+    with suppress(LightpenError):  # the touches are known without their images
+        place = touch_place((str(record.folder),))
+        return lamps_in(observe_place(place, setup.instrument))
+    return LampWatch()
 
 
 def _held_in(record: Record, n_frames: int) -> tuple[StillFrames, ...]:

@@ -22,7 +22,6 @@ from lightpen.model.rigid import skew
 from lightpen.record.calibrations import CalibrationFile
 from lightpen.sentences import Sentence, sentence
 from lightpen.verification.assessment import (
-    CHECK_FILES,
     Conformity,
     accepted,
     check,
@@ -39,6 +38,14 @@ ROUNDS = 20
 MEASURE_AGAIN = sentence(
     "pen-health.measure-again",
     "Next: look at the pen, fix the LED, and measure the LEDs again.",
+)
+MEASURE_LENGTH = sentence(
+    "pen-health.measure-length",
+    "Next: let the pen take the temperature of the room, and measure a certified "
+    "length.",
+)
+KEEP_FILE = sentence(
+    "pen-health.keep-file", "Next: go on with this pen and its LED file."
 )
 
 
@@ -215,13 +222,14 @@ def _assessment(
             MEASURE_AGAIN,
         )
     if growth is not None and abs(growth) > GROWN:
-        return check(_grown(growth), CHECK_FILES)
+        return check(_grown(growth), MEASURE_LENGTH)
     return accepted(
         sentence(
             "pen-health.good",
             "No LED has moved against the others over {n_swings} swings.",
             n_swings=len(swings),
-        )
+        ),
+        KEEP_FILE,
     )
 
 
@@ -230,8 +238,7 @@ def _grown(growth: float) -> Sentence:
         "pen-health.grown",
         "All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K "
         "warmer (of aluminium), or cone and camera moved apart along the view. No "
-        "single LED has moved. Let the pen take the temperature of the room, and "
-        "measure a certified length.",
+        "single LED has moved.",
         growth=1e6 * growth,
         kelvin=growth / ALUMINIUM,
     )

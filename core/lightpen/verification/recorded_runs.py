@@ -8,10 +8,11 @@ from lightpen.verification.choices import TaskKind
 from lightpen.verification.keeping import TouchedImages
 from lightpen.verification.places import runs_at, touch_place
 from lightpen.verification.session import measure
-from lightpen.verification.session_state import Found, SessionSetup
-from lightpen.verification.sources import touch_run
+from lightpen.verification.session_state import Found, SessionSetup, with_drift
+from lightpen.verification.sources import touch_run, witness_of
 from lightpen.verification.tip_in_force import TipInForce, tip_at
 from lightpen.verification.touching import TouchRules
+from lightpen.verification.witness import judged_with
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,14 @@ def read_runs(
     rules: TouchRules,
     report: Report,
 ) -> Done:
-    """Return what recorded images have found."""
+    """Return what recorded images have found.
+
+    Parameters
+    ----------
+    setup : SessionSetup
+        With how far the camera moved meanwhile, where that is known; fixed lamps in
+        the images count besides.
+    """
     rig = tip.viewers.rig
     places = [touch_place((run,), rig) for run in runs_at(place, rig)]
     tip = tip_at(tip, places[0])
@@ -41,10 +49,14 @@ def read_runs(
     for i, each in enumerate(places, start=1):
         runs.append(touch_run(each, tip.instrument, rules))
         report(i / len(places))
+    witness = witness_of(runs, tip.instrument, setup.choices.limits)
+    setup = with_drift(setup, witness)
     found = measure(setup, task, [(run.name, run.touches) for run in runs])
+    found = replace(found, assessment=judged_with(found.assessment, witness))
     images = TouchedImages(
         origin=places[0].origin,
         files=all_hashed([file for each in places for file in each.files]),
         rejected=tuple(image for run in runs for image in run.rejected),
+        witness=witness,
     )
     return Done(task, found, tip, images)

@@ -207,7 +207,9 @@ def repeatability_entries(found: Repeatability) -> dict[str, Any]:
             if study is None
             else {"tolerance_mm": study.tolerance, "cg": study.cg, "cgk": study.cgk}
         ),
-        "fixed_point_std_mm": found.fixed_point_deviation,
+        "fixed_point_std_mm": (
+            None if found.touched is None else found.touched.deviation
+        ),
         "points_to": found.points_to,
         "tips": [
             {

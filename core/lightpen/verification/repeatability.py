@@ -34,6 +34,14 @@ CONTROL = 3.0  # standard deviations
 BY_CHANCE = 2.58  # standard deviations of a logarithm of variances: 99 %
 SHARE_OF_TOLERANCE = 0.2
 CAPABLE = 1.33
+TIGHTEN = sentence(
+    "repeatability.tighten",
+    "Next: tighten the tip, look at the LEDs of the pen, calibrate it again, and "
+    "verify the new result.",
+)
+USE_NEWEST = sentence(
+    "repeatability.use-newest", "Next: use the tip of the newest calibration."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +60,30 @@ class TipEstimate:
     tip_pen: FloatArray
     uncertainty: FloatArray
     when: datetime | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TouchedPoint:
+    """A fixed point touched several times with a tip.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Camera frame, mm.
+    expected_deviation : (3,) array
+        Standard deviation of the touches by all that is known of them, mm.
+    when : datetime
+        When it was verified.
+    """
+
+    points: FloatArray
+    expected_deviation: FloatArray
+    when: datetime
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Standard deviation of the touches, (3,), mm."""
+        return Scatter(self.points).deviation
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +126,8 @@ class Repeatability:
 
     Attributes
     ----------
-    fixed_point_deviation : (3,) array or None
-        Standard deviation of a fixed point touched with the tip, mm.
+    touched : TouchedPoint or None
+        A fixed point touched with the tip.
     points_to : Sentence or None
         What the scatter points to beside that of the fixed point.
     """
@@ -103,7 +135,7 @@ class Repeatability:
     tips: tuple[TipEstimate, ...]
     control: ControlLimits
     capability: Capability | None
-    fixed_point_deviation: FloatArray | None
+    touched: TouchedPoint | None
     points_to: Sentence | None
     assessment: Conformity
 
@@ -126,7 +158,7 @@ def measure_repeatability(
     *,
     tolerance: float | None = None,
     reference: FloatArray | None = None,
-    fixed_point: FloatArray | None = None,
+    touched: TouchedPoint | None = None,
 ) -> Repeatability:
     """Measure how well calibrations of one tip repeat.
 
@@ -136,8 +168,8 @@ def measure_repeatability(
         Width of the tolerance of a coordinate, mm, to study the capability.
     reference : (3,) array, optional
         The tip by a better instrument, mm.
-    fixed_point : (N, 3) array, optional
-        A point touched N times with the tip, camera frame, mm.
+    touched : TouchedPoint, optional
+        A fixed point touched with the tip.
 
     Raises
     ------
@@ -155,18 +187,14 @@ def measure_repeatability(
         )
     scatter = Scatter(np.array([tip.tip_pen for tip in tips]))
     values, deviation = scatter.points, scatter.deviation
-    fixed = None if fixed_point is None else Scatter(fixed_point).deviation
-    n_touches = 0 if fixed_point is None else len(fixed_point)
-    points_to = (
-        None if fixed is None else _points_to(deviation, len(tips), fixed, n_touches)
-    )
+    points_to = None if touched is None else _points_to(deviation, len(tips), touched)
     return Repeatability(
         tips=tuple(tips),
         control=_control(values),
         capability=(
             None if tolerance is None else _capability(values, tolerance, reference)
         ),
-        fixed_point_deviation=fixed,
+        touched=touched,
         points_to=points_to,
         assessment=_assessment(tips, deviation, points_to, limits),
     )
@@ -190,15 +218,16 @@ def _capability(
     return Capability(tolerance, cg, cgk)
 
 
-def _points_to(
-    tip: FloatArray, n_tips: int, point: FloatArray, n_touches: int
-) -> Sentence | None:
-    """Return what two scatters point to that differ by more than chance."""
-    of_tip, of_point = float(np.linalg.norm(tip)), float(np.linalg.norm(point))
-    n_free = 3 * (n_tips - 1), 3 * (n_touches - 1)
-    apart = np.log(of_tip**2 / of_point**2) if of_point > 0 else np.inf
-    by_chance = BY_CHANCE * np.sqrt(2 / n_free[0] + 2 / n_free[1])
-    if apart > by_chance:
+def _points_to(tip: FloatArray, n_tips: int, touched: TouchedPoint) -> Sentence | None:
+    """Return what two scatters point to that differ by more than chance.
+
+    A point that scatters no more than its touches are expected to has not moved.
+    """
+    of_tip = float(np.linalg.norm(tip))
+    of_point = float(np.linalg.norm(touched.deviation))
+    expected = float(np.linalg.norm(touched.expected_deviation))
+    n_free, n_free_point = 3 * (n_tips - 1), 3 * (len(touched.points) - 1)
+    if _is_larger(of_tip, of_point, 2 / n_free + 2 / n_free_point):
         return sentence(
             "repeatability.rode-with-pen",
             "The tip scatters by {of_tip:.4f} mm over the calibrations, a fixed point "
@@ -209,17 +238,30 @@ def _points_to(
             of_tip=of_tip,
             of_point=of_point,
         )
-    if apart < -by_chance:
+    is_beyond_noise = _is_larger(of_point, expected, 2 / n_free_point)
+    if is_beyond_noise and _is_larger(of_point, of_tip, 2 / n_free + 2 / n_free_point):
         return sentence(
             "repeatability.point-moved",
             "A fixed point scatters by {of_point:.4f} mm, the tip by only "
             "{of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the "
-            "camera moved between the touches, the tip did not rest in the cone, or "
-            "each touch was of too few images.",
+            "camera moved between the touches, or the tip did not rest in the cone.",
             of_tip=of_tip,
             of_point=of_point,
         )
     return None
+
+
+def _is_larger(one: float, other: float, variance: float) -> bool:
+    """Return whether a deviation is larger by more than chance.
+
+    Parameters
+    ----------
+    variance : float
+        Of the logarithm of the ratio of both variances.
+    """
+    if not (one > 0 and other > 0):
+        return one > 0
+    return 2 * float(np.log(one / other)) > BY_CHANCE * float(np.sqrt(variance))
 
 
 def _assessment(
@@ -230,10 +272,13 @@ def _assessment(
 ) -> Conformity:
     axis = int(np.argmax(deviation))
     stated = np.mean([tip.uncertainty for tip in tips], axis=0) / 2
+    ridden = "repeatability.rode-with-pen"
+    has_ridden = points_to is not None and points_to.code == ridden
     if deviation[axis] > limits.repeatability:
         return refused(
             points_to
-            or sentence(
+            if points_to is not None and has_ridden
+            else sentence(
                 "repeatability.scatters",
                 "The tip scatters by {deviation:.4f} mm along {axis} (standard "
                 "deviation, limit {limit:.4f} mm); its calibrations state {stated:.4f} "
@@ -247,7 +292,7 @@ def _assessment(
             CALIBRATE_AGAIN,
         )
     if points_to is not None:
-        return check(points_to, VERIFY_AGAIN)
+        return check(points_to, TIGHTEN if has_ridden else VERIFY_AGAIN)
     return accepted(
         sentence(
             "repeatability.good",
@@ -257,5 +302,6 @@ def _assessment(
             axis="xyz"[axis],
             limit=limits.repeatability,
             stated=float(stated[axis]),
-        )
+        ),
+        USE_NEWEST,
     )

@@ -85,6 +85,10 @@ class SessionKeeping:
         """Whether something could not be written yet."""
         return self._records.are_waiting
 
+    def has_read(self, task: TaskKind) -> bool:
+        """Return whether a task that is done was done with recorded images."""
+        return any(images.task is task for images in self._read)
+
     def root(self, tip: TipInForce) -> Path:
         """Return the folder of the verifications of a tip."""
         is_simulated = tip.origin is Origin.SIMULATED
@@ -201,7 +205,9 @@ class SessionKeeping:
             )
         )
 
-    def take_over(self, path: Path, before: GoneOn) -> None:
+    def take_over(
+        self, path: Path, before: GoneOn, witness: LampWitness | None
+    ) -> None:
         """Go on with what was kept of an interrupted verification.
 
         Parameters
@@ -224,7 +230,7 @@ class SessionKeeping:
         self._file, self._read = file, under_way.read
         self._records.begin(before.files)
         for kind in before.unwritten:
-            self.add_task(kind, before.tip, None)
+            self.add_task(kind, before.tip, witness)
 
     def _add(self, done: Done, status: VerificationStatus) -> None:
         """Have a task written, now or as soon as it can be."""

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
+import numpy as np
+
 from lightpen.arrays import FloatArray
 from lightpen.estimation.instrument import Instrument
 from lightpen.sentences import Sentence
@@ -16,6 +18,7 @@ from lightpen.verification.fixed_point import FixedPoint
 from lightpen.verification.length import Length
 from lightpen.verification.touch import NO_DRIFT, Touch
 from lightpen.verification.touching import TouchState
+from lightpen.verification.witness import LampWitness
 
 Found: TypeAlias = FixedPoint | Circle | Length | Articulation | Drift
 Runs: TypeAlias = Sequence[tuple[str, Sequence[Touch]]]
@@ -41,6 +44,15 @@ class SessionSetup:
     nominal_tip: FloatArray | None = None
     cone_cam: FloatArray | None = None
     drift: FloatArray = field(default_factory=NO_DRIFT.copy)
+
+
+def with_drift(
+    setup: SessionSetup, witness: LampWitness | Drift | None
+) -> SessionSetup:
+    """Return it with how far the camera moved by what lamps or a cone tell."""
+    if witness is None:
+        return setup
+    return replace(setup, drift=np.maximum(setup.drift, witness.share))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.formats.files import printable, sha256
 from lightpen.formats.pairing import pair_images
 from lightpen.model.camera import Camera
+from lightpen.model.limits import VerificationLimits
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.record.calibrations import CalibrationFile, FittedInstrument
@@ -34,6 +35,7 @@ from lightpen.verification.touch import (
     measure_touches,
 )
 from lightpen.verification.touching import TouchRules, take_all, touch_frame
+from lightpen.verification.witness import LampWatch, LampWitness, lamps_in
 
 MAX_RMS = 1.0  # px; LED errors of 0.3 mm make this
 
@@ -48,11 +50,24 @@ class TouchRun:
         Of its folder or file.
     rejected : tuple of RejectedFrame
         Images that belong to no touch, and why.
+    lamps : LampWatch
+        What the images show of fixed lamps.
     """
 
     name: str
     touches: tuple[Touch, ...]
     rejected: tuple[RejectedFrame, ...]
+    lamps: LampWatch
+
+
+def witness_of(
+    runs: Sequence[TouchRun], instrument: Instrument, limits: VerificationLimits
+) -> LampWitness | None:
+    """Return what fixed lamps tell of the camera by runs in the order of time."""
+    lamps = LampWatch()
+    for run in runs:
+        lamps = lamps.then(run.lamps)
+    return lamps.witness(instrument.rig.cameras, limits)
 
 
 def instrument_of(
@@ -135,16 +150,28 @@ def touch_run(place: TouchPlace, instrument: Instrument, rules: TouchRules) -> T
     CalibrationError
         No image shows the pen, or its LEDs are not those of the pen.
     """
+    seen = observe_place(place, instrument)
+    return touches_of(place.name, seen, instrument, rules, place.touches)
+
+
+def observe_place(
+    place: TouchPlace, instrument: Instrument
+) -> tuple[Observations, ...]:
+    """Find and label the LEDs in the images of each camera.
+
+    Raises
+    ------
+    FileError, CalibrationError
+        As of `touch_run`.
+    """
     rig, pen = instrument.rig, instrument.pen
     if len(place.images) != rig.n_cameras:
         raise _other_number(place, rig)
     if rig.n_cameras == 1:
         images, mask = place.images[0], place.masks[0]
-        alone = observe_images(images, instrument.camera, pen, mask=mask)
-        return touches_of(place.name, [alone], instrument, rules, place.touches)
+        return (observe_images(images, instrument.camera, pen, mask=mask),)
     pairing = pair_images([each.names for each in place.images], rig.names)
-    seen = observe_rig_images(place.images, pairing, rig, pen, masks=place.masks)
-    return touches_of(place.name, seen, instrument, rules, place.touches)
+    return observe_rig_images(place.images, pairing, rig, pen, masks=place.masks)
 
 
 def touches_of(
@@ -166,10 +193,14 @@ def touches_of(
         raise CalibrationError(
             sentence(
                 "verification.never-still",
-                "{run}: the pen was held still nowhere for {n_frames} images. Hold it "
-                "still on each point, or take each image for a touch.",
+                "{run}: the pen was held still nowhere for {n_all} images, "
+                "{n_settling} to settle and {n_frames} that count. Hold it still "
+                "longer on each point, ask for fewer images of a touch, or take each "
+                "image for a touch.",
                 run=name,
-                n_frames=rules.n_settling + rules.n_frames,
+                n_all=rules.n_settling + rules.n_frames,
+                n_settling=rules.n_settling,
+                n_frames=rules.n_frames,
             )
         )
     touches = measure_touches(instrument, held)
@@ -180,7 +211,7 @@ def touches_of(
         for image, sighting in images
         if not sighting.has_pose and image not in named
     )
-    return TouchRun(name, touches, rejected)
+    return TouchRun(name, touches, rejected, lamps_in(seen))
 
 
 def require_leds_fit(name: str, touches: Sequence[Touch]) -> None:

@@ -8,11 +8,11 @@ from typing import Protocol
 
 from lightpen.detection.aim import Aim
 from lightpen.sentences import Sentence
-from lightpen.verification.assessment import Conformity, worst
+from lightpen.verification.assessment import Conformity
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.session_state import SessionSetup, SessionState
 from lightpen.verification.tip_in_force import TipInForce
-from lightpen.verification.witness import LampWitness
+from lightpen.verification.witness import LampWitness, judged_with
 
 
 class Reading(StrEnum):
@@ -93,9 +93,7 @@ class VerificationStatus:
     def assessment(self) -> Conformity | None:
         """The worst that was found so far."""
         found = None if self.state is None else self.state.assessment
-        if found is None or self.witness is None:
-            return found
-        return worst((self.witness.assessment, found))  # it explains the others
+        return None if found is None else judged_with(found, self.witness)
 
 
 class VerificationListener(Protocol):

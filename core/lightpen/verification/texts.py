@@ -210,8 +210,11 @@ def repeatability_text(found: Repeatability) -> str:
     out = found.out_of_control
     if out:
         lines.append("Out of control: " + ", ".join(tip.name for tip in out))
-    if found.fixed_point_deviation is not None:
-        lines.append(row("Std of a fixed point", found.fixed_point_deviation))
+    if found.touched is not None:
+        lines += [
+            row("Std of a fixed point", found.touched.deviation) + "  (u v w)",
+            row("  expected", found.touched.expected_deviation),
+        ]
     if found.capability is not None:
         lines += _capability_lines(found.capability, len(found.tips), row)
     return "\n".join([*lines, "", *_verdict(found.assessment)])

@@ -1,31 +1,40 @@
 """How a tip developed: its calibrations in their order, beside their limits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lightpen.archive.chains import records_of
 from lightpen.archive.database import Database
-from lightpen.archive.entries import IN_FORCE_BY, Written
+from lightpen.archive.entries import Kind, Written
 from lightpen.archive.history import TipState, lines
-from lightpen.archive.queries import Wanted
+from lightpen.archive.queries import Wanted, newest
 from lightpen.arrays import FloatArray
 from lightpen.estimation.verdict import Change, change_since
 from lightpen.model.limits import VerificationLimits
+from lightpen.verification.choices import TaskKind
+from lightpen.verification.read_back import fixed_point_in
 from lightpen.verification.repeatability import (
     MIN_TIPS,
     ControlLimits,
     Repeatability,
     TipEstimate,
+    TouchedPoint,
     measure_repeatability,
 )
 
 LONGEST = 1000  # calibrations, the newest
+LATEST = 100  # verifications, among which a fixed point is looked for
+VERIFIED = "verified"  # among the settings of an entry: what was
 LIMIT = "max_uncertainty_mm"  # among the settings of an entry
 
 
 @dataclass(frozen=True, eq=False)
 class Trend:
     """The calibrations of a tip that were accepted and not taken back.
+
+    One whose tip was put in force again stands for itself once.
 
     Attributes
     ----------
@@ -35,6 +44,8 @@ class Trend:
         The oldest first.
     max_uncertainty : float or None
         Limit of U (k = 2) at the newest, mm.
+    touched : TouchedPoint or None
+        The fixed point that was touched last with the tip.
     """
 
     pen: str = ""
@@ -43,6 +54,12 @@ class Trend:
     tips: tuple[TipEstimate, ...] = ()
     control: ControlLimits | None = None
     max_uncertainty: float | None = None
+    touched: TouchedPoint | None = None
+
+    def touched_with(self, entries: Sequence[Written]) -> TouchedPoint | None:
+        """Return the fixed point if it was touched with the tip of all entries."""
+        is_of_tip = {*map(_subject, entries)} == {*map(_subject, self.entries)}
+        return self.touched if is_of_tip else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +88,11 @@ def trend_of(database: Database, wanted: Wanted) -> Trend:
     wanted : Wanted
         With a pen and a tip; entries of all kinds but calibrations are left out.
     """
-    newest = lines(database, replace(wanted, kinds=IN_FORCE_BY), 0, LONGEST)
+    accepted = replace(wanted, kinds=(Kind.ACCEPTED,))
+    found = lines(database, accepted, 0, LONGEST)
     entries = tuple(
         each.entry
-        for each in reversed(newest)
+        for each in reversed(found)
         if each.entry is not None
         and has_tip(each.entry)
         and each.state is not TipState.TAKEN_BACK
@@ -87,7 +105,22 @@ def trend_of(database: Database, wanted: Wanted) -> Trend:
         tips=tips,
         control=_control(tips),
         max_uncertainty=_limit(entries[-1]) if entries else None,
+        touched=_last_touched(database, wanted),
     )
+
+
+def _last_touched(database: Database, wanted: Wanted) -> TouchedPoint | None:
+    """Return the fixed point that was touched last with a tip."""
+    tasks = newest(database, replace(wanted, kinds=(Kind.VERIFICATION,)), LATEST)
+    points = (
+        each
+        for each in tasks
+        if each.entry.event.settings.get(VERIFIED) == TaskKind.FIXED_POINT
+    )
+    last = next(points, None)
+    if last is None:
+        return None
+    return next(map(fixed_point_in, records_of(database, [last]).values()), None)
 
 
 def has_tip(entry: Written) -> bool:
@@ -120,19 +153,28 @@ def repeatability_of(
     limits: VerificationLimits,
     tolerance: float | None = None,
     reference: FloatArray | None = None,
+    touched: TouchedPoint | None = None,
 ) -> Repeatability | None:
     """Return how well tips repeat; None if they are fewer than two, or of several.
 
     Parameters
     ----------
-    tolerance, reference
-        Of a study of the capability, as `measure_repeatability` takes them.
+    entries : tuple of Written
+        Those that put a tip in force again are left out: nothing was measured anew.
+    tolerance, reference, touched
+        As `measure_repeatability` takes them.
     """
-    if len(entries) < MIN_TIPS or len({_subject(each) for each in entries}) > 1:
+    measured = [e for e in entries if e.entry.event.kind is not Kind.RESTORED]
+    if len(measured) < MIN_TIPS or len({_subject(each) for each in measured}) > 1:
         return None
-    in_order = sorted(entries, key=lambda each: each.entry.since)
+    in_order = sorted(measured, key=lambda each: each.entry.since)
     tips = [tip_of(each) for each in in_order]
-    return measure_repeatability(tips, limits, tolerance=tolerance, reference=reference)
+    return measure_repeatability(
+        *(tips, limits),
+        tolerance=tolerance,
+        reference=reference,
+        touched=touched,
+    )
 
 
 def _subject(entry: Written) -> tuple[str, str, bool]:

@@ -16,7 +16,8 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import Frame
 from lightpen.detection.aim import Aim
-from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
+from lightpen.detection.fixed_lamps import lamps_among, masked_lights, other_lights
+from lightpen.detection.observations import Observations
 from lightpen.detection.sighting import Sighting
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR
 from lightpen.model.camera import Camera
@@ -27,6 +28,7 @@ from lightpen.verification.assessment import (
     Conformity,
     accepted,
     refused,
+    worst,
 )
 
 BLOCK = 8  # images, at least
@@ -35,20 +37,24 @@ MIN_BLOCKS, MAX_BLOCKS = 3, 10  # before, during and after; larger ones are less
 
 @dataclass(frozen=True, eq=False)
 class LampImages:
-    """What the images of the touches show of lamps, in the order of time.
+    """What images of touches show of lamps, in the order of time.
 
     Attributes
     ----------
-    masked : tuple of array
-        Lights in masked circles, (M, 2) each, px; NaN where an image shows none.
+    lights : tuple of array
+        What shines in each image and is no LED, masked or not, (S, 2), px.
+    distances : tuple of float
+        Of the pen along the view in each, mm.
     """
 
-    sightings: tuple[Sighting, ...] = ()
-    masked: tuple[FloatArray, ...] = ()
+    lights: tuple[FloatArray, ...] = ()
+    distances: tuple[float, ...] = ()
 
-    def with_image(self, sighting: Sighting, masked: FloatArray) -> "LampImages":
-        """Return them with one more image."""
-        return LampImages((*self.sightings, sighting), (*self.masked, masked))
+    def then(self, other: "LampImages") -> "LampImages":
+        """Return both, the other ones after these."""
+        return LampImages(
+            (*self.lights, *other.lights), (*self.distances, *other.distances)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,28 +64,33 @@ class LampWatch:
     Attributes
     ----------
     cameras : tuple of LampImages
+        Empty before the first image.
     """
 
     cameras: tuple[LampImages, ...] = ()
 
+    def then(self, other: "LampWatch") -> "LampWatch":
+        """Return what these cameras saw, and after it what they saw in the other."""
+        if not (self.cameras and other.cameras):
+            return self if self.cameras else other
+        both = zip(self.cameras, other.cameras, strict=True)
+        return LampWatch(tuple(one.then(another) for one, another in both))
+
     def with_frame(self, frame: Frame, sighting: Sighting, aim: Aim) -> "LampWatch":
         """Return it with one more image of each camera that sees the pen."""
-        known = self.cameras or (LampImages(),) * len(aim.aims)
         views = zip(
-            *(known, (frame, *frame.others), (sighting, *sighting.others)),
+            *((frame, *frame.others), (sighting, *sighting.others)),
             aim.aims,
             strict=False,
         )
-        return LampWatch(
-            tuple(
-                lamps.with_image(
-                    seen, masked_lights(own.image, of.mask, own.full_scale)
-                )
-                if seen.has_pose
-                else lamps
-                for lamps, own, seen, of in views
-            )
-        )
+        seen = [
+            LampImages((_lights(own, view, of.mask),), (float(view.translation[2]),))
+            if view.has_pose
+            else LampImages()
+            for own, view, of in views
+        ]
+        unseen = [LampImages()] * (len(aim.aims) - len(seen))
+        return self.then(LampWatch((*seen, *unseen)))
 
     def witness(
         self, cameras: Sequence[Camera], limits: VerificationLimits
@@ -91,6 +102,23 @@ class LampWatch:
         ]
         known = [each for each in told if each is not None]
         return max(known, key=lambda each: each.moved, default=None)
+
+
+def lamps_in(seen: Sequence[Observations]) -> LampWatch:
+    """Return what recorded images of each camera show of lamps."""
+    return LampWatch(tuple(map(_lamps_of, seen)))
+
+
+def _lamps_of(seen: Observations) -> LampImages:
+    (used,) = np.isfinite(seen.translations[:, 2]).nonzero()
+    lights = [lamps[np.isfinite(lamps[:, 0])] for lamps in seen.lamps[used]]
+    return LampImages(tuple(lights), tuple(seen.translations[used, 2].tolist()))
+
+
+def _lights(frame: Frame, sighting: Sighting, mask: FloatArray | None) -> FloatArray:
+    masked = masked_lights(frame.image, mask, frame.full_scale)
+    seen = masked[np.isfinite(masked[:, 0])]
+    return np.concatenate([other_lights(sighting), seen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,11 +166,11 @@ def witnessed(
     focal_length : float
         px.
     """
-    if len(images.sightings) < MIN_BLOCKS * BLOCK:
+    n_images = len(images.lights)
+    if n_images < MIN_BLOCKS * BLOCK:
         return None
-    lamps = fixed_lamps(np.array(images.masked), images.sightings)
-    distances = [each.translation[2] for each in images.sightings]
-    scale = float(np.median(distances)) / focal_length
+    lamps = lamps_among(np.zeros((n_images, 0, 2)), images.lights)
+    scale = float(np.median(images.distances)) / focal_length
     return witnessed_by(lamps, scale, limits)
 
 
@@ -173,6 +201,13 @@ def witnessed_by(
     uncertainty = COVERAGE_FACTOR * scale * spread * float(np.sqrt(2 / length))
     moves = scale * (means - means[0])
     return LampWitness(places, moves, uncertainty, _judged(moves, uncertainty, limits))
+
+
+def judged_with(found: Conformity, witness: LampWitness | None) -> Conformity:
+    """Return what was found, or before it that the camera moved, which explains it."""
+    if witness is None or witness.assessment.is_accepted:
+        return found
+    return worst((witness.assessment, found))
 
 
 def witness_entries(witness: LampWitness | None) -> dict[str, Any] | None:

@@ -611,6 +611,14 @@
         <translation>作为新条目</translation>
     </message>
     <message>
+        <source>Record on paper...</source>
+        <translation>纸质记录...</translation>
+    </message>
+    <message>
+        <source>Look at it, save it as PDF or print it</source>
+        <translation>查看、存为 PDF 或打印</translation>
+    </message>
+    <message>
         <source>No entry is chosen.</source>
         <translation>未选择条目。</translation>
     </message>
@@ -649,6 +657,14 @@
     <message>
         <source>It is in force.</source>
         <translation>该数据正在生效。</translation>
+    </message>
+    <message>
+        <source>Only a tip that was accepted has a record on paper.</source>
+        <translation>只有已接受的测头才有纸质记录。</translation>
+    </message>
+    <message>
+        <source>Its result is at the station that it is of.</source>
+        <translation>其结果保存在所属工位。</translation>
     </message>
 </context>
 <context>
@@ -1108,6 +1124,10 @@
         <translation>光笔 {1} 的测头 {0} 已按当时的标定重新生效。</translation>
     </message>
     <message>
+        <source>Saved in {0}</source>
+        <translation>已保存到 {0}</translation>
+    </message>
+    <message>
         <source>Entries of another station</source>
         <translation>另一工位的条目</translation>
     </message>
@@ -1349,6 +1369,45 @@
     </message>
 </context>
 <context>
+    <name>InterruptedControl</name>
+    <message>
+        <source>The swing is being read.</source>
+        <translation>正在读取摆动。</translation>
+    </message>
+    <message>
+        <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
+        <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
+        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
+    </message>
+    <message>
+        <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
+        <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
+    </message>
+    <message>
+        <source>The swing is being discarded.</source>
+        <translation>正在放弃摆动。</translation>
+    </message>
+    <message>
+        <source>Discarded. The images stay in {0}.</source>
+        <translation>已放弃。图像保留在 {0}。</translation>
+    </message>
+    <message>
+        <source>The verification is being read.</source>
+        <translation>正在读取验证。</translation>
+    </message>
+    <message>
+        <source>The verification is being closed.</source>
+        <translation>正在结束验证。</translation>
+    </message>
+    <message>
+        <source>Closed as abandoned; see History.</source>
+        <translation>已作为放弃结束，见“历史”。</translation>
+    </message>
+</context>
+<context>
     <name>InterruptedPanel</name>
     <message>
         <source>Interrupted: {0}</source>
@@ -1475,6 +1534,10 @@
     <message>
         <source>The camera sends {0}, the calibration file was made for {1}. Choose the file for this camera, set the region to the whole sensor, or switch off binning.</source>
         <translation>相机送来 {0}，标定文件是为 {1} 做的。请选择此相机的文件，把区域设为整个传感器，或关闭像素合并。</translation>
+    </message>
+    <message>
+        <source>Checked by the swing: file and camera agree.</source>
+        <translation>已由摆动检查：文件与相机一致。</translation>
     </message>
     <message>
         <source>no date</source>
@@ -3297,6 +3360,10 @@
         <translation>测头已接受。</translation>
     </message>
     <message>
+        <source>Check the settings</source>
+        <translation>检查设置</translation>
+    </message>
+    <message>
         <source>Accept...</source>
         <translation>接受...</translation>
     </message>
@@ -3598,6 +3665,10 @@
     <message>
         <source>Stated U / mm</source>
         <translation>给出的 U / mm</translation>
+    </message>
+    <message>
+        <source>A fixed point touched {0} times with the tip, {1}: scatter along u, v, w {2} mm, {3} mm to be expected.</source>
+        <translation>用该测头触测固定点 {0} 次（{1}）：沿 u、v、w 的散布为 {2} mm，预期为 {3} mm。</translation>
     </message>
 </context>
 <context>
@@ -3918,44 +3989,8 @@
         <translation>无法显示上次标定。</translation>
     </message>
     <message>
-        <source>The swing is being read.</source>
-        <translation>正在读取摆动。</translation>
-    </message>
-    <message>
-        <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
-        <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
-    </message>
-    <message>
-        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
-        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
-    </message>
-    <message>
-        <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
-        <translation>相机图像为 {0} × {1}，该摆动采集时为 {2} × {3}。请在“相机”步骤选择当时的相机，再回到这里继续摆动。</translation>
-    </message>
-    <message>
-        <source>The verification is being read.</source>
-        <translation>正在读取验证。</translation>
-    </message>
-    <message>
-        <source>The verification is being closed.</source>
-        <translation>正在结束验证。</translation>
-    </message>
-    <message>
-        <source>Closed as abandoned; see History.</source>
-        <translation>已作为放弃结束，见“历史”。</translation>
-    </message>
-    <message>
         <source>A swing is under way.</source>
         <translation>正在摆动。</translation>
-    </message>
-    <message>
-        <source>The swing is being discarded.</source>
-        <translation>正在放弃摆动。</translation>
-    </message>
-    <message>
-        <source>Discarded. The images stay in {0}.</source>
-        <translation>已放弃。图像保留在 {0}。</translation>
     </message>
 </context>
 <context>
@@ -5034,10 +5069,6 @@
         <translation>控制图写为 .csv 或 .svg，而 {name} 不以二者结尾。请选择这样的文件名。</translation>
     </message>
     <message>
-        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, the tip did not rest in the cone, or each touch was of too few images.</source>
-        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定的测头仅散布 {of_tip:.4f} mm。测头是稳定的：锥孔或相机在触测之间移动，测头没有停稳在锥孔中，或每次触测的图像太少。</translation>
-    </message>
-    <message>
         <source>A name, the images of the camera or a file is missing. Choose what the steps say, and go on with the verification then.</source>
         <translation>缺少名称、相机图像或文件。请按各步骤的提示选择，然后继续验证。</translation>
     </message>
@@ -5048,10 +5079,6 @@
     <message>
         <source>A pen needs {least} to {most} LEDs; the file has {n_leds}. Check that it is the complete file of a pen.</source>
         <translation>光笔需要 {least} 至 {most} 个 LED；文件有 {n_leds} 个。请检查是否为一支光笔的完整文件。</translation>
-    </message>
-    <message>
-        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved. Let the pen take the temperature of the room, and measure a certified length.</source>
-        <translation>所有 LED 按同一尺度变化 {growth:+.0f} ppm：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相对移动。没有单个 LED 移动。请让光笔与室温平衡，并测量一个有证书的标准长度。</translation>
     </message>
     <message>
         <source>All images of one camera had been held up on their way, so that the last pairs are of moments {moved:.0f} ms apart. From now on they are paired rightly. Images that do not fit are left out of the result: look at them in Review, or begin the swing again.</source>
@@ -5168,10 +5195,6 @@
     <message>
         <source>Entry {number} of leds in {name} is LED {led:g}. List the LEDs from 1 in ascending order, each once.</source>
         <translation>{name} 中 leds 的第 {number} 项是 LED {led:g}。请从 1 开始按升序列出 LED，每个一次。</translation>
-    </message>
-    <message>
-        <source>Entry {number} of station {station} is not the one that follows here. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
-        <translation>工位 {station} 的第 {number} 个条目与此处应接续的条目不符。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
     </message>
     <message>
         <source>Entry {number} of the archive {archive} is damaged. Restore the archive from a copy.</source>
@@ -5458,8 +5481,20 @@
         <translation>下一步：检查内参文件和 LED 文件是否属于这台相机和这支光笔。</translation>
     </message>
     <message>
+        <source>Next: check the LED file, then repeat.</source>
+        <translation>下一步：检查 LED 文件，然后重做。</translation>
+    </message>
+    <message>
         <source>Next: check the intrinsics file and the LED file, then repeat.</source>
         <translation>下一步：检查内参文件和 LED 文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: check the intrinsics file, then repeat.</source>
+        <translation>下一步：检查内参文件，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: check the rig file, then repeat.</source>
+        <translation>下一步：检查相机组文件，然后重做。</translation>
     </message>
     <message>
         <source>Next: clamp cone and camera, then repeat the swing.</source>
@@ -5488,6 +5523,10 @@
     <message>
         <source>Next: see that it is the tip that is named, clean and tight, then repeat.</source>
         <translation>下一步：确认测头与所填写的一致、清洁且已拧紧，然后重做。</translation>
+    </message>
+    <message>
+        <source>Next: see to the cause that is named, then repeat.</source>
+        <translation>下一步：处理所指出的原因，然后重做。</translation>
     </message>
     <message>
         <source>Next: use the tip.</source>
@@ -6090,10 +6129,6 @@
         <translation>圆环半径未知。请输入证书半径。</translation>
     </message>
     <message>
-        <source>The record of entry {number} of station {station} is missing or was changed. Get the entries from their station again.</source>
-        <translation>工位 {station} 第 {number} 个条目的标定数据缺失或被改动过。请从该工位重新获取这些条目。</translation>
-    </message>
-    <message>
         <source>The record of {entry} is missing.</source>
         <translation>{entry}的标定数据缺失。</translation>
     </message>
@@ -6156,6 +6191,10 @@
     <message>
         <source>The tip did not keep the limits. {why} Only a supervisor can accept it, with a reason.</source>
         <translation>测头未满足限值。{why}只有主管说明理由后才能接受。</translation>
+    </message>
+    <message>
+        <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped, and that the intrinsics file is of this camera, lens and focus.</source>
+        <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧，以及内参文件属于该相机、镜头和对焦设置。</translation>
     </message>
     <message>
         <source>The tip in {tip} was calibrated with the pen file {its_pen}, which {pen} is not: a tip belongs to the pen, and to the LED positions, that it was calibrated with. Give that file, or calibrate the tip with this one.</source>
@@ -6422,6 +6461,10 @@
         <translation>英寸</translation>
     </message>
     <message>
+        <source>measured drift of the camera</source>
+        <translation>相机漂移测量记录</translation>
+    </message>
+    <message>
         <source>metres</source>
         <translation>米</translation>
     </message>
@@ -6478,6 +6521,14 @@
         <translation>向上</translation>
     </message>
     <message>
+        <source>verified fixed point</source>
+        <translation>固定点验证记录</translation>
+    </message>
+    <message>
+        <source>verified length</source>
+        <translation>长度验证记录</translation>
+    </message>
+    <message>
         <source>{file} is no exported archive, or not as it was exported: line {line}. Export it again, with this version of the program.</source>
         <translation>{file} 不是导出的档案库，或与导出时不符：第 {line} 行。请用此版本的程序重新导出。</translation>
     </message>
@@ -6510,6 +6561,14 @@
         <translation>{path} 既不是摆动记录，也不是标定结果。请打开摆动记录的文件夹、其中的文件，或 results 文件夹中的文件。</translation>
     </message>
     <message>
+        <source>{path} is no {what}, or was changed since it was written. Give the JSON as it was written.</source>
+        <translation>{path} 不是{what}，或写出后被更改。请给出写出时的 JSON 文件。</translation>
+    </message>
+    <message>
+        <source>{run}: the pen was held still nowhere for {n_all} images, {n_settling} to settle and {n_frames} that count. Hold it still longer on each point, ask for fewer images of a touch, or take each image for a touch.</source>
+        <translation>{run}：光笔没有在任何位置静止保持 {n_all} 幅图像（{n_settling} 幅用于稳定，{n_frames} 幅计入）。请在每个点上保持静止更久，减少每次触测的图像数，或将每幅图像作为一次触测。</translation>
+    </message>
+    <message>
         <source>The residuals are {sigma:.2f} px, {usual:.2f} px or less is usual. Is this the LED file of this pen, and the intrinsics file of this camera and lens?</source>
         <translation>残差为 {sigma:.2f} px，通常不超过 {usual:.2f} px。LED 文件是否属于本光笔，内参文件是否属于这台相机和镜头？</translation>
     </message>
@@ -6526,6 +6585,10 @@
         <translation>测球直径不可能是 {diameter:g} mm：须大于 0 且不超过 {most:g} mm。请测量；若未知则留空。</translation>
     </message>
     <message>
+        <source>A fixed point scatters by {of_point:.4f} mm, the tip by only {of_tip:.4f} mm over the calibrations. The tip is steady: the cone or the camera moved between the touches, or the tip did not rest in the cone.</source>
+        <translation>固定点的散布为 {of_point:.4f} mm，而各次标定间测头的散布仅 {of_tip:.4f} mm。测头是稳定的：触测之间锥孔或相机移动过，或测头未落稳在锥孔中。</translation>
+    </message>
+    <message>
         <source>A limit of {limit:g} mm for the change is not possible: above 0 and up to {most:g} mm are.</source>
         <translation>变化限值不可能是 {limit:g} mm：须大于 0 且不超过 {most:g} mm。</translation>
     </message>
@@ -6534,8 +6597,32 @@
         <translation>与其他各点相距 {distance:.1f} mm 的一次接触不计入：测头不在锥孔中。请把测头放入锥孔并保持不动。</translation>
     </message>
     <message>
+        <source>All LEDs changed by one scale, {growth:+.0f} ppm: the pen is {kelvin:+.1f} K warmer (of aluminium), or cone and camera moved apart along the view. No single LED has moved.</source>
+        <translation>所有 LED 按同一比例变化（{growth:+.0f} ppm）：光笔温度变化 {kelvin:+.1f} K（按铝计），或锥孔与相机沿视线方向相互远离。没有单个 LED 移位。</translation>
+    </message>
+    <message>
         <source>Camera {camera} shows the pen in another posture than the other cameras at {n_apart} of {n_moments} moments, such as {example}; its images of these are left out. Check that the images of one moment have the same name, and the trigger.</source>
         <translation>相机 {camera} 在 {n_moments} 个时刻中的 {n_apart} 个所显示的光笔姿态与其他相机不同，例如 {example}；这些时刻的该相机图像不参与计算。请检查同一时刻的图像是否同名，并检查触发信号。</translation>
+    </message>
+    <message>
+        <source>Next: go on with this pen and its LED file.</source>
+        <translation>下一步：继续使用此光笔及其 LED 文件。</translation>
+    </message>
+    <message>
+        <source>Next: let the pen take the temperature of the room, and measure a certified length.</source>
+        <translation>下一步：让光笔达到室温，并测量一段已认证的长度。</translation>
+    </message>
+    <message>
+        <source>Next: tighten the tip, look at the LEDs of the pen, calibrate it again, and verify the new result.</source>
+        <translation>下一步：拧紧测头，检查光笔的 LED，重新标定，并验证新的结果。</translation>
+    </message>
+    <message>
+        <source>Next: use the tip of the newest calibration.</source>
+        <translation>下一步：使用最近一次标定的测头。</translation>
+    </message>
+    <message>
+        <source>Next: use what was touched between the visits.</source>
+        <translation>下一步：使用各次复测之间触测的结果。</translation>
     </message>
     <message>
         <source>The address of the archive&apos;s server cannot be read. It has the form postgresql://user:password@host/database, with %40 for an @ in the password.</source>
@@ -6576,6 +6663,10 @@
     <message>
         <source>The picture {path} is not the one that was kept. Keep it again.</source>
         <translation>图片 {path} 已不是当初保存的那张。请重新保存。</translation>
+    </message>
+    <message>
+        <source>The record of {entry} is missing or was changed. Get the entries from their station again.</source>
+        <translation>{entry}的标定数据缺失或被改动过。请从其工位重新获取这些条目。</translation>
     </message>
     <message>
         <source>The result {file} is damaged. Restore it from a copy, or move it away to go on without it.</source>
@@ -6644,10 +6735,6 @@
     <message>
         <source>The tip did not come to rest in the same place: it moved by {distance:.4f} mm (standard deviation) from image to image. Clean tip and cone, look for wear, and press the tip in. It is in the uncertainty.</source>
         <translation>测头没有停在同一位置：各图像之间移动 {distance:.4f} mm（标准差）。请清洁测头和锥孔，检查磨损，并将测头压入。该影响已计入不确定度。</translation>
-    </message>
-    <message>
-        <source>The tip did not stay in one place: it moved by {scatter:.2f} mm (rms), {excess:.0f} times what the images alone explain. Press the tip into the cone and repeat; check that cone and camera are clamped.</source>
-        <translation>测头没有停在原处：移动了 {scatter:.2f} mm（均方根），是图像本身所能解释的 {excess:.0f} 倍。请把测头压入锥孔后重做；检查锥孔和相机是否夹紧。</translation>
     </message>
     <message>
         <source>The tip is that of the first, which are more.</source>
@@ -6798,6 +6885,10 @@
         <translation>测头的 U (k = 2) 为 {uncertainty:.4f} mm。</translation>
     </message>
     <message>
+        <source>What is kept here does not go on with {entry}. A data folder was copied and both copies were gone on with, or entries were changed. Check both archives.</source>
+        <translation>此处保存的内容与{entry}不相接。可能是数据文件夹被复制后两份都在继续使用，或条目被改动过。请检查两边的档案库。</translation>
+    </message>
+    <message>
         <source>Where the tip has a limit of its own for its change, the distance from the tip that was in force before (as found) to the tip that is accepted (as left) is compared with it by simple acceptance; beyond it is CHECK.</source>
         <translation>若测头自有变化限值，则将此前有效的测头（标定前状态）与所接受测头（标定后状态）之间的距离按简单接受与之比较；超出则为“需检查”。</translation>
     </message>
@@ -6860,6 +6951,10 @@
     <message>
         <source>distortion coefficient {name}</source>
         <translation>畸变系数 {name}</translation>
+    </message>
+    <message>
+        <source>entry {number} of the station {station}</source>
+        <translation>工位 {station} 的第 {number} 个条目</translation>
     </message>
     <message>
         <source>exposure</source>
@@ -7658,10 +7753,6 @@
         <translation>{run}：LED 位置与图像不符：{rms:.1f} px，通常不超过 {usual} px。请检查图像是否属于这支光笔和这台相机。</translation>
     </message>
     <message>
-        <source>{run}: the pen was held still nowhere for {n_frames} images. Hold it still on each point, or take each image for a touch.</source>
-        <translation>{run}：光笔没有在任何一处保持不动达 {n_frames} 幅图像。请在每个点上保持不动，或把每幅图像当作一次触测。</translation>
-    </message>
-    <message>
         <source>{text} is no board. Name it in a form such as {forms}; lengths are in mm.</source>
         <translation>{text} 不是标定板。请按如下形式命名：{forms}；长度单位为 mm。</translation>
     </message>
@@ -7922,6 +8013,10 @@
     <message>
         <source>This tip was not accepted.</source>
         <translation>该测头未被接受。</translation>
+    </message>
+    <message>
+        <source>This tip of an earlier calibration was put in force again, with the reason: {0}</source>
+        <translation>该测头为较早一次标定的结果，已重新生效，理由：{0}</translation>
     </message>
     <message>
         <source>The tip was accepted.</source>

@@ -24,7 +24,7 @@ def window(
     result: Result,
     printed: Callable[..., Paper],
 ) -> Iterator[PaperWindow]:
-    window = PaperWindow(printed(result), SavePlace(workbench))
+    window = PaperWindow(printed(result), SavePlace(workbench), "tip")
     window.show()
     yield window
     QThreadPool.globalInstance().waitForDone()

@@ -55,6 +55,17 @@ def test_a_tip_that_passed_before_a_live_camera_has_no_mark(
     assert printed(simulated).margins.badges == ("SIMULATED",)
 
 
+def test_a_tip_that_is_in_force_again_is_told_to_be_so(
+    result: Result, printed: Printed, words: Words
+) -> None:
+    again = replace(result, restores="0" * 64, reason="The new ball is bent.")
+
+    told = " ".join(words(printed(again))[0])
+
+    assert "was put in force again, with the reason: The new ball is bent." in told
+    assert "The tip was accepted" not in told
+
+
 def test_the_tip_is_told_to_the_second_digit_of_its_uncertainty(
     result: Result, stated: dict[str, Any], printed: Printed, words: Words
 ) -> None:
@@ -186,6 +197,7 @@ def test_the_pdf_holds_all_that_an_archive_asks_of_it(
     # See-through colours are what PDF/A-1 forbids above all.
     assert {*re.findall(rb"/ca ([\d.]+)", pdf)} <= {b"1.0", b"1"}
     assert b"/SMask " not in pdf.replace(b"/SMask /None", b"")
+    assert b"CMYK" not in pdf.replace(b"/CSpcmyk", b"").replace(b"/PCSpcmyk", b"")
     assert len(pdf) < 2_000_000
     assert b"<rdf:li>Ann</rdf:li>" in pdf
 

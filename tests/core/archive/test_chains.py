@@ -118,16 +118,23 @@ def test_a_copy_takes_each_entry_once(
 def test_a_copy_does_not_go_on_with_another_history(
     make_station: Callable[[str], Station],
 ) -> None:
-    here, there = make_station("Hall 2"), make_station("Hall 3")
+    here, nameless = make_station("Hall 2"), make_station("")
+    there = make_station("Hall 3")
     entries = here.enter(3)
     records = records_of(here.database, entries)
     other = replace(entries[1], sha256="0" * 64)
     copy_entries(there.database, here.chain, [entries[0], other], records)
 
-    with pytest.raises(ArchiveError, match="Entry 2 of station Hall 2 is not the one"):
+    with pytest.raises(ArchiveError, match="go on with entry 2 of the station Hall 2"):
         copy_entries(there.database, here.chain, entries, records)
-    with pytest.raises(ArchiveError, match="Entry 3 of station Hall 2 is not the one"):
+    with pytest.raises(ArchiveError, match="go on with entry 3 of the station Hall 2"):
         copy_entries(there.database, here.chain, entries[2:], records)
+
+    (_, second) = nameless.enter(2)
+    records = records_of(nameless.database, [second])
+    told = f"go on with entry 2 of the chain {nameless.chain[:8]}"
+    with pytest.raises(ArchiveError, match=told):
+        copy_entries(there.database, nameless.chain, [second], records)
 
 
 def test_a_copy_refuses_a_record_that_is_not_the_one(

@@ -1,8 +1,10 @@
 """A database is looked at before it is written to, and said to be what it is."""
 
 import sqlite3
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 from threading import Event
 from time import sleep
@@ -12,9 +14,12 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from benchmarks.postgres_server import PASSWORD, Postgres
-from tests.core.archive.conftest import Station
+from msgspec import structs
+from tests.core.archive.conftest import NOON, Station, accepted
 
 from lightpen.archive import database
+from lightpen.archive.chains import append
+from lightpen.archive.check import check_archive
 from lightpen.archive.database import (
     MIGRATIONS,
     VERSION,
@@ -24,6 +29,10 @@ from lightpen.archive.database import (
     open_file,
     open_server,
 )
+from lightpen.archive.exchange import deliver
+from lightpen.archive.history import lines
+from lightpen.archive.queries import Wanted, n_wanted
+from lightpen.archive.seal import close_sealed
 from lightpen.archive.tables import METADATA
 from lightpen.errors import ArchiveError, NoArchiveError
 
@@ -58,6 +67,65 @@ def test_an_archive_of_a_later_version_is_refused_and_untouched(
             opening(file)
     assert file.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["archive.sqlite"]
+
+
+OF_VERSION_1 = (
+    "DROP INDEX archive_by_clock",
+    "ALTER TABLE archive_entries DROP COLUMN at_us",
+    f"UPDATE {VERSION_TABLE} SET version_num = '1'",
+)
+
+
+def test_an_archive_of_version_1_is_read_as_it_is_and_brought_up_to_date(
+    station: Station, make_station: Callable[[str], Station]
+) -> None:
+    ahead = structs.replace(accepted(0)[0], at=NOON + timedelta(days=9000))
+    append(station.database, station.chain, ahead)
+    station.enter(3)
+    close_sealed(station.database)
+    file = station.database.file
+    assert file is not None
+    with closing(sqlite3.connect(file)) as connection, connection:
+        connection.execute(
+            "UPDATE archive_entries SET text = 'lost' WHERE number = 4"
+        )  # fmt: skip
+        for statement in OF_VERSION_1:
+            connection.execute(statement)
+    before = file.read_bytes()
+
+    def listed(database: Database) -> list[int]:
+        found = lines(database, Wanted(end=NOON + timedelta(days=1)), 0, 9)
+        return [line.number for line in found if line.entry]
+
+    with closing(look_into(file)) as database:
+        told = check_archive(database).findings
+        assert listed(database) == [3, 2]
+    assert file.read_bytes() == before
+    assert [path.suffix for path in file.parent.iterdir()] == [".seal", ".sqlite"]
+
+    again = make_station(station.name)
+    assert listed(again.database) == [3, 2]
+    assert told[-1] in check_archive(again.database).findings
+
+
+def test_a_server_of_version_1_is_brought_up_to_date(
+    station: Station, postgres: Postgres
+) -> None:
+    import psycopg
+
+    station.enter(2)
+    address = postgres.new_database()
+    with closing(open_server(address)) as server:
+        deliver(station.database, station.chain, server)
+    with psycopg.connect(address) as connection:
+        for statement in OF_VERSION_1:
+            connection.execute(statement)
+
+    station.enter(1, first=2)
+    with closing(open_server(address)) as server:
+        deliver(station.database, station.chain, server)
+        assert n_wanted(server, Wanted(begin=NOON + timedelta(minutes=1))) == 2
+        assert check_archive(server).findings == ()
 
 
 def test_a_database_of_another_program_is_refused_and_untouched(

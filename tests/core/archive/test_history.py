@@ -113,6 +113,23 @@ def test_only_what_is_looked_for_is_shown(
     assert known_names(station.database).tips_of("LP-04") == ("T-10", "T-11")
 
 
+def test_what_follows_a_clock_that_was_ahead_is_found_by_the_days_it_says(
+    station: Station,
+) -> None:
+    station.enter(1)
+    ahead = accepted(1)[0]
+    enter(station, structs.replace(ahead, at=NOON + timedelta(days=9000)))
+    station.enter(2, first=2)
+
+    today = Wanted(begin=NOON, end=NOON + timedelta(days=1))
+    found = lines(station.database, today, 0, 100)
+    assert [line.number for line in found] == [4, 3, 1]
+    assert n_wanted(station.database, today) == 3
+    late = Wanted(begin=NOON + timedelta(days=1))
+    assert [line.number for line in lines(station.database, late, 0, 100)] == [2]
+    assert states(station) == [IN_FORCE, REPLACED, REPLACED, REPLACED]
+
+
 def test_a_changed_entry_is_told_of_and_nothing_it_says_is_shown(
     station: Station,
 ) -> None:

@@ -119,6 +119,8 @@ def test_a_file_without_distortion_never_passes_and_is_named() -> None:
         _, result = calibrated(file, seed)
         assert judge(result, LIMITS).grade is not Grade.PASS
         assert any("k1" in name for name in names(result))
+        deviations = [each.deviations for each in result.contradictions]
+        assert deviations == sorted(deviations, reverse=True)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +156,7 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
     verdict = judge(result, SwingLimits(max_uncertainty=0.1))
     assert verdict.grade is Grade.CHECK
     assert verdict.reason.code == Code.FILE_CONTRADICTED
-    assert verdict.next_step is NextStep.CHECK_FILES
+    assert verdict.next_step is NextStep.CHECK_CAMERA
     # What is refuted no longer pulls at the tip.
     error = np.abs(result.joint.tip_pen - swing.tip_pen)
     assert (error <= 1.5 * result.budget.expanded_uncertainty[:3]).all()

@@ -10,7 +10,10 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.noise_correlation import lag1
+from lightpen.estimation.report import warnings_of
+from lightpen.estimation.uncertainty import ShareName
 from lightpen.formats.observation_files import Centers
+from lightpen.model.pen import Pen
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -33,7 +36,7 @@ def lasting(n_images: int, coefficient: float, seed: int) -> FloatArray:
     return noise
 
 
-def calibrated(swing: Swing, errors: FloatArray) -> Calibration:
+def calibrated(swing: Swing, errors: FloatArray, pen: Pen = PEN) -> Calibration:
     exact = simulate_centers(
         CAMERA,
         PEN,
@@ -41,7 +44,7 @@ def calibrated(swing: Swing, errors: FloatArray) -> Calibration:
         np.random.default_rng(0),
     )
     centers = Centers(np.arange(len(swing)), exact + errors, Path("simulated"))
-    return calibrate(CAMERA, PEN, observe_centers(centers, CAMERA, PEN))
+    return calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
 
 
 def of_noise(n_images: int, coefficient: float, seed: int) -> tuple[Swing, Calibration]:
@@ -78,6 +81,25 @@ def test_u_covers_the_tip_whose_noise_lasts(n_images: int) -> None:
 
     # 90 % of 24 along each axis, less three standard deviations of 6.1 %.
     assert (np.mean(inside, axis=0) >= 0.71).all()
+
+
+def test_noise_that_lasts_is_not_counted_again_as_errors_of_leds_and_drift() -> None:
+    ratios, warned = [], []
+    for seed in range(5):
+        swing = swing_poses(60, np.random.default_rng(seed))
+        unstated = replace(PEN, led_sigma=None)
+        result = calibrated(swing, 0.03 * lasting(60, 0.9, seed), unstated)
+        # Fitted as if the LEDs were off, which takes noise out of the tip.
+        assert result.bundle.components.leds.sigma > 0.001
+        of = {
+            share.name: float(np.linalg.norm(share.standard_uncertainty))
+            for share in result.budget.shares
+        }
+        ratios.append(of.get(ShareName.LEDS, 0.0) / of[ShareName.NOISE])
+        warned += [each.code for each in warnings_of(result)]
+
+    assert np.mean(ratios) < 0.2
+    assert "warning.drift" not in warned
 
 
 def test_an_led_that_is_not_used_has_no_part_in_the_correlation() -> None:

@@ -88,8 +88,10 @@ def test_images_put_back_give_the_tip_of_before(folder: Path) -> None:
     assert_same(solve_record(open_record(folder)), before)
 
 
-def test_a_record_goes_by_its_mask(swung: Callable[..., Path]) -> None:
-    folder = swung(N_IMAGES, ((612.0, 512.0, 90.0),))
+def test_a_record_goes_by_its_mask(
+    folder: Path, rewrite_header: Callable[..., None]
+) -> None:
+    rewrite_header(folder, mask_px=[[612.0, 512.0, 90.0]])
     solution = solve_record(open_record(folder))
     seen = solution.observations.pixels
     distances = np.linalg.norm(seen - [612.0, 512.0], axis=2)

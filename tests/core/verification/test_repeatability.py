@@ -1,5 +1,6 @@
 """Tests of `lightpen.verification.repeatability` and its control chart."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,6 +14,7 @@ from lightpen.simulator.swings import PAPER_CONE, PAPER_TIP
 from lightpen.verification.charts import write_chart
 from lightpen.verification.repeatability import (
     TipEstimate,
+    TouchedPoint,
     measure_repeatability,
 )
 from lightpen.verification.texts import repeatability_text
@@ -43,12 +45,15 @@ def estimates(values: np.ndarray) -> list[TipEstimate]:
     ]
 
 
-def fixed_point(deviation: np.ndarray, n: int = 10) -> np.ndarray:
-    """Points whose standard deviation is as given."""
+def touched(
+    deviation: np.ndarray, expected: float = 0.004, n: int = 10
+) -> TouchedPoint:
+    """A fixed point whose standard deviation is as given."""
     rng = np.random.default_rng(0)
     draws = rng.standard_normal((n, 3))
     draws -= draws.mean(axis=0)
-    return np.asarray(PAPER_CONE + deviation * draws / draws.std(axis=0, ddof=1))
+    points = PAPER_CONE + deviation * draws / draws.std(axis=0, ddof=1)
+    return TouchedPoint(points, np.full(3, expected), datetime(2026, 1, 2, tzinfo=UTC))
 
 
 def test_the_table_of_the_paper_is_reproduced() -> None:
@@ -67,19 +72,25 @@ def test_the_table_of_the_paper_is_reproduced() -> None:
 
 def test_a_tip_that_scatters_more_than_a_fixed_point_rode_with_the_pen() -> None:
     found = measure_repeatability(
-        estimates(TABLE_1), LIMITS, fixed_point=fixed_point(TABLE_2_STD)
+        estimates(TABLE_1), LIMITS, touched=touched(TABLE_2_STD)
     )
 
     assert found.points_to is not None
     assert found.points_to.code == "repeatability.rode-with-pen"
     assert found.assessment.grade is Grade.REPEAT
+    loose = VerificationLimits(repeatability=0.1)
+    found = measure_repeatability(
+        estimates(TABLE_1), loose, touched=touched(TABLE_2_STD)
+    )
+    assert found.assessment.grade is Grade.CHECK
+    assert found.assessment.next_step.code == "repeatability.tighten"
 
 
 def test_a_fixed_point_that_scatters_more_than_the_tip_has_moved_itself() -> None:
     steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
 
     found = measure_repeatability(
-        estimates(steady), LIMITS, fixed_point=fixed_point(TABLE_2_STD)
+        estimates(steady), LIMITS, touched=touched(TABLE_2_STD)
     )
 
     assert found.points_to is not None
@@ -87,11 +98,34 @@ def test_a_fixed_point_that_scatters_more_than_the_tip_has_moved_itself() -> Non
     assert found.assessment.grade is Grade.CHECK
 
 
+def test_a_fixed_point_that_scatters_by_the_noise_of_its_touches_has_not_moved() -> (
+    None
+):
+    steady = PAPER_TIP + 0.02 * (TABLE_1 - TABLE_1.mean(axis=0))
+
+    found = measure_repeatability(
+        estimates(steady), LIMITS, touched=touched(TABLE_2_STD, expected=0.012)
+    )
+
+    assert found.points_to is None
+    assert found.assessment.grade is Grade.PASS
+
+
+def test_a_tip_beyond_its_limit_is_not_called_steady() -> None:
+    found = measure_repeatability(
+        estimates(TABLE_1), LIMITS, touched=touched(10 * TABLE_2_STD)
+    )
+
+    assert found.points_to is not None
+    assert found.points_to.code == "repeatability.point-moved"
+    assert found.assessment.reason.code == "repeatability.scatters"
+
+
 def test_scatters_that_agree_point_to_nothing() -> None:
     steady = PAPER_TIP + 0.1 * (TABLE_1 - TABLE_1.mean(axis=0))
 
     found = measure_repeatability(
-        estimates(steady), LIMITS, fixed_point=fixed_point(np.full(3, 0.004))
+        estimates(steady), LIMITS, touched=touched(np.full(3, 0.004))
     )
 
     assert found.points_to is None

@@ -1,7 +1,9 @@
 """A verification from the tip in force to its verdict, and what is kept of it."""
 
 import json
-from contextlib import closing
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
@@ -21,7 +23,6 @@ from lightpen.archive.check import check_archive
 from lightpen.archive.logbook import Logbook
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
-from lightpen.commands.verifications import read_fixed_point, read_scale
 from lightpen.detection.aim import Aim
 from lightpen.detection.sighting import look
 from lightpen.estimation.verdict import Grade
@@ -41,8 +42,10 @@ from lightpen.simulator.swings import PAPER_TIP
 from lightpen.simulator.toucher import Toucher
 from lightpen.swing.preparation import Preparation
 from lightpen.verification.choices import WHOLE, Surface, TaskKind, VerificationChoices
-from lightpen.verification.status import SessionHappening
+from lightpen.verification.read_back import read_fixed_point, read_scale
+from lightpen.verification.status import SessionHappening, VerificationStatus
 from lightpen.verification.touch_images import CONCLUDED
+from lightpen.verification.under_way import find_interrupted
 
 EVE = Signature("Eve", "correct horse")
 
@@ -96,7 +99,7 @@ def test_what_is_kept_can_be_given_to_other_commands(at_it: Verifier) -> None:
     at_it.touch(*leant(4), *round_a_ring(11, 31.751)[:10], *BAR)
     point, _, length, _ = at_it.status.files
 
-    assert read_fixed_point(point).shape == (4, 3)
+    assert read_fixed_point(point).points.shape == (4, 3)
     assert read_scale(length).factor == pytest.approx(1.0, abs=1e-3)
 
 
@@ -339,53 +342,117 @@ def test_an_image_that_cannot_be_kept_does_not_count(at_it: Verifier) -> None:
 # A camera that moves
 
 
-@pytest.mark.parametrize("turn", [0.0, 3.0])
-def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
-    verifier: Verifier, turn: float
-) -> None:
-    """It turns by so many px a minute, of which the touches take a tenth or so."""
-    accept_tip(verifier.folder, verifier.preparation)
-    few = replace(CHOICES, kinds=(TaskKind.FIXED_POINT,), n_touches=3, n_frames=8)
-    verifier.come(few)
-    assert verifier.preparation.camera is not None
-    clock = SkippingClock()
-    camera = SimulatedCamera(
-        Scene(camera=verifier.preparation.camera, has_lamp=True, camera_turn=turn),
-        clock,
-    )
-    camera.open()
-    camera.configure(CameraSettings(frame_rate=10.0))
-    camera.start()
+WITH_LAMP = replace(CHOICES, kinds=(TaskKind.FIXED_POINT,), n_touches=3, n_frames=8)
+
+
+def touch_before_lamp(
+    verifier: Verifier, camera: SimulatedCamera, n_touches: int = 3
+) -> VerificationStatus:
+    """Have the simulated operator touch a cone, as often as said."""
     toucher, seen = Toucher(camera.operator), None
-    while verifier.status.task is not None and clock.now_ns() < TIMEOUT * 1e9:
+    while verifier.status.task is not None:
         status = verifier.status
         assert status.setup is not None
         assert status.state is not None
         assert status.aim is not None
         assert status.aim.camera is not None
         assert status.aim.pen is not None
+        if len(status.state.touches) == n_touches:
+            break
         toucher.follow(status.setup, status.state)
         frame = camera.read(1.0)
+        assert frame.seq < 1000  # of which the touches take a tenth
         seen = look(frame.image, status.aim.camera, status.aim.pen, None, seen)
         verifier.runner.take(frame, seen, status.aim)
-    camera.close()
-    status = verifier.status
+    return verifier.status
+
+
+@pytest.fixture
+def lit_by(
+    verifier: Verifier,
+) -> Iterator[Callable[[float], SimulatedCamera]]:
+    """Return a function that makes a camera with a lamp in view, which turns.
+
+    It turns by so many px a minute, of which the touches take a tenth or so.
+    """
+    with ExitStack() as stack:
+
+        def camera_turning(turn: float) -> SimulatedCamera:
+            own = verifier.preparation.camera
+            assert own is not None
+            scene = Scene(camera=own, has_lamp=True, camera_turn=turn)
+            camera = SimulatedCamera(scene, SkippingClock())
+            camera.open()
+            stack.callback(camera.close)
+            camera.configure(CameraSettings(frame_rate=10.0))
+            camera.start()
+            return camera
+
+        yield camera_turning
+
+
+@pytest.mark.parametrize("turn", [0.0, 3.0])
+def test_a_rendered_lamp_tells_whether_the_camera_turns_slowly(
+    verifier: Verifier, lit_by: Callable[[float], SimulatedCamera], turn: float
+) -> None:
+    """Live, and in the same images when they are read once more."""
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.come(WITH_LAMP)
+    status = touch_before_lamp(verifier, lit_by(turn))
+    (run,) = verifier.runs
+    verifier.runner.touch_anew(TaskKind.FIXED_POINT)
+    verifier.read(TaskKind.FIXED_POINT, run)
+
     witness = status.witness
     assert witness is not None
     assert status.assessment is not None
     assert status.state is not None
     assert status.state.fixed_point is not None
-    (record,) = verifier.records
-    told = record["witness"]
-    assert told["moved_mm"] == witness.moved
+    record, again = verifier.records
+    assert record["witness"]["moved_mm"] == witness.moved
+    # Live, images in which the pen comes to rest are looked at, too; none is kept.
+    moved = again["witness"]["moved_mm"]
+    assert moved == pytest.approx(witness.moved, rel=0.4, abs=0.006)
+    assert again["verdict"]["grade"] == status.assessment.grade
     U = status.state.fixed_point.uncertainty
     assert U[0] >= 2 * witness.share[0]
+    assert again["expanded_uncertainty_mm"][0] == pytest.approx(U[0], rel=0.4)
     if turn:
         assert status.assessment.reason.code == "witness.moved"
+        assert again["verdict"]["code"] == "witness.moved"
         assert 0.02 < witness.moved < 0.3
     else:
+        assert status.assessment.reason.code == "fixed-point.steady"
         assert witness.assessment.grade is Grade.PASS
         assert witness.moved < 0.006
+
+
+def test_a_lamp_is_watched_on_after_an_interruption(
+    verifier: Verifier,
+    lit_by: Callable[[float], SimulatedCamera],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    accept_tip(verifier.folder, verifier.preparation)
+    verifier.come(WITH_LAMP)
+    camera = lit_by(3.0)
+    assert touch_before_lamp(verifier, camera, 2).witness is None
+    copy = tmp_path_factory.mktemp("killed") / "data"
+    shutil.copytree(verifier.folder, copy)
+    second = Verifier(copy, verifier.preparation)
+    second.runner.choose(second.preparation, WITH_LAMP)
+    second.runner.go_on(*find_interrupted(copy))
+    second.runner.come()
+    second.ear.wait_until(lambda: second.status.began is not None)
+    status = touch_before_lamp(second, camera)
+    second.runner.shut_down()
+    assert second.runner.await_end(TIMEOUT)
+
+    # The images of the last touch alone are too few to tell.
+    assert status.witness is not None
+    assert status.assessment is not None
+    assert status.assessment.reason.code == "witness.moved"
+    (record,) = second.records
+    assert record["witness"]["moved_mm"] == status.witness.moved
 
 
 # What became of it

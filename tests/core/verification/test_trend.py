@@ -1,8 +1,10 @@
 """The trend of a tip, two of its calibrations compared, and how well they repeat."""
 
+import json
 from collections.abc import Iterator
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +54,7 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     for x in values:
         enter(database, x)
     enter(database, 9.0, Kind.REFUSED)
+    enter(database, 1.0, Kind.RESTORED)
     enter(database, 9.0, tip="T-11")
     trend = trend_of(database, WANTED)
 
@@ -62,6 +65,51 @@ def test_the_trend_is_of_accepted_tips_in_their_order_with_limits(
     assert trend.control.center[0] == pytest.approx(1.075)
     reach = 3 * np.mean([0.1, 0.1, 0.2]) / 1.128
     assert trend.control.upper[0] == pytest.approx(1.075 + reach)
+
+
+def enter_touches(database: Database, w: float, tip: str = "T-10") -> Written:
+    """Enter a fixed point of three touches that scatter along the view."""
+    points = [[0.0, 0.0, 1000.0 + offset] for offset in (-w, 0.0, w)]
+    record = json.dumps(
+        {
+            "created": NOON.isoformat(),
+            "calibrated": {"points_cam_mm": points},
+            "expected_std_mm": [0.001, 0.001, 0.001],
+        }
+    )
+    event = Event(
+        kind=Kind.VERIFICATION,
+        at=NOON,
+        names=Names(pen="LP-04", tip=tip),
+        program="lightpen 1",
+        settings={"verified": "fixed point"},
+        record_sha256=sha256(record.encode()).hexdigest(),
+    )
+    entry = append(database, own_chain(database), event, record)
+    assert entry is not None
+    return entry
+
+
+def test_the_fixed_point_that_was_touched_last_with_the_tip_stands_beside_its_trend(
+    database: Database,
+) -> None:
+    assert trend_of(database, WANTED).touched is None
+    entries = tuple(enter(database, x) for x in (1.0, 1.1, 1.0))
+    other = enter(database, 1.0, tip="T-11")
+    enter_touches(database, 9.0)
+    enter_touches(database, 0.002)
+    enter_touches(database, 5.0, tip="T-11")
+    trend = trend_of(database, WANTED)
+
+    assert trend.touched is not None
+    np.testing.assert_allclose(trend.touched.deviation, [0, 0, 0.002])
+    assert trend.touched_with((other, *entries)) is None
+    found = repeatability_of(
+        entries, VerificationLimits(), touched=trend.touched_with(entries)
+    )
+    assert found is not None
+    assert found.points_to is not None
+    assert found.points_to.code == "repeatability.rode-with-pen"
 
 
 def test_a_tip_that_was_taken_back_is_not_in_the_trend(database: Database) -> None:
@@ -93,9 +141,10 @@ def test_the_change_of_two_is_from_the_earlier_to_the_later(database: Database) 
 def test_repeatability_needs_two_calibrations_of_one_tip(database: Database) -> None:
     one, other = enter(database, 1.0), enter(database, 1.02)
     limits = VerificationLimits()
-    found = repeatability_of((other, one), limits)
+    again = enter(database, 1.0, Kind.RESTORED)
+    found = repeatability_of((other, one, again), limits)
 
     assert found is not None
     assert found.scatter.deviation[0] == pytest.approx(0.02 / np.sqrt(2))
-    assert repeatability_of((one,), limits) is None
+    assert repeatability_of((one, again), limits) is None
     assert repeatability_of((one, enter(database, 1.0, tip="T-11")), limits) is None

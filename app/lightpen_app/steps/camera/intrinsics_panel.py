@@ -15,6 +15,7 @@ from lightpen.formats.opened_files import CameraFile
 from lightpen.local_time import local_now
 from lightpen.model.camera import Camera
 from lightpen.model.camera_validity import doubts_about
+from lightpen.record.solving import Solution
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -48,6 +49,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._file: CameraFile | None = None
         self._image_size: tuple[int, int] | None = None
         self._serial = ""
+        self._swing: Solution | None = None
 
         # Widgets
         self._path = PathField()
@@ -57,6 +59,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         self._problem = SignLabel()
         self._check = SignLabel()
         self._doubt = SignLabel()
+        self._by_pen = SignLabel()
         self._names = [text_label(TextSize.SMALL, Tone.QUIET) for _ in range(N_FACTS)]
         self._facts = [text_label(TextSize.SMALL) for _ in range(N_FACTS)]
 
@@ -76,6 +79,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         layout.addWidget(self._problem)
         layout.addWidget(self._check)
         layout.addWidget(self._doubt)
+        layout.addWidget(self._by_pen)
         layout.addWidget(self._calibrate)
         layout.addLayout(grid)
 
@@ -109,6 +113,12 @@ class IntrinsicsPanel(Translated, QGroupBox):
         """Compare with the serial number of another camera, empty if it has none."""
         if serial != self._serial:
             self._serial = serial
+            self._refresh()
+
+    def set_swing(self, swing: Solution | None) -> None:
+        """Check the file by another swing of the pen, or by none."""
+        if swing is not self._swing:
+            self._swing = swing
             self._refresh()
 
     def set_problem(self, sentence: str) -> None:
@@ -149,6 +159,7 @@ class IntrinsicsPanel(Translated, QGroupBox):
         camera = None if self._file is None else self._file.camera
         self._check.set_value(self._checked(camera))
         self._doubt.set_value(self._doubted(camera))
+        self._by_pen.set_value(self._checked_by_pen(camera))
         facts = [""] * N_FACTS if camera is None else self._told(camera)
         for name, label, fact in zip(self._names, self._facts, facts, strict=True):
             label.setText(fact)
@@ -186,6 +197,19 @@ class IntrinsicsPanel(Translated, QGroupBox):
         doubts = doubts_about(camera, local_now().date(), serial=self._serial)
         words = " ".join(map(worded, doubts))
         return Remark(words, Sign.WARNING, Tone.WARN)
+
+    def _checked_by_pen(self, camera: Camera | None) -> Remark:
+        """Return whether the swing still agrees with the file that it was taken by."""
+        if camera is None or self._swing is None or self._swing.source.rig is not None:
+            return Remark()
+        used = self._swing.source.camera
+        if not np.array_equal(camera.intrinsics, used.intrinsics):
+            return Remark()
+        for denied in self._swing.calibration.contradictions:
+            if not denied.of_pen:
+                return Remark(worded(denied.sentence), Sign.WARNING, Tone.WARN)
+        words = self.tr("Checked by the swing: file and camera agree.")
+        return Remark(words, Sign.CHECK, Tone.GOOD)
 
     def _told(self, camera: Camera) -> list[str]:
         """Return what is in the file, a text for each name."""

@@ -117,7 +117,7 @@ class CameraPage(Rearranged, Page):
         self._workbench.search.succeeded.connect(self._on_cameras_found)
         self._workbench.search.failed.connect(self._on_search_failed)
         self._workbench.changed.connect(self._on_workbench_changed)
-        self._workbench.run.changed.connect(self._remark_swing)
+        self._workbench.run.changed.connect(self._on_swing_changed)
         self._live.image_shown.connect(self._on_image_shown)
         self._live.connection_changed.connect(self._on_connection_changed)
         self._live.other_changed.connect(self._on_other_changed)
@@ -236,6 +236,7 @@ class CameraPage(Rearranged, Page):
         self._source.set_value(now.source)
         if now.source != self._looked_beside:
             self._look_beside(now.source)
+            self._show_connection()  # what was lacking is another thing now
         self._offer_beside()
         self._intrinsics.set_value(now.camera_file)
         self._intrinsics.set_image_size(now.image_size)
@@ -524,6 +525,10 @@ class CameraPage(Rearranged, Page):
         masked = mask_markers(self._mask)
         found = stray_markers(self._stray.found(), self.tr("stray"))
         self._images.set_extra_markers((*masked, *found))
+
+    def _on_swing_changed(self) -> None:
+        self._remark_swing()
+        self._intrinsics.set_swing(self._workbench.run.status.solution)
 
     def _remark_swing(self) -> None:
         remark = Remark()

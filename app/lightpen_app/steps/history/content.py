@@ -20,6 +20,7 @@ from lightpen.record.results import Result
 from lightpen.verification.trend import Trend
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
+from lightpen_app.paper.showing import PaperShowing
 from lightpen_app.steps.history.archive_panel import ArchivePanel, Saving
 from lightpen_app.steps.history.due_panel import DuePanel
 from lightpen_app.steps.history.entry_panel import EntryPanel
@@ -60,6 +61,7 @@ class HistoryContent(Translated, QWidget):
         self._logbook = workbench.run.logbook
         self._reader = HistoryReader(self._logbook, self)
         self._place = SavePlace(workbench)
+        self._paper = PaperShowing(self._place, self)
         self._trend = Trend()
         self._followed: Wanted | None = None  # whose trend it is
         self._work: Job | None = None
@@ -102,6 +104,9 @@ class HistoryContent(Translated, QWidget):
         self._table.selection_changed.connect(self._on_selection_changed)
         self._entry.note_given.connect(self._enter_note)
         self._entry.restore_requested.connect(self._restore)
+        self._entry.paper_requested.connect(self._show_paper)
+        self._paper.saved.connect(self._on_paper_saved)
+        self._paper.failed.connect(self.notice_raised)
         self._due.rule_changed.connect(self._on_rule_changed)
         self._archive.check_requested.connect(self._check)
         self._archive.cancel_requested.connect(self._cancel)
@@ -121,6 +126,7 @@ class HistoryContent(Translated, QWidget):
     def shut_down(self) -> None:
         """Cancel what is under way."""
         self._reader.shut_down()
+        self._paper.shut_down()
         self._cancel()
 
     def _panels(self) -> tuple[QWidget, ...]:
@@ -143,6 +149,7 @@ class HistoryContent(Translated, QWidget):
         self._filter.set_known(opening.names)
         self._trend, self._followed = Trend(), None
         self._entry.set_value(None)
+        self._entry.set_home(opening.home)
         self._archive.set_delivery(opening.delivery)
         self._table.set_stations(opening.names.stations)
         self._table.set_lines(opening.n_lines, opening.first)
@@ -183,7 +190,7 @@ class HistoryContent(Translated, QWidget):
         entries = [line.entry for line in self._table.selected()]
         selected = [entry for entry in entries if entry is not None]
         self._selection.set_limits(self._workbench.choices.limits)
-        self._selection.set_value(selected, self._trend.entries)
+        self._selection.set_value(selected, self._trend)
 
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._workbench.set_due_rule(rule)
@@ -212,6 +219,16 @@ class HistoryContent(Translated, QWidget):
         names = result.names
         words = (shortened(names.tip), shortened(names.pen))
         self.status_changed.emit(told.format(*words))
+
+    # What is printed
+
+    def _show_paper(self, entry: Written) -> None:
+        result, folder = entry.entry.event.result, self._workbench.folder
+        if result is not None:
+            self._paper.show(lambda: folder / result.place)
+
+    def _on_paper_saved(self, path: Path) -> None:
+        self.status_changed.emit(self.tr("Saved in {0}").format(path.parent))
 
     # The archive as a whole
 

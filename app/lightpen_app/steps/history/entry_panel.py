@@ -33,15 +33,19 @@ class EntryPanel(Translated, QWidget):
         A note on an entry.
     restore_requested(Written, str)
         The tip of an entry shall be in force again, for a reason.
+    paper_requested(Written)
+        The record on paper of an entry's tip shall be shown.
     """
 
     note_given = Signal(object, str)
     restore_requested = Signal(object, str)
+    paper_requested = Signal(object)
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._line: Line | None = None
         self._asked: Written | None = None
+        self._home = ""
         self._restores = False
         self._remarks: tuple[Written, ...] = ()
 
@@ -55,13 +59,14 @@ class EntryPanel(Translated, QWidget):
         self._texts = (self._what, self._who, self._why, self._notes, self._kept)
         self._note = PushButton()
         self._restore = PushButton()
+        self._paper = PushButton()
         self._reason = ReasonBar()
 
         # Layout
         buttons = QHBoxLayout()
         buttons.setSpacing(GRID)
-        buttons.addWidget(self._note)
-        buttons.addWidget(self._restore)
+        for button in (self._note, self._restore, self._paper):
+            buttons.addWidget(button)
         buttons.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, GRID, 0, 0)
@@ -79,6 +84,7 @@ class EntryPanel(Translated, QWidget):
         # Connections
         self._note.clicked.connect(lambda: self._ask(restores=False))
         self._restore.clicked.connect(lambda: self._ask(restores=True))
+        self._paper.clicked.connect(self._ask_paper)
         self._reason.given.connect(self._on_given)
 
         self._retranslate()
@@ -94,6 +100,10 @@ class EntryPanel(Translated, QWidget):
         self._line, self._remarks = line, ()
         self._reason.hide()
         self._retranslate()
+
+    def set_home(self, chain: str) -> None:
+        """Take over which chain is at home here: the files of its results are here."""
+        self._home = chain
 
     def set_remarks(self, remarks: Sequence[Written]) -> None:
         """Show what concerns the entry."""
@@ -129,6 +139,10 @@ class EntryPanel(Translated, QWidget):
             )
         self._reason.ask()
 
+    def _ask_paper(self) -> None:
+        if self._line is not None and self._line.entry is not None:
+            self.paper_requested.emit(self._line.entry)
+
     def _on_given(self, text: str) -> None:
         given = self.restore_requested if self._restores else self.note_given
         given.emit(self._asked, text)
@@ -153,6 +167,11 @@ class EntryPanel(Translated, QWidget):
         self._note.set_why_not(nothing, self.tr("Say something of this entry"))
         self._restore.set_why_not(
             nothing or self._why_not_restored(line), self.tr("As a new entry")
+        )
+        self._paper.setText(self.tr("Record on paper..."))
+        self._paper.set_why_not(
+            nothing or self._why_not_on_paper(line),
+            self.tr("Look at it, save it as PDF or print it"),
         )
 
     def _told(self, line: Line | None) -> tuple[str, ...]:
@@ -197,6 +216,15 @@ class EntryPanel(Translated, QWidget):
             return self.tr("Only a tip that was accepted can be put in force.")
         if line.state is TipState.IN_FORCE:
             return self.tr("It is in force.")
+        return ""
+
+    def _why_not_on_paper(self, line: Line | None) -> str:
+        if line is None or line.entry is None:
+            return ""
+        if line.entry.entry.event.kind not in IN_FORCE_BY:
+            return self.tr("Only a tip that was accepted has a record on paper.")
+        if line.chain != self._home:
+            return self.tr("Its result is at the station that it is of.")
         return ""
 
 

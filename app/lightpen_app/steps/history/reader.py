@@ -29,6 +29,8 @@ class Opening:
 
     Attributes
     ----------
+    home : str
+        Chain that is at home here.
     first : tuple of Line
         The newest.
     delivery : Delivered or None
@@ -36,6 +38,7 @@ class Opening:
     """
 
     wanted: Wanted
+    home: str
     n_lines: int
     first: tuple[Line, ...]
     names: KnownNames
@@ -88,6 +91,7 @@ class HistoryReader(QObject):
             database = opened.database
             return Opening(
                 wanted,
+                opened.chain,
                 n_wanted(database, wanted),
                 lines(database, wanted, 0, BLOCK),
                 known_names(database),

@@ -8,8 +8,14 @@ from PySide6.QtWidgets import QGridLayout, QWidget
 from lightpen.archive.entries import Written
 from lightpen.estimation.verdict import Grade
 from lightpen.model.limits import VerificationLimits
-from lightpen.verification.repeatability import Repeatability
-from lightpen.verification.trend import Comparison, compare, has_tip, repeatability_of
+from lightpen.verification.repeatability import Repeatability, TouchedPoint
+from lightpen.verification.trend import (
+    Comparison,
+    Trend,
+    compare,
+    has_tip,
+    repeatability_of,
+)
 from lightpen_app.look.grades import GRADE_MARKS
 from lightpen_app.look.quantities import AXES, decimals_for, number_text
 from lightpen_app.look.sentences import worded
@@ -22,6 +28,7 @@ from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 
 PAIR = 2
+DECIMALS = 4  # of mm
 
 
 class SelectionPanel(Translated, QWidget):
@@ -33,12 +40,14 @@ class SelectionPanel(Translated, QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._selected: tuple[Written, ...] = ()
-        self._trend: tuple[Written, ...] = ()
+        self._trend = Trend()
 
         # Widgets
         self._heads = tuple(text_label(TextSize.LEAD) for _ in range(2))
         self._compared, self._scattered = NumberTable(), NumberTable()
         self._change, self._verdict = SignLabel(), SignLabel()
+        self._touched = text_label(TextSize.BODY, Tone.QUIET)
+        self._touched.setWordWrap(True)
         self._limits = VerificationLimits()
         self._study = CapabilityRow()
 
@@ -59,8 +68,9 @@ class SelectionPanel(Translated, QWidget):
                 layout.addWidget(widget, row, column)
         for remark in (self._change, self._verdict):
             layout.setAlignment(remark, Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(self._study, 3, 1)
-        layout.setRowStretch(4, 1)
+        layout.addWidget(self._touched, 3, 1)
+        layout.addWidget(self._study, 4, 1)
+        layout.setRowStretch(5, 1)
 
         # Connections
         self._study.value_changed.connect(self._retranslate)
@@ -73,10 +83,10 @@ class SelectionPanel(Translated, QWidget):
             self._limits = limits
             self._retranslate()
 
-    def set_value(self, selected: Sequence[Written], trend: Sequence[Written]) -> None:
+    def set_value(self, selected: Sequence[Written], trend: Trend) -> None:
         """Show other entries: those that are selected, and those of the trend."""
         self._selected = tuple(filter(has_tip, selected))
-        self._trend = tuple(trend)
+        self._trend = trend
         self._retranslate()
 
     def comparison(self) -> Comparison | None:
@@ -85,10 +95,11 @@ class SelectionPanel(Translated, QWidget):
 
     def repeatability(self) -> Repeatability | None:
         """Return how well the tips repeat; None if they are fewer than two."""
-        entries = self._selected if len(self._selected) >= PAIR else self._trend
-        study = self._study
+        trend, study = self._trend, self._study
+        entries = self._selected if len(self._selected) >= PAIR else trend.entries
         return repeatability_of(
-            *(entries, self._limits, study.tolerance(), study.reference())
+            *(entries, self._limits, study.tolerance(), study.reference()),
+            trend.touched_with(entries),
         )
 
     def words(self) -> tuple[str, ...]:
@@ -96,6 +107,7 @@ class SelectionPanel(Translated, QWidget):
         said = (
             *(head.text() for head in self._heads),
             *(remark.value().text for remark in (self._change, self._verdict)),
+            self._touched.text(),
             self._study.words(),
         )
         return tuple(filter(None, said))
@@ -136,6 +148,7 @@ class SelectionPanel(Translated, QWidget):
     def _show_repeatability(self, found: Repeatability | None) -> None:
         self._scattered.setVisible(found is not None)
         self._study.setVisible(found is not None)
+        self._show_touched(None if found is None else found.touched)
         n_repeats = 0 if found is None else len(found.tips)
         self._study.set_value(None if found is None else found.capability, n_repeats)
         self._verdict.set_value(Remark())
@@ -157,8 +170,33 @@ class SelectionPanel(Translated, QWidget):
         )
         cells = tuple(_scattered_row(found, axis) for axis in range(3))
         self._scattered.set_value(Figures(columns, AXES, cells))
-        mark = GRADE_MARKS[Grade(found.assessment.grade)]
-        self._verdict.set_value(Remark(worded(found.assessment.reason), *mark))
+        assessment = found.assessment
+        told = worded(assessment.reason)
+        if not assessment.is_accepted:
+            told += " " + worded(assessment.next_step)
+        mark = GRADE_MARKS[Grade(assessment.grade)]
+        self._verdict.set_value(Remark(told, *mark))
+
+    def _show_touched(self, touched: TouchedPoint | None) -> None:
+        """Show the scatter of a fixed point beside that of the tips."""
+        self._touched.setVisible(touched is not None)
+        if touched is None:
+            self._touched.clear()
+            return
+        words = self.tr(
+            "A fixed point touched {0} times with the tip, {1}: scatter along u, v, w "
+            "{2} mm, {3} mm to be expected."
+        )
+        self._touched.setText(
+            words.format(
+                len(touched.points),
+                moment_text(touched.when, "yyyy-MM-dd hh:mm"),
+                *(
+                    ", ".join(number_text(float(x), DECIMALS) for x in each)
+                    for each in (touched.deviation, touched.expected_deviation)
+                ),
+            )
+        )
 
 
 def _compared_row(found: Comparison, axis: int) -> tuple[str, ...]:

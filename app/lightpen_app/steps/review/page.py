@@ -56,6 +56,10 @@ if TYPE_CHECKING:
 PATIENCE_MS = 300  # before the progress of a solution is shown
 RESULT_WIDTH, LARGE_RESULT_WIDTH = 46 * GRID, 80 * GRID
 ANY_WIDTH = 16777215  # QWIDGETSIZE_MAX
+OF_FILES = (
+    *(NextStep.CHECK_FILES, NextStep.CHECK_CAMERA),
+    *(NextStep.CHECK_LEDS, NextStep.CHECK_RIG),
+)
 
 
 class ReviewPage(Rearranged, Page):
@@ -195,7 +199,9 @@ class ReviewPage(Rearranged, Page):
                 return MainAction(self.tr("Accept"), why_not, at_screen=True)
             case NextStep.CAPTURE_MORE if not self._is_recording:
                 return MainAction(self.tr("Capture more"), why_not)
-            case NextStep.CHECK_FILES:
+            case NextStep.SEE_TO_CAUSE:
+                return MainAction(self.tr("Check the settings"), why_not)
+            case step if step in OF_FILES:
                 return MainAction(self.tr("Check the files"), why_not)
         return MainAction(self.tr("Repeat"), why_not)
 
@@ -213,7 +219,9 @@ class ReviewPage(Rearranged, Page):
                 self._run.runner.accept()
             case NextStep.CAPTURE_MORE if not self._is_recording:
                 self._on_capture_more_clicked()
-            case NextStep.CHECK_FILES:
+            case NextStep.SEE_TO_CAUSE:
+                self.step_requested.emit("start")
+            case step if step in OF_FILES:
                 self.step_requested.emit(step_of_file(status.verdict.reason))
             case _:
                 self._ask_to_repeat()

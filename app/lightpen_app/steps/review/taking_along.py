@@ -7,19 +7,16 @@ from typing import TypeAlias
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
-from lightpen.archive.entered import entry_of_file
 from lightpen.errors import FileError
 from lightpen.record.exports import export_json, export_tables, tip_text
-from lightpen.record.retraced import Retraced, retrace
-from lightpen.record.statement import Entered, Statement, read_statement
 from lightpen_app.look.sentences import worded
+from lightpen_app.paper.showing import PaperShowing
 from lightpen_app.steps.review.result_tools import Export, ResultTools
 from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
 
-Read: TypeAlias = tuple[Statement, Retraced | None, Entered | None]
 SavePlots: TypeAlias = Callable[[Path, str], None]
 
 
@@ -57,20 +54,24 @@ class TakingAlong(QObject):
         self._save_plots = save_plots
         self._page = page
         self._saving: Job | None = None
-        self._reading: Job | None = None
+        self._paper = PaperShowing(place, page)
+
+        # Connections
+        self._paper.saved.connect(lambda path: self._tell_saved(path.parent))
+        self._paper.failed.connect(self.failed)
 
     def follow(self, tools: ResultTools) -> None:
         """Do what these ask for."""
         tools.folder_requested.connect(self._open_folder)
         tools.copy_requested.connect(self._copy_tip)
         tools.save_requested.connect(self._ask_folder)
-        tools.paper_requested.connect(self._read_paper)
+        tools.paper_requested.connect(self._show_paper)
 
     def shut_down(self) -> None:
         """Tell of nothing any more."""
-        for job in (self._saving, self._reading):
-            if job is not None:
-                job.cancel()
+        self._paper.shut_down()
+        if self._saving is not None:
+            self._saving.cancel()
 
     def _open_folder(self) -> None:
         folder = self._run.status.record_folder
@@ -119,34 +120,11 @@ class TakingAlong(QObject):
         job.failed.connect(self.failed)
         job.start()
 
-    def _read_paper(self) -> None:
+    def _show_paper(self) -> None:
         """Show the record on paper, of the result as it is on the disk."""
         result, archive = self._run.status.result, self._run.archive
-        if result is None:
-            return
-
-        def read(_: Report) -> Read:
-            file = archive.file_of(result)
-            statement = read_statement(file)
-            retraced = retrace(statement.calibration)
-            return statement, retraced, entry_of_file(file, statement.sha256)
-
-        self._reading = job = Job(read, self)
-
-        # Connections
-        job.succeeded.connect(self._show_paper)
-        job.failed.connect(self.failed)
-        job.start()
-
-    def _show_paper(self, read: Read) -> None:
-        # Printing takes long to be imported, and few swings are printed.
-        from lightpen_app.paper.preview import PaperWindow
-        from lightpen_app.paper.printing import paper_of
-
-        window = PaperWindow(paper_of(*read), self._place, self._page)
-        window.saved.connect(lambda path: self._tell_saved(path.parent))
-        window.failed.connect(self.failed)
-        window.show()
+        if result is not None:
+            self._paper.show(lambda: archive.file_of(result))
 
     def _tell_saved(self, folder: Path) -> None:
         self.told.emit(self.tr("Saved in {0}").format(folder))

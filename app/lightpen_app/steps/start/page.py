@@ -1,8 +1,7 @@
 """The step Start: who calibrates what, where, and what there is of it already."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QSize, QTimer
@@ -12,28 +11,10 @@ from typing_extensions import override
 
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
-from lightpen.record.acceptance import conclude_accepted
-from lightpen.record.opening import swing_folder
-from lightpen.record.reading import recorded_names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, Supervision, lay_down
 from lightpen.record.tip_library import ItemKind
-from lightpen.record.unfinished import (
-    Unfinished,
-    discard_damaged,
-    discard_swing,
-    find_unfinished,
-)
-from lightpen.swing.preparation import (
-    Preparation,
-)
-from lightpen.swing.resuming import Resumable, read_resumable
-from lightpen.verification.going_on import abandon_interrupted
-from lightpen.verification.under_way import (
-    InterruptedVerification,
-    UnderWay,
-    find_interrupted,
-)
+from lightpen.swing.preparation import Preparation
 from lightpen_app.look.phrases import lack_text
 from lightpen_app.look.sounds import Sounds
 from lightpen_app.look.theme import GRID
@@ -42,6 +23,7 @@ from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.start.assumptions_panel import AssumptionsPanel
 from lightpen_app.steps.start.data_folder_panel import DataFolderPanel
 from lightpen_app.steps.start.form import LimitsForm, NamesForm
+from lightpen_app.steps.start.interrupted_control import InterruptedControl
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.steps.start.library_control import LibraryControl
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
@@ -78,12 +60,7 @@ class StartPage(Rearranged, Page):
         self._wants_last = False  # of a tip that was just named
         self._taken_back: Result | None = None
         self._lookup: Job | None = None
-        self._search: Job | None = None
-        self._work: Job | None = None
         self._signing: Job | None = None
-        self._resumed: Path | None = None
-        self._reviewed: Path | None = None
-        self._continued: UnderWay | None = None
         self._is_trying = False
 
         # Widgets: the order of making them is the order of the Tab key
@@ -94,6 +71,9 @@ class StartPage(Rearranged, Page):
         self._library = LibraryControl(workbench, self._names, self._unknown_code, self)
         self._assumed = AssumptionsPanel()
         self._interrupted = InterruptedPanel()
+        self._unfinished = InterruptedControl(
+            workbench, self._interrupted, self._settle, self
+        )
         self._last = LastResultPanel(workbench.around.now)
         self._sound_test = SoundTest(sounds)
         self._folder = DataFolderPanel(workbench.folder)
@@ -102,8 +82,6 @@ class StartPage(Rearranged, Page):
         self._typing = QTimer(self)
         self._typing.setSingleShot(True)
         self._typing.setInterval(TYPING_PAUSE_MS)
-        self._searching = QTimer(self)
-        self._searching.setSingleShot(True)
 
         # Layout
         self._left = left = QVBoxLayout()
@@ -153,12 +131,9 @@ class StartPage(Rearranged, Page):
         self._all_limits.signed.connect(self._on_limits_signed)
         self._assumed.value_changed.connect(self._on_assumed_changed)
         self._typing.timeout.connect(self._take_names)
-        self._searching.timeout.connect(self._search_interrupted)
-        self._interrupted.resume_requested.connect(self._on_resume_requested)
-        self._interrupted.discard_requested.connect(self._on_discard_requested)
-        self._interrupted.search_requested.connect(self._search_interrupted)
-        self._interrupted.continue_requested.connect(self._on_continue_requested)
-        self._interrupted.close_requested.connect(self._on_close_requested)
+        self._unfinished.notice_raised.connect(self.notice_raised)
+        self._unfinished.told.connect(self.status_changed)
+        self._unfinished.step_requested.connect(self.step_requested)
         self._newcomer.trial_requested.connect(self._on_trial_requested)
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
@@ -167,11 +142,7 @@ class StartPage(Rearranged, Page):
         workbench.folder_watch.counted.connect(self._folder.set_others)
         workbench.folder_watch.doubted.connect(self._folder.set_trouble)
         workbench.changed.connect(self._on_workbench_changed)
-        workbench.swing_wanted.connect(self._on_swing_wanted)
         workbench.run.changed.connect(self._on_run_changed)
-        workbench.run.troubled.connect(self._on_run_troubled)
-        workbench.verification.changed.connect(self._on_verification_changed)
-        workbench.verification.troubled.connect(self._on_verification_troubled)
 
         self._show_changes(None, self._shown)
         self._retranslate()
@@ -218,9 +189,9 @@ class StartPage(Rearranged, Page):
 
     @override
     def shut_down(self) -> None:
-        self._searching.stop()
+        self._unfinished.shut_down()
         self._vast.shut_down()
-        for job in (self._lookup, self._search, self._work, self._signing):
+        for job in (self._lookup, self._signing):
             if job is not None:
                 job.cancel()
 
@@ -246,7 +217,7 @@ class StartPage(Rearranged, Page):
         super().showEvent(event)
         self._library.barcodes.listen(self.window().windowHandle())
         if not event.spontaneous():
-            self._searching.start()  # when the window is on the screen
+            self._unfinished.search()
 
     @override
     def hideEvent(self, event: QHideEvent) -> None:
@@ -417,6 +388,8 @@ class StartPage(Rearranged, Page):
         if before is None or now.names != before.names:
             self._typing.stop()
             self._names.set_value(now.names)
+        if before is None or now.names.station != before.names.station:
+            self._names.set_stations(self._workbench.stations())
         if before is None or now.limits != before.limits:
             self._limits.set_value(now.limits)
         if before is None or now.assumptions != before.assumptions:
@@ -486,137 +459,6 @@ class StartPage(Rearranged, Page):
             self._is_trying = False
             self.step_requested.emit("swing")
 
-    # Interrupted swings
-
-    def _search_interrupted(self) -> None:
-        if self._search is not None:
-            self._search.cancel()
-        run, data = self._workbench.run, self._workbench.folder
-        archive, folder = run.archive, run.records_folder
-
-        def search(_: Report) -> Interrupted:
-            swings = conclude_accepted(archive, find_unfinished(folder))
-            return Interrupted(swings, find_interrupted(data))
-
-        self._search = self._started(search, self._on_interrupted_found)
-        self._search.failed.connect(self.notice_raised)
-
-    def _on_interrupted_found(self, found: "Interrupted") -> None:
-        swings = found.swings
-        present = self._workbench.run.status.record_folder
-        others = Unfinished(
-            tuple(r for r in swings.interrupted if r.folder != present),
-            tuple(r for r in swings.under_way if r.folder != present),
-            swings.damaged,
-        )
-        self._interrupted.set_value(others, found.verifications)
-
-    def _on_resume_requested(self, folder: Path) -> None:
-        self._interrupted.set_waiting(self.tr("The swing is being read."))
-        self._work = self._started(
-            lambda _: read_resumable(folder), self._on_swing_read
-        )
-        self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._on_work_crashed)
-
-    def _on_swing_read(self, swing: Resumable) -> None:
-        self._interrupted.set_waiting("")
-        self._take_over(swing)
-        live = self._workbench.live
-        if not live.is_open:
-            self._workbench.open_camera()
-        size = self._workbench.preparation.image_size
-        if not live.is_open:
-            self.notice_raised.emit(
-                self.tr(
-                    "No camera is open. Choose the source of the images at the step "
-                    "Camera, then resume the swing here."
-                )
-            )
-        elif not swing.is_of(self._workbench.preparation.sources):
-            self.notice_raised.emit(
-                self.tr(
-                    "The swing was captured with another source of images. Choose that "
-                    "source at the step Camera, then resume the swing here."
-                )
-            )
-        elif size is not None and not swing.fits(size):
-            camera = swing.setup.camera
-            self.notice_raised.emit(
-                self.tr(
-                    "The camera sends {0} x {1}, the swing was captured with {2} x "
-                    "{3}. Choose its camera at the step Camera, then resume the swing "
-                    "here."
-                ).format(*size, *camera.image_size)
-            )
-        else:
-            self._go_on(swing)
-
-    def _take_over(self, swing: Resumable) -> None:
-        """Choose what the swing was captured for, and the camera of its station."""
-        workbench, header = self._workbench, swing.record.header
-        station = workbench.preparation.names.station
-        if header.station != station and header.station in workbench.stations():
-            workbench.choose_station(header.station)
-        names = recorded_names(swing.record)
-        names = replace(names, station=names.station or station)
-        workbench.set_preparation(
-            replace(workbench.preparation, names=names, nominal_tip=header.nominal_tip)
-        )
-        self._names.set_stations(workbench.stations())
-
-    def _go_on(self, swing: Resumable) -> None:
-        self._resumed = swing.record.folder
-        self._workbench.run.runner.go_on(swing)
-
-    def _on_continue_requested(self, found: InterruptedVerification) -> None:
-        """Choose what the verification was of, and go on with it."""
-        under_way, workbench = found.under_way, self._workbench
-        if under_way is None:
-            return
-        self._settle()
-        station = under_way.names.station
-        if station != workbench.preparation.names.station:
-            self._on_station_changed(station)
-        workbench.set_preparation(replace(workbench.preparation, names=under_way.names))
-        limits = workbench.choices.limits
-        workbench.set_choices(replace(under_way.choices, limits=limits))
-        lacks = workbench.preparation.lacks()
-        if lacks:
-            self.notice_raised.emit(lack_text(lacks[0]))
-            return
-        self._continued = under_way
-        self._interrupted.set_waiting(self.tr("The verification is being read."))
-        workbench.verification.runner.go_on(found)
-
-    def _on_verification_changed(self) -> None:
-        continued = self._continued
-        status = self._workbench.verification.status
-        if continued is not None and status.began == continued.began:
-            self._continued = None
-            self._interrupted.set_waiting("")
-            self.step_requested.emit("verify")
-
-    def _on_verification_troubled(self) -> None:
-        if self._continued is not None:
-            self._continued = None
-            self._interrupted.set_waiting("")
-
-    def _on_close_requested(self, found: InterruptedVerification) -> None:
-        folder, now = self._workbench.folder, self._workbench.around.now
-        self._interrupted.set_waiting(self.tr("The verification is being closed."))
-        self._work = self._started(
-            lambda _: abandon_interrupted(folder, found, now()),
-            lambda _: self._on_closed(),
-        )
-        self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._on_work_crashed)
-
-    def _on_closed(self) -> None:
-        self._workbench.enter_owed()
-        self.status_changed.emit(self.tr("Closed as abandoned; see History."))
-        self._search_interrupted()
-
     def _on_verification_requested(self) -> None:
         self._settle()
         self.step_requested.emit("verify")
@@ -624,26 +466,6 @@ class StartPage(Rearranged, Page):
     def _on_take_back_requested(self, result: Result) -> None:
         operator = self._workbench.preparation.names.operator
         self._workbench.run.runner.take_back(result, operator)
-
-    def _on_swing_wanted(self, path: Path) -> None:
-        self._interrupted.set_waiting(self.tr("The swing is being read."))
-        self._work = self._started(
-            lambda _: read_resumable(swing_folder(path)), self._on_wanted_read
-        )
-        self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._on_work_crashed)
-
-    def _on_wanted_read(self, swing: Resumable) -> None:
-        """Go on with an interrupted swing; show the tip of one that has a verdict."""
-        if swing.record.verdict is None:
-            self._on_swing_read(swing)
-            return
-        self._interrupted.set_waiting("")
-        self._take_over(swing)
-        self._reviewed = swing.record.folder
-        runner = self._workbench.run.runner
-        runner.go_on(swing)
-        runner.finish()
 
     def _on_run_changed(self) -> None:
         status = self._workbench.run.status
@@ -653,39 +475,6 @@ class StartPage(Rearranged, Page):
         if status.taken_back is not self._taken_back:
             self._taken_back = status.taken_back
             self._look_up_last()
-        if status.solution is not None and status.record_folder == self._reviewed:
-            self._reviewed = None
-            self.step_requested.emit("review")
-        if self._resumed is not None and status.record_folder == self._resumed:
-            self._resumed = None
-            self.step_requested.emit("swing")
-
-    def _on_run_troubled(self) -> None:
-        self._resumed = self._reviewed = None
-
-    def _on_discard_requested(self, folder: Path) -> None:
-        self._interrupted.set_waiting(self.tr("The swing is being discarded."))
-        damaged = {swing.folder for swing in self._interrupted.value().damaged}
-        discard = discard_damaged if folder in damaged else discard_swing
-        self._work = self._started(
-            lambda _: discard(folder), lambda _: self._on_discarded(folder)
-        )
-        self._work.failed.connect(self._on_work_failed)
-        self._work.crashed.connect(self._on_work_crashed)
-
-    def _on_discarded(self, folder: Path) -> None:
-        self.status_changed.emit(
-            self.tr("Discarded. The images stay in {0}.").format(folder)
-        )
-        self._search_interrupted()
-
-    def _on_work_failed(self, sentence: str) -> None:
-        self.notice_raised.emit(sentence)
-        self._on_work_crashed()
-
-    def _on_work_crashed(self) -> None:
-        self._interrupted.set_waiting("")
-        self._search_interrupted()
 
     def _started(
         self, function: Callable[[Report], T], on_succeeded: Callable[[T], None]
@@ -696,14 +485,6 @@ class StartPage(Rearranged, Page):
         job.succeeded.connect(on_succeeded)
         job.start()
         return job
-
-
-@dataclass(frozen=True, eq=False)
-class Interrupted:
-    """What was found that has no end."""
-
-    swings: Unfinished
-    verifications: tuple[InterruptedVerification, ...]
 
 
 def _key(preparation: Preparation) -> tuple[str, str, bool]:

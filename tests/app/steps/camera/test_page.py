@@ -532,6 +532,9 @@ def test_a_recording_asks_where_it_is(live: "Seen", workbench: Workbench) -> Non
     assert exposure(live) == "No LED is seen"
     assert live.named("Folder, record or video").hasFocus()
 
+    live.choose("GenICam with a vendor's GenTL producer")
+    live.wait("Search for the camera and choose it.")
+
 
 def test_a_recorded_swing_is_played(
     live: "Seen", small_scene: Scene, tmp_path: Path

@@ -4,9 +4,10 @@ import json
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, Qt
@@ -24,8 +25,10 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from lightpen.archive.chains import append
+from lightpen.archive.chains import append, own_chain
+from lightpen.archive.database import open_file
 from lightpen.archive.entries import Event, Kind
+from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import ARCHIVE
 from lightpen.model.limits import StationLimits
@@ -36,8 +39,10 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 from lightpen.record.supervision import Signature, lay_down
 from lightpen.record.tip_library import ListedTip
+from lightpen.verification.keeping import keep_verification
 from lightpen_app.look.languages import Language, LanguageSwitch
 from lightpen_app.look.theme import LIGHT, apply_theme
+from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.history.archive_panel import ArchivePanel
 from lightpen_app.steps.history.capability_row import CapabilityRow
 from lightpen_app.steps.history.due_panel import DuePanel
@@ -136,18 +141,22 @@ class Desk:
     def show_tab(self, tab: int) -> None:
         self.child(QTabWidget).setCurrentIndex(tab)
 
+    def button(self, text: str) -> QPushButton:
+        """Return the button that is seen with a text."""
+        (button,) = [
+            each
+            for each in self.page.findChildren(QPushButton)
+            if each.isVisible() and each.text() == text
+        ]
+        return button
+
     def click(self, text: str) -> None:
         """Click a button that is seen, or choose from the menu of one."""
         for action in (a for m in self.page.findChildren(QMenu) for a in m.actions()):
             if action.text() == text:
                 action.trigger()
                 return
-        (button,) = [
-            each
-            for each in self.page.findChildren(QPushButton)
-            if each.isVisible() and each.text() == text
-        ]
-        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+        QTest.mouseClick(self.button(text), Qt.MouseButton.LeftButton)
 
     def type_reason(self, text: str) -> None:
         (edit,) = [
@@ -335,6 +344,40 @@ def test_two_that_are_selected_are_compared(desk: Desk) -> None:
     assert "scatters by 1.4142 mm along x" in panel.words()[3]
 
 
+def test_it_is_told_what_scatter_of_tip_and_fixed_point_points_to(desk: Desk) -> None:
+    desk.enter(3)  # at x of 0, 1 and 2 mm
+    steady = {
+        "program": {"name": "lightpen", "version": "1"},
+        "created": NOON.isoformat(),
+        "verification": "fixed point",
+        "pen": "LP-04",
+        "tip": "T-10",
+        "calibrated": {
+            "points_cam_mm": [[0, 0, 999.99], [0, 0, 1000], [0, 0, 1000.01]]
+        },
+        "expected_std_mm": [0.002, 0.002, 0.008],
+    }
+    keep_verification(desk.workbench.folder, steady, is_simulated=False)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(SELECTION)
+    panel = desk.child(SelectionPanel)
+    desk.until(lambda: panel.repeatability())
+
+    words = " ".join(panel.words())
+    assert "The tip scatters by 1.0000 mm over the calibrations" in words
+    assert "something moved with the pen between the calibrations" in words
+    assert "Next: seat the tip firmly" in words
+    assert "A fixed point touched 3 times with the tip, 2026-01-02" in words
+    assert "0.0000, 0.0000, 0.0100 mm" in words
+    desk.enter(2, tip="T-11", first=3)
+    desk.page.entered()
+    desk.until(lambda: len(desk.column(TIP)) == 6)
+    desk.select(0, 1)
+    desk.until(lambda: "Repeatability of the 2 that are selected" in panel.words())
+    assert "A fixed point" not in " ".join(panel.words())
+
+
 def test_the_capability_is_studied_with_a_tolerance_and_a_reference(
     desk: Desk,
 ) -> None:
@@ -427,6 +470,54 @@ def test_an_older_tip_is_put_in_force_again_for_a_reason(desk: Desk) -> None:
     assert found is not None
     assert (found.tip_pen[0], found.reason) == (0.0, "The new one is bent.")
     assert desk.notices == []
+
+
+def test_what_was_accepted_here_is_put_on_paper_as_its_file_has_it(
+    desk: Desk, stated: dict[str, Any]
+) -> None:
+    folder = desk.workbench.folder
+    result = replace(store(folder, 0), calibration=stated)
+    FolderArchive(folder).store(result)
+    desk.workbench.run.logbook.enter_owed()
+    desk.open()
+    desk.show_tab(ENTRY)
+    desk.click("Record on paper...")
+    desk.until(lambda: desk.page.findChildren(PaperWindow))
+
+    window = desk.child(PaperWindow)
+    desk.until(lambda: window.n_pages() > 2)
+    window.close()
+
+    desk.select(1)
+    desk.click("Record on paper...")
+    desk.until(lambda: desk.notices)
+    assert "000001" in desk.notices[0]
+
+
+def test_what_is_not_accepted_or_not_of_this_station_has_no_record_on_paper(
+    desk: Desk, tmp_path: Path
+) -> None:
+    with closing(open_file(tmp_path / "there" / ARCHIVE)) as there:
+        event = Event(Kind.ACCEPTED, NOON, names("T-11"), "lightpen 1")
+        append(there, own_chain(there), event)
+        export_entries(there, tmp_path / "there.jsonl")
+    desk.enter(1)
+    logbook = desk.workbench.run.logbook.opened()
+    import_entries(logbook.database, tmp_path / "there.jsonl")
+    append(logbook.database, logbook.chain, Event(Kind.NOTE, NOON, names(""), "1"))
+    desk.open()
+    desk.show_tab(ENTRY)
+
+    why_not = {}
+    for row, tip in enumerate(desk.column(TIP)):
+        desk.select(row)
+        button = desk.button("Record on paper...")
+        why_not[tip] = "" if button.isEnabled() else button.toolTip()
+    assert why_not == {
+        "T-10": "",
+        "": "Only a tip that was accepted has a record on paper.",
+        "T-11": "Its result is at the station that it is of.",
+    }
 
 
 def test_when_tips_are_due_follows_a_rule_that_is_remembered(

@@ -36,6 +36,7 @@ from lightpen.estimation.verdict import Grade
 from lightpen.formats.opened_files import CameraFile, PenFile
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
+from lightpen.record.assumed import PREFIX
 from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
 from lightpen.record.reading import DISCARDED, open_record
@@ -393,6 +394,28 @@ def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     assert page.main_action() == MainAction("Capture more")
     page.run_main_action()
     bed.qtbot.waitUntil(lambda: workbench.run.status.is_capturing)
+
+
+@pytest.mark.parametrize(
+    ("assumed", "value"), [("form_error", 0.002), ("warmth", 60.0)]
+)
+def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
+    bed: Bed, assumed: str, value: float
+) -> None:
+    folder = bed.workbench.run.records_folder / "swing"
+    bed.rewrite_header(folder, {PREFIX + assumed: value})
+    workbench = bed.solve()
+    assert workbench.run.status.solution is not None
+    uncertainty = workbench.run.status.solution.calibration.budget.weakest_uncertainty
+    bed.solve(0.7 * uncertainty)
+    page = bed.show()
+
+    assert banner(page).word == "CHECK: Not certain enough"
+    assert page.lead() == "Next: see to the cause that is named, then repeat."
+    assert page.main_action() == MainAction("Check the settings")
+    with bed.qtbot.waitSignal(page.step_requested) as asked:
+        page.run_main_action()
+    assert asked.args == ["start"]
 
 
 def test_a_tip_that_is_far_too_uncertain_cannot_be_accepted(bed: Bed) -> None:

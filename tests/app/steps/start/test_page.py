@@ -1256,7 +1256,8 @@ def test_after_a_bug_the_swing_is_offered_as_before(
     broken_parts = [broken_part] + ["find_unfinished"] * also_searching
     with monkeypatch.context() as broken:
         for part in broken_parts:
-            broken.setattr(f"lightpen_app.steps.start.page.{part}", lambda *_: 1 / 0)
+            name = f"lightpen_app.steps.start.interrupted_control.{part}"
+            broken.setattr(name, lambda *_: 1 / 0)
         start.press(word)
         if word == "Discard":
             start.press(word)

@@ -1,0 +1,309 @@
+"""What the step Start does with swings and verifications that have no end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from lightpen.record.acceptance import conclude_accepted
+from lightpen.record.opening import swing_folder
+from lightpen.record.reading import recorded_names
+from lightpen.record.unfinished import (
+    Unfinished,
+    discard_damaged,
+    discard_swing,
+    find_unfinished,
+)
+from lightpen.swing.resuming import Resumable, read_resumable
+from lightpen.verification.going_on import abandon_interrupted
+from lightpen.verification.under_way import (
+    InterruptedVerification,
+    UnderWay,
+    find_interrupted,
+)
+from lightpen_app.look.phrases import lack_text
+from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
+from lightpen_app.work.job import Job, Report
+from lightpen_app.work.workbench import Workbench
+
+T = TypeVar("T")
+
+
+class InterruptedControl(QObject):
+    """Looks for what has no end, and goes on with it, shows, closes or discards it.
+
+    Parameters
+    ----------
+    panel : InterruptedPanel
+        That lists what is found.
+    settle : callable
+        Takes over what is being typed on the page.
+
+    Signals
+    -------
+    notice_raised(str)
+        Why something cannot be gone on with.
+    told(str)
+        What became of what was closed or discarded.
+    step_requested(str)
+        Key of the step that what is gone on with shows at.
+    """
+
+    notice_raised = Signal(str)
+    told = Signal(str)
+    step_requested = Signal(str)
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        panel: InterruptedPanel,
+        settle: Callable[[], None],
+        parent: QObject,
+    ) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self._panel = panel
+        self._settle = settle
+        self._search: Job | None = None
+        self._work: Job | None = None
+        self._resumed: Path | None = None
+        self._reviewed: Path | None = None
+        self._continued: UnderWay | None = None
+        self._searching = QTimer(self)
+        self._searching.setSingleShot(True)
+
+        # Connections
+        self._searching.timeout.connect(self._search_now)
+        panel.resume_requested.connect(self._on_resume_requested)
+        panel.discard_requested.connect(self._on_discard_requested)
+        panel.search_requested.connect(self._search_now)
+        panel.continue_requested.connect(self._on_continue_requested)
+        panel.close_requested.connect(self._on_close_requested)
+        workbench.swing_wanted.connect(self._on_swing_wanted)
+        workbench.run.changed.connect(self._on_run_changed)
+        workbench.run.troubled.connect(self._on_run_troubled)
+        workbench.verification.changed.connect(self._on_verification_changed)
+        workbench.verification.troubled.connect(self._on_verification_troubled)
+
+    def search(self) -> None:
+        """Look for what has no end, once the window is on the screen."""
+        self._searching.start()
+
+    def shut_down(self) -> None:
+        """Stop all that is under way."""
+        self._searching.stop()
+        for job in (self._search, self._work):
+            if job is not None:
+                job.cancel()
+
+    def _search_now(self) -> None:
+        if self._search is not None:
+            self._search.cancel()
+        run, data = self._workbench.run, self._workbench.folder
+        archive, folder = run.archive, run.records_folder
+
+        def search(_: Report) -> Interrupted:
+            swings = conclude_accepted(archive, find_unfinished(folder))
+            return Interrupted(swings, find_interrupted(data))
+
+        self._search = Job(search, self)
+        self._search.succeeded.connect(self._on_found)
+        self._search.failed.connect(self.notice_raised)
+        self._search.start()
+
+    def _on_found(self, found: "Interrupted") -> None:
+        swings = found.swings
+        present = self._workbench.run.status.record_folder
+        others = Unfinished(
+            tuple(r for r in swings.interrupted if r.folder != present),
+            tuple(r for r in swings.under_way if r.folder != present),
+            swings.damaged,
+        )
+        self._panel.set_value(others, found.verifications)
+
+    def _work_on(
+        self,
+        waiting: str,
+        function: Callable[[Report], T],
+        on_succeeded: Callable[[T], None],
+    ) -> None:
+        """Do something to one of the list, which waits meanwhile."""
+        self._panel.set_waiting(waiting)
+        self._work = Job(function, self)
+
+        # Connections
+        self._work.succeeded.connect(on_succeeded)
+        self._work.failed.connect(self._on_work_failed)
+        self._work.crashed.connect(self._on_work_crashed)
+        self._work.start()
+
+    def _on_work_failed(self, sentence: str) -> None:
+        self.notice_raised.emit(sentence)
+        self._on_work_crashed()
+
+    def _on_work_crashed(self) -> None:
+        self._panel.set_waiting("")
+        self._search_now()
+
+    # Swings
+
+    def _on_resume_requested(self, folder: Path) -> None:
+        self._work_on(
+            self.tr("The swing is being read."),
+            lambda _: read_resumable(folder),
+            self._on_swing_read,
+        )
+
+    def _on_swing_wanted(self, path: Path) -> None:
+        self._work_on(
+            self.tr("The swing is being read."),
+            lambda _: read_resumable(swing_folder(path)),
+            self._on_wanted_read,
+        )
+
+    def _on_wanted_read(self, swing: Resumable) -> None:
+        """Go on with an interrupted swing; show the tip of one that has a verdict."""
+        if swing.record.verdict is None:
+            self._on_swing_read(swing)
+            return
+        self._panel.set_waiting("")
+        self._take_over(swing)
+        self._reviewed = swing.record.folder
+        runner = self._workbench.run.runner
+        runner.go_on(swing)
+        runner.finish()
+
+    def _on_swing_read(self, swing: Resumable) -> None:
+        self._panel.set_waiting("")
+        self._take_over(swing)
+        live = self._workbench.live
+        if not live.is_open:
+            self._workbench.open_camera()
+        size = self._workbench.preparation.image_size
+        if not live.is_open:
+            self.notice_raised.emit(
+                self.tr(
+                    "No camera is open. Choose the source of the images at the step "
+                    "Camera, then resume the swing here."
+                )
+            )
+        elif not swing.is_of(self._workbench.preparation.sources):
+            self.notice_raised.emit(
+                self.tr(
+                    "The swing was captured with another source of images. Choose that "
+                    "source at the step Camera, then resume the swing here."
+                )
+            )
+        elif size is not None and not swing.fits(size):
+            camera = swing.setup.camera
+            self.notice_raised.emit(
+                self.tr(
+                    "The camera sends {0} x {1}, the swing was captured with {2} x "
+                    "{3}. Choose its camera at the step Camera, then resume the swing "
+                    "here."
+                ).format(*size, *camera.image_size)
+            )
+        else:
+            self._resumed = swing.record.folder
+            self._workbench.run.runner.go_on(swing)
+
+    def _take_over(self, swing: Resumable) -> None:
+        """Choose what the swing was captured for, and the camera of its station."""
+        workbench, header = self._workbench, swing.record.header
+        station = workbench.preparation.names.station
+        self._go_to_station(header.station)
+        names = recorded_names(swing.record)
+        names = replace(names, station=names.station or station)
+        workbench.set_preparation(
+            replace(workbench.preparation, names=names, nominal_tip=header.nominal_tip)
+        )
+
+    def _go_to_station(self, name: str) -> None:
+        """Bring back what was chosen last at a station that is known."""
+        workbench = self._workbench
+        is_other = name != workbench.preparation.names.station
+        if is_other and name in workbench.stations():
+            workbench.choose_station(name)
+
+    def _on_run_changed(self) -> None:
+        status = self._workbench.run.status
+        if status.solution is not None and status.record_folder == self._reviewed:
+            self._reviewed = None
+            self.step_requested.emit("review")
+        if self._resumed is not None and status.record_folder == self._resumed:
+            self._resumed = None
+            self.step_requested.emit("swing")
+
+    def _on_run_troubled(self) -> None:
+        self._resumed = self._reviewed = None
+
+    def _on_discard_requested(self, folder: Path) -> None:
+        damaged = {swing.folder for swing in self._panel.value().damaged}
+        discard = discard_damaged if folder in damaged else discard_swing
+
+        def leave(_: Report) -> Path:
+            discard(folder)
+            return folder
+
+        waiting = self.tr("The swing is being discarded.")
+        self._work_on(waiting, leave, self._on_discarded)
+
+    def _on_discarded(self, folder: Path) -> None:
+        self.told.emit(self.tr("Discarded. The images stay in {0}.").format(folder))
+        self._search_now()
+
+    # Verifications
+
+    def _on_continue_requested(self, found: InterruptedVerification) -> None:
+        """Choose what the verification was of, and go on with it."""
+        under_way, workbench = found.under_way, self._workbench
+        if under_way is None:
+            return
+        self._settle()
+        self._go_to_station(under_way.names.station)
+        workbench.set_preparation(replace(workbench.preparation, names=under_way.names))
+        limits = workbench.choices.limits
+        workbench.set_choices(replace(under_way.choices, limits=limits))
+        lacks = workbench.preparation.lacks()
+        if lacks:
+            self.notice_raised.emit(lack_text(lacks[0]))
+            return
+        self._continued = under_way
+        self._panel.set_waiting(self.tr("The verification is being read."))
+        workbench.verification.runner.go_on(found)
+
+    def _on_verification_changed(self) -> None:
+        continued = self._continued
+        status = self._workbench.verification.status
+        if continued is not None and status.began == continued.began:
+            self._continued = None
+            self._panel.set_waiting("")
+            self.step_requested.emit("verify")
+
+    def _on_verification_troubled(self) -> None:
+        if self._continued is not None:
+            self._continued = None
+            self._panel.set_waiting("")
+
+    def _on_close_requested(self, found: InterruptedVerification) -> None:
+        folder, now = self._workbench.folder, self._workbench.around.now
+        self._work_on(
+            self.tr("The verification is being closed."),
+            lambda _: abandon_interrupted(folder, found, now()),
+            self._on_closed,
+        )
+
+    def _on_closed(self, _: object) -> None:
+        self._workbench.enter_owed()
+        self.told.emit(self.tr("Closed as abandoned; see History."))
+        self._search_now()
+
+
+@dataclass(frozen=True, eq=False)
+class Interrupted:
+    """What was found that has no end."""
+
+    swings: Unfinished
+    verifications: tuple[InterruptedVerification, ...]
