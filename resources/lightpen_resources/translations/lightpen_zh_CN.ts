@@ -921,8 +921,8 @@
         <translation>看不到 LED</translation>
     </message>
     <message>
-        <source>Saturated: lower the exposure first</source>
-        <translation>过饱和：请先降低曝光</translation>
+        <source>Saturated</source>
+        <translation>饱和</translation>
     </message>
     <message>
         <source>Sharp</source>
@@ -947,6 +947,14 @@
 </context>
 <context>
     <name>FocusPanel</name>
+    <message>
+        <source>Recorded: the focus is as it was.</source>
+        <translation>录制的图像：对焦保持当时状态。</translation>
+    </message>
+    <message>
+        <source>Lower the exposure first: now this tells nothing.</source>
+        <translation>请先降低曝光：目前该值无意义。</translation>
+    </message>
     <message>
         <source>Turn the focus ring until the rims are narrowest.</source>
         <translation>转动对焦环，使边缘最窄。</translation>
@@ -2549,6 +2557,14 @@
         <translation>尚无匹配</translation>
     </message>
     <message>
+        <source>Swing under way</source>
+        <translation>摆动进行中</translation>
+    </message>
+    <message>
+        <source>The rings show its LED file, the remarks this table.</source>
+        <translation>圆环对应该摆动的 LED 文件，说明对应此表。</translation>
+    </message>
+    <message>
         <source>Pen not found</source>
         <translation>未找到光笔</translation>
     </message>
@@ -3362,6 +3378,10 @@
     <message>
         <source>Check the settings</source>
         <translation>检查设置</translation>
+    </message>
+    <message>
+        <source>The tip was taken back and is not accepted. The swing is kept; the file swing.lightpen in {0} opens it again.</source>
+        <translation>测头已撤回，未被接受。摆动数据已保留；{0} 中的 swing.lightpen 文件可重新打开。</translation>
     </message>
     <message>
         <source>Accept...</source>
@@ -7906,6 +7926,13 @@
     <message>
         <source>practice</source>
         <translation>练习</translation>
+    </message>
+</context>
+<context>
+    <name>opened_folder</name>
+    <message>
+        <source>No program here shows folders. This one is {0}</source>
+        <translation>本机没有可显示文件夹的程序。该文件夹为 {0}</translation>
     </message>
 </context>
 <context>
