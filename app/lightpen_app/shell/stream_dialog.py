@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QDialog,
     QDialogButtonBox,
     QFormLayout,
@@ -22,6 +21,7 @@ from lightpen.streaming.server import (
 )
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
@@ -65,7 +65,7 @@ class StreamDialog(Translated, QDialog):
         # Widgets
         self._lead = text_label(TextSize.BODY)
         self._on = QCheckBox()
-        self._address = QComboBox()
+        self._address = ChoiceField()
         self._address.setEditable(True)
         self._address.addItems([LOOPBACK, EVERYWHERE])
         self._port = NumberField("", (FIRST_PORT, LAST_PORT), 0)

@@ -1,5 +1,7 @@
 """A field for a number with its unit."""
 
+import re
+
 from PySide6.QtCore import QLocale, Qt
 from PySide6.QtGui import QKeyEvent, QValidator, QWheelEvent
 from PySide6.QtWidgets import QDoubleSpinBox, QWidget
@@ -7,6 +9,8 @@ from typing_extensions import override
 
 from lightpen_app.look.theme import GRID
 
+LONGEST = 9  # digits before the point
+NUMBER = re.compile(rf"[+-]?\d{{1,{LONGEST}}}(\.\d*)?")
 INSET = 13  # px; a style sheet cannot pad the text of a spin box
 PAGE_KEYS = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
@@ -15,7 +19,8 @@ class NumberField(QDoubleSpinBox):
     """A spin box whose text is set in as in other fields, with a decimal point.
 
     A decimal comma that is typed becomes a point; it would be passed over otherwise,
-    and "3,5" be taken for 35.
+    and "3,5" be taken for 35. A number beyond the limits becomes the nearest limit once
+    it is typed; else its last digit would be passed over, and "400" be taken for 40.
 
     Parameters
     ----------
@@ -43,8 +48,29 @@ class NumberField(QDoubleSpinBox):
 
     @override
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
-        state, *_ = super().validate(text.replace(",", "."), position)
-        return state, text.replace(",", "."), position
+        text = text.replace(",", ".")
+        state, *_ = super().validate(text, position)
+        is_invalid = state is QValidator.State.Invalid
+        if is_invalid and self._nearest(text) is not None:
+            state = QValidator.State.Intermediate
+        return state, text, position
+
+    @override
+    def fixup(self, text: str) -> str:
+        nearest = self._nearest(text)
+        return super().fixup(text) if nearest is None else self.textFromValue(nearest)
+
+    def _nearest(self, text: str) -> float | None:
+        """Return the limit that a typed number is beyond; None where it is not."""
+        digits = text.strip().removesuffix(self.suffix().strip()).strip()
+        if not NUMBER.fullmatch(digits):
+            return None
+        _, point, decimals = digits.partition(".")
+        if len(decimals) > self.decimals() or (point and not self.decimals()):
+            return None
+        number = float(digits)
+        nearest = min(max(number, self.minimum()), self.maximum())
+        return None if nearest == number else nearest
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

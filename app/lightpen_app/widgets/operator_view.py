@@ -91,7 +91,7 @@ class OperatorView(Translated, QWidget):
         self._progress = QProgressBar()
         self._progress.setRange(0, 1000)
         self._progress.setTextVisible(False)
-        self._banner = StateBanner()
+        self._banner = StateBanner(speaks=False)  # the page tells it
         self._keys = FittedText(43, 1)
 
         # Layout

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QShowEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
@@ -39,12 +39,15 @@ class State:
 class StateBanner(QWidget):
     """A filled area with a sign, a word and a sentence.
 
-    A screen reader is told each new word with its sentence.
+    A screen reader is told each new word with its sentence, once all is shown that
+    belongs to it: what stands only in passing is not told.
 
     Parameters
     ----------
     word_size : float
         Size of the word, px; the sentence is half of it, at least `TextSize.BODY`.
+    speaks : bool
+        Whether a screen reader is told; not where another banner says the same.
 
     Signals
     -------
@@ -55,12 +58,22 @@ class StateBanner(QWidget):
     announced = Signal(str)
 
     def __init__(
-        self, word_size: float = TextSize.DISPLAY, parent: QWidget | None = None
+        self,
+        word_size: float = TextSize.DISPLAY,
+        parent: QWidget | None = None,
+        *,
+        speaks: bool = True,
     ) -> None:
         super().__init__(parent)
         self._value = State()
+        self._speaks = speaks
+        self._speaking = QTimer(self)
+        self._speaking.setSingleShot(True)
         self._word_size = word_size
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
+
+        # Connections
+        self._speaking.timeout.connect(self._announce)
 
     def value(self) -> State:
         """Return the state shown."""
@@ -75,16 +88,18 @@ class StateBanner(QWidget):
         self.setAccessibleName(value.word)
         self.setAccessibleDescription(value.detail)
         self.update()
-        if is_new and self.isVisible():
-            self._announce()
+        if is_new:
+            self._speaking.start()
 
     @override
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if not event.spontaneous():
-            self._announce()
+            self._speaking.start()
 
     def _announce(self) -> None:
+        if not (self._speaks and self.isVisible()):
+            return
         text = ". ".join(filter(None, (self._value.word, self._value.detail)))
         announce(self, text)
         self.announced.emit(text)

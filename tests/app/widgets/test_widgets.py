@@ -1,8 +1,10 @@
 """What the smaller widgets say, by word and sign as well as by colour."""
 
 import pytest
-from PySide6.QtCore import QLocale, QRectF
-from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter
+from PySide6.QtCore import QLocale, QPoint, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.detection.inspection import Exposure
@@ -11,6 +13,7 @@ from lightpen_app.look.theme import DARK, TextSize, Tone
 from lightpen_app.look.words import BREAK, breakable, unbroken
 from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.fitted_text import FittedText
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.operator_view import (
@@ -135,6 +138,46 @@ def test_a_number_has_a_decimal_point_in_every_country(qtbot: QtBot) -> None:
     field.setValue(2.5)
 
     assert field.text() == "2.500 mm"
+
+
+@pytest.mark.parametrize(
+    ("typed", "value"),
+    [("400", 50), ("0.5", 1), ("3,5", 3.5), ("12.3456", 12.345), ("x", 2)],
+)
+def test_a_number_beyond_its_limits_becomes_the_nearest_and_no_digit_is_lost(
+    qtbot: QtBot, typed: str, value: float
+) -> None:
+    field = NumberField("mm", (1, 50), 3)
+    qtbot.addWidget(field)
+    field.setValue(2)
+    field.selectAll()
+
+    QTest.keyClicks(field, typed)
+    QTest.keyClick(field, Qt.Key.Key_Return)
+
+    assert field.value() == pytest.approx(value)
+
+
+def test_the_wheel_over_a_choice_changes_nothing(qtbot: QtBot) -> None:
+    field = ChoiceField()
+    qtbot.addWidget(field)
+    field.addItems(["mm", "m"])
+    field.show()
+
+    middle = QPointF(field.rect().center())
+    down = QWheelEvent(
+        middle,
+        field.mapToGlobal(middle),
+        QPoint(),
+        QPoint(0, -120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(field, down)
+
+    assert field.currentText() == "mm"
 
 
 @pytest.fixture
@@ -265,11 +308,31 @@ def test_a_new_state_is_announced_once_it_is_seen(qtbot: QtBot) -> None:
     banner.announced.connect(said.append)
 
     banner.set_value(State("WAITING", "Show the pen."))
+    QApplication.processEvents()
+    assert said == []
     banner.show()
-    banner.set_value(State("WAITING", "10 of 10 LEDs"))
-    banner.set_value(State("PASS", "U (k = 2) of the tip is 0.002 mm."))
+    qtbot.waitUntil(lambda: said == ["WAITING. Show the pen."])
 
-    assert said == ["WAITING. Show the pen.", "PASS. U (k = 2) of the tip is 0.002 mm."]
+    banner.set_value(State("WAITING", "10 of 10 LEDs"))
+    banner.set_value(State("COMPUTING"))  # in passing
+    banner.set_value(State("PASS", "U (k = 2) of the tip is 0.002 mm."))
+    qtbot.waitUntil(lambda: len(said) > 1)
+    QApplication.processEvents()
+
+    assert said[1:] == ["PASS. U (k = 2) of the tip is 0.002 mm."]
+
+
+def test_of_two_banners_with_the_same_words_one_speaks(qtbot: QtBot) -> None:
+    banner = StateBanner(speaks=False)
+    qtbot.addWidget(banner)
+    said: list[str] = []
+    banner.announced.connect(said.append)
+
+    banner.set_value(State("WAITING", "Show the pen."))
+    banner.show()
+    QApplication.processEvents()
+
+    assert said == []
 
 
 def test_words_stay_large_enough_to_be_read(qtbot: QtBot) -> None:

@@ -1,16 +1,15 @@
 """A field for a camera: one that was found, or a serial number or address typed in."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtGui import QWheelEvent
-from PySide6.QtWidgets import QComboBox, QSizePolicy, QWidget
-from typing_extensions import override
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from lightpen.cameras.source import FoundDevice
 from lightpen_app.look.theme import Tone, set_tone
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.path_field import EnterEdit
 
 
-class DeviceField(QComboBox):
+class DeviceField(ChoiceField):
     """A camera, taken over when it is chosen, or typed and Enter pressed.
 
     Signals
@@ -25,7 +24,7 @@ class DeviceField(QComboBox):
         super().__init__(parent)
         self._value = ""
         self.setEditable(True)
-        self.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._edit = edit = EnterEdit()
         self.setLineEdit(edit)
@@ -64,11 +63,6 @@ class DeviceField(QComboBox):
     def set_faulty(self, faulty: bool) -> None:
         """Mark the camera as one that cannot be opened."""
         set_tone(self._edit, Tone.BAD if faulty else Tone.PLAIN)
-
-    @override
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the page: a camera is not chosen in passing."""
-        event.ignore()
 
     def _on_activated(self, index: int) -> None:
         self._take(str(self.itemData(index)))

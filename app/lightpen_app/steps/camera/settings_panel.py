@@ -1,16 +1,13 @@
 """What else of a camera can be set: rate, region, pixel format, trigger, packets."""
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import (
-    QComboBox,
     QGridLayout,
     QGroupBox,
     QLabel,
     QVBoxLayout,
     QWidget,
 )
-from typing_extensions import override
 
 from lightpen.cameras.pixel_formats import pixel_format_named
 from lightpen.cameras.protocol import (
@@ -25,19 +22,12 @@ from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import PARTED
 from lightpen_app.steps.camera.setting_field import SettingField
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 
 LARGEST = 100_000  # px or bytes, of a field before the camera told its range
-
-
-class ChoiceField(QComboBox):
-    """A choice that the wheel does not change while the page scrolls."""
-
-    @override
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        event.ignore()
 
 
 class SettingsPanel(Translated, QGroupBox):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QComboBox,
     QFileDialog,
     QGroupBox,
     QHBoxLayout,
@@ -24,6 +23,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
 from lightpen_app.steps.camera.device_field import DeviceField
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
@@ -69,9 +69,10 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome = Remark()
 
         # Widgets
-        self._kind = QComboBox()  # no wider than its neighbours, however long its words
+        self._kind = ChoiceField()
+        # No wider than its neighbours, however long its words.
         self._kind.setSizeAdjustPolicy(
-            QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+            ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         for _ in SOURCES:
             self._kind.addItem("")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from datetime import date, datetime, time, timedelta
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from lightpen.archive.entries import Kind
 from lightpen.archive.history import KnownNames
@@ -13,6 +13,7 @@ from lightpen.local_time import local_time
 from lightpen_app.look.theme import GRID
 from lightpen_app.look.words import shortened
 from lightpen_app.steps.history.texts import kind_text
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.date_field import DateField
 from lightpen_app.widgets.labelled import field_label, stacked
 from lightpen_app.widgets.translated import Translated
@@ -107,16 +108,16 @@ class FilterBar(Translated, QWidget):
             self._kind.setItemText(i, kind_text(kind))
 
 
-def _choice() -> QComboBox:
-    choice = QComboBox()
+def _choice() -> ChoiceField:
+    choice = ChoiceField()
     choice.addItem("", "")
-    policy = QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+    policy = ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
     choice.setSizeAdjustPolicy(policy)
     choice.setMinimumWidth(LEAST_CHOICE)
     return choice
 
 
-def _list(choice: QComboBox, names: Sequence[str]) -> None:
+def _list(choice: ChoiceField, names: Sequence[str]) -> None:
     """List names behind the choice of all; one that is chosen stays so."""
     chosen = choice.currentData()
     blocked = choice.blockSignals(True)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
-    QComboBox,
     QFileDialog,
     QHBoxLayout,
     QLabel,
@@ -16,6 +15,7 @@ from PySide6.QtWidgets import (
 from lightpen.formats.pen_content import UNITS
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, Tone
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.file_drops import FileDrops
 from lightpen_app.widgets.path_field import PathField
 from lightpen_app.widgets.push_button import PushButton
@@ -228,7 +228,7 @@ class _UnitsRow(Translated, QWidget):
 
         # Widgets
         self._words = SignLabel(wraps=False)
-        self._choice = QComboBox()
+        self._choice = ChoiceField()
         self._choice.addItems(["", *UNITS])
 
         # Layout

@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QLineEdit, QWidget
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QLineEdit, QWidget
 from typing_extensions import override
 
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.keys import ENTER_KEYS, PAGE_KEYS
 
 LONGEST_NAME = 200
 ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
-class StationField(QComboBox):
+class StationField(ChoiceField):
     """A list of the known stations in which another name can be typed.
 
     Signals
@@ -36,7 +37,7 @@ class StationField(QComboBox):
         self._edit = _NameEdit()
         self._edit.setMaxLength(LONGEST_NAME)
         self.setLineEdit(self._edit)
-        self.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        self.setInsertPolicy(ChoiceField.InsertPolicy.NoInsert)
         # "Hall" must not become "Hall 2" because that is known; Qt takes None for no
         # completer, its stub does not.
         self.setCompleter(None)  # type: ignore[arg-type]
@@ -65,11 +66,6 @@ class StationField(QComboBox):
         self.addItems(list(names))
         self.setEditText(shown)
         self._edit.setCursorPosition(0)
-
-    @override
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Scroll the page, not the stations."""
-        event.ignore()
 
     @override
     def keyPressEvent(self, event: QKeyEvent) -> None:

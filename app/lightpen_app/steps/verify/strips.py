@@ -6,7 +6,6 @@ from dataclasses import replace
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QComboBox,
     QHBoxLayout,
     QLabel,
     QVBoxLayout,
@@ -17,6 +16,7 @@ from typing_extensions import override
 from lightpen.verification.choices import Surface, TaskKind, VerificationChoices
 from lightpen.verification.fixed_point import MIN_TOUCHES
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.translated import Translated
 
@@ -66,7 +66,7 @@ class TaskStrip(Translated, QWidget):
             if isinstance(field, NumberField):
                 field.setKeyboardTracking(False)
                 field.valueChanged.connect(self._on_changed)
-            elif isinstance(field, QComboBox):
+            elif isinstance(field, ChoiceField):
                 field.activated.connect(self._on_changed)
 
         self._retranslate()
@@ -130,12 +130,12 @@ class FixedPointStrip(TaskStrip):
         return self.tr("Touch the cone again"), self.tr("Touches")
 
 
-class SurfaceField(QComboBox):
+class SurfaceField(ChoiceField):
     """Where something is touched; as wide as its longest choice."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        self.setSizeAdjustPolicy(ChoiceField.SizeAdjustPolicy.AdjustToContents)
         for surface in Surface:
             self.addItem("", surface)
 

@@ -14,7 +14,8 @@ from lightpen.cameras.protocol import (
 )
 from lightpen_app.look.theme import Tone
 from lightpen_app.steps.camera.setting_field import SettingField
-from lightpen_app.steps.camera.settings_panel import ChoiceField, SettingsPanel
+from lightpen_app.steps.camera.settings_panel import SettingsPanel
+from lightpen_app.widgets.choice_field import ChoiceField
 from lightpen_app.widgets.push_button import PushButton
 
 CAPS = Caps(

@@ -1,0 +1,13 @@
+"""A list of which one is chosen."""
+
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtWidgets import QComboBox
+from typing_extensions import override
+
+
+class ChoiceField(QComboBox):
+    """A choice that the wheel does not change while the page scrolls."""
+
+    @override
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
