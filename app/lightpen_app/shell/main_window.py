@@ -137,6 +137,9 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.focusChanged.connect(self._on_focus_changed)
 
         self._use_room()
         self._retranslate()
@@ -448,6 +451,18 @@ class MainWindow(Rearranged, QMainWindow):
                 return
             widget = widget.nextInFocusChain()
         self._action_bar.focus_main()
+
+    def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
+        """Let the page choose where the focus goes when what had it has vanished.
+
+        Qt gives it to whatever comes next, such as a button that Enter then presses.
+        """
+        if not isinstance(now, QAbstractButton) or now.window() is not self:
+            return
+        if before is None or before.isVisible() or not self._area.isAncestorOf(before):
+            return
+        if self.page().isAncestorOf(before):
+            self._focus_page()
 
     def _show_options(self) -> None:
         """Open the options above their button."""

@@ -1,10 +1,13 @@
 """A question in the page that takes a reason, and a signature, for an answer."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QWidget
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QAbstractButton, QGridLayout, QWidget
+from typing_extensions import override
 
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.widgets.asking_bar import AskingBar
+from lightpen_app.widgets.keys import ENTER_KEYS
 from lightpen_app.widgets.path_field import EnterEdit
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.supervisor_fields import SupervisorFields
@@ -58,6 +61,13 @@ class ReasonBar(AskingBar):
 
         self._refresh()
         self.hide()
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Keep Enter in a field that lacks something from what is behind the bar."""
+        is_typing = not isinstance(self.window().focusWidget(), QAbstractButton)
+        if not (is_typing and event.key() in ENTER_KEYS):
+            super().keyPressEvent(event)
 
     def set_words(self, question: str, field: str, yes: str, no: str) -> None:
         """Change the question, the name of its field, and its answers."""

@@ -1,6 +1,6 @@
 """Buttons for the simulated operator, where the pen is simulated."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 from typing_extensions import override
 
@@ -59,6 +59,10 @@ class HandPanel(Rearranged, Translated, QFrame):
         layout.addStretch(1)
         for button in self._commands():
             layout.addWidget(button)
+
+        for each in (self._follow, *self._commands()):
+            # A click leaves Space and Enter to the swing.
+            each.setFocusPolicy(Qt.FocusPolicy.TabFocus)
 
         # Connections
         self._follow.toggled.connect(self._on_follow_toggled)

@@ -49,6 +49,7 @@ class LeaningDial(PostureDial):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._is_interactive = False
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._wish: Posture | None = None  # what the user wanted last
         self._turns_at: float | None = None  # where a drag that turns began, px
 
@@ -61,8 +62,6 @@ class LeaningDial(PostureDial):
         if interactive == self._is_interactive:
             return
         self._is_interactive = interactive
-        policy = Qt.FocusPolicy.StrongFocus if interactive else Qt.FocusPolicy.NoFocus
-        self.setFocusPolicy(policy)
         self._retranslate()
 
     def forget_wish(self) -> None:

@@ -154,6 +154,10 @@ class SwingPage(Page):
             self._runner.pause()
 
     @override
+    def first_control(self) -> QWidget:
+        return self._face.dial  # no button: Space pauses, Enter goes on
+
+    @override
     def entered(self) -> None:
         self._is_entered = True
         is_recording = self._workbench.preparation.source.kind == SourceKind.RECORDED
