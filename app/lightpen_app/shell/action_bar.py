@@ -68,13 +68,22 @@ class ActionBar(Translated, QFrame):
         self._main.setAccessibleDescription(action.why_not)
         self._why_not.setText(action.why_not)
         self._why_not.setVisible(bool(action.why_not))
+        self._refresh_status()
         self._back.setVisible(can_go_back)
 
     def set_status(self, text: str) -> None:
         """Show a sentence in the status line, or none."""
         self._status.setText(text)
         self._status.setAccessibleName(text)
-        self._status.setVisible(bool(text))
+        self._refresh_status()
+
+    def _told_status(self) -> str:
+        """Return the status, but not the same sentence twice."""
+        text = self._status.text()
+        return "" if text == self._why_not.text() else text
+
+    def _refresh_status(self) -> None:
+        self._status.setVisible(bool(self._told_status()))
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""
@@ -84,7 +93,7 @@ class ActionBar(Translated, QFrame):
 
     def words(self) -> tuple[str, str]:
         """Return why the main button cannot be pressed, and the status."""
-        return self._why_not.text(), self._status.text()
+        return self._why_not.text(), self._told_status()
 
     def press_main(self) -> None:
         """Press the main button, if it can be pressed."""
