@@ -24,6 +24,7 @@ from lightpen_app.widgets.translated import Translated
 
 US_PER_MS = 1000.0
 PADDING = 3 * GRID // 2
+EXPOSURE_WIDTH, GAIN_WIDTH = 100, 88  # px, at least: of "30.00 ms" and "24.0 dB"
 
 
 class ExposurePanel(Translated, QFrame):
@@ -58,6 +59,8 @@ class ExposurePanel(Translated, QFrame):
         self._exposure_name.setBuddy(self._exposure)
         self._gain_name = QLabel()
         self._gain = SettingField("dB", (0.0, 48.0), 1)
+        self._exposure.setMinimumWidth(EXPOSURE_WIDTH)
+        self._gain.setMinimumWidth(GAIN_WIDTH)
         self._gain_name.setBuddy(self._gain)
         self._adjust = PushButton()
         self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)
@@ -232,6 +235,7 @@ class FocusPanel(Translated, QFrame):
         super().__init__(parent)
         self.setProperty("area", "panel")
         self._widths: deque[float] = deque(maxlen=N_TRACED)
+        self._is_saturated = self._is_recorded = False
 
         # Widgets
         self._meter = FocusMeter()
@@ -250,16 +254,37 @@ class FocusPanel(Translated, QFrame):
     def add(self, inspection: Inspection) -> None:
         """Show one more image."""
         self._widths.append(inspection.edge_width)
-        is_saturated = inspection.exposure.n_saturated > 0
-        self._meter.set_value(self._widths, is_saturated=is_saturated)
+        self._is_saturated = inspection.exposure.n_saturated > 0
+        self._meter.set_value(self._widths, is_saturated=self._is_saturated)
+        self._refresh()
 
     def clear(self) -> None:
         """Forget the images, as those of another camera."""
         self._widths.clear()
+        self._is_saturated = False
         self._meter.set_value(())
+        self._refresh()
+
+    def set_recorded(self, is_recorded: bool) -> None:
+        """Say whether the images are as they were taken, whatever is turned now."""
+        self._is_recorded = is_recorded
+        self._refresh()
+
+    def hint(self) -> str:
+        """Return what to do, a sentence."""
+        return self._hint.text()
+
+    def _refresh(self) -> None:
+        if self._is_recorded:
+            words = self.tr("Recorded: the focus is as it was.")
+        elif self._is_saturated:
+            words = self.tr("Lower the exposure first: now this tells nothing.")
+        else:
+            words = self.tr("Turn the focus ring until the rims are narrowest.")
+        self._hint.setText(words)
 
     def _retranslate(self) -> None:
-        self._hint.setText(self.tr("Turn the focus ring until the rims are narrowest."))
+        self._refresh()
         self._meter.setToolTip(
             self.tr("Width of the LEDs' rims from dark to bright. Hold the pen still.")
         )

@@ -54,7 +54,7 @@ class FocusMeter(Translated, QWidget):
         if not np.isfinite(self._present):
             return self.tr("No LED is seen")
         if self._is_saturated:
-            return self.tr("Saturated: lower the exposure first")
+            return self.tr("Saturated")
         return self.tr("Sharp") if is_sharp(self._present) else self.tr("Soft")
 
     def number(self) -> str:

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from math import hypot
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from typing_extensions import override
 
 from lightpen.cameras.protocol import Stats
 from lightpen.cameras.worker import Connection
@@ -23,6 +25,7 @@ from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import Shown
 
+HEAD_GAP = 3 * GRID  # px, between the words above the image
 N_TIMED = 40  # images of which the rate is the mean: two seconds
 WITHOUT_IMAGES = (Connection.SILENT, Connection.LOST, Connection.CLOSED)
 
@@ -51,6 +54,7 @@ class LivePanel(Translated, QWidget):
         # Widgets
         self._switch = CameraSwitch()
         self._state = SignLabel(wraps=False)
+        self._told: tuple[str, ...] = ()  # the most important first
         self._figures = text_label(TextSize.SMALL, Tone.QUIET)
         self._figures.setWordWrap(False)
         self._figures.setAlignment(
@@ -63,7 +67,7 @@ class LivePanel(Translated, QWidget):
 
         # Layout
         head = QHBoxLayout()
-        head.setSpacing(3 * GRID)
+        head.setSpacing(HEAD_GAP)
         head.addWidget(self._state)
         head.addWidget(self._figures, 1)
         layout = QVBoxLayout(self)
@@ -92,7 +96,7 @@ class LivePanel(Translated, QWidget):
         return self._state.value()
 
     def figures(self) -> str:
-        """Return what the last image shows, and how images come."""
+        """Return what the last image shows, and how images come, as far as it fits."""
         return self._figures.text()
 
     def view(self) -> ImageView:
@@ -107,13 +111,15 @@ class LivePanel(Translated, QWidget):
         """Show another image, and what became of those before."""
         self._seen = shown.seen
         frame = shown.seen.frame
+        if self._arrivals and frame.seq <= self._arrivals[-1][1]:
+            self._arrivals.clear()  # of another stream
         self._arrivals.append((frame.host_ts_ns, frame.seq))
         self._n_lost.append(stats.missed + stats.incomplete)
         rings = live_markers(shown.seen)
         free = (ring for ring in rings if not self._is_found(ring))
         markers = (*free, *self._extra)
         self._view.set_half(shown.half, shown.size, markers)
-        self._figures.setText(self._told())
+        self._tell()
 
     def set_extra_markers(self, markers: Sequence[Marker]) -> None:
         """Draw other marks besides the rings about what is seen."""
@@ -132,7 +138,22 @@ class LivePanel(Translated, QWidget):
         self._seen = None
         self._arrivals.clear()
         self._n_lost.clear()
-        self._figures.clear()
+        self._told = ()
+        self._fit_figures()
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_figures()
+
+    def _fit_figures(self) -> None:
+        """Show as much as there is room for; all of it is in the tool tip."""
+        parts, metrics = self._told, self._figures.fontMetrics()
+        room = self.width() - self._state.sizeHint().width() - HEAD_GAP
+        while len(parts) > 1 and metrics.horizontalAdvance(PARTED.join(parts)) > room:
+            parts = parts[:-1]
+        self._figures.setText(PARTED.join(parts))
+        self._figures.setToolTip(PARTED.join(self._told))
 
     def _retranslate(self) -> None:
         self._view.setToolTip(
@@ -144,7 +165,7 @@ class LivePanel(Translated, QWidget):
         self._state.set_value(self._remark())
         self._view.set_message(self._message())
         if self._seen is not None:
-            self._figures.setText(self._told())
+            self._tell()
 
     def _remark(self) -> Remark:
         match self._connection:
@@ -177,19 +198,21 @@ class LivePanel(Translated, QWidget):
             case Connection.CLOSED:
                 return self._sentence
 
-    def _told(self) -> str:
+    def _tell(self) -> None:
+        """Say what the last image shows, and how images come."""
         seen = self._seen
         assert seen is not None
         height, width = seen.frame.image.shape
         parts = [
             self._leds_told(seen),
-            self.tr("{0} x {1} px").format(width, height),
             self.tr("{0} images/s").format(f"{self._rate():.0f}"),
         ]
         n_lost = self._n_lost[-1] - self._n_lost[0]
         if n_lost > 0:
             parts.append(self.tr("lost: {0}").format(n_lost))
-        return PARTED.join(parts)
+        parts.append(self.tr("{0} x {1} px").format(width, height))
+        self._told = tuple(parts)
+        self._fit_figures()
 
     def _leds_told(self, seen: LiveImage) -> str:
         sighting = seen.sighting

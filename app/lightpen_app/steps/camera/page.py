@@ -242,6 +242,8 @@ class CameraPage(Rearranged, Page):
         self._intrinsics.set_image_size(now.image_size)
         self._intrinsics.setVisible(now.second is None)
         self._show_camera(self._live.chosen)
+        self._show_connection()  # what is missing to open one may be another
+        self._focus.set_recorded(now.source.kind == SourceKind.RECORDED)
         self._stray.set_n_masked(len(self._mask))
         self._mark()
         self.changed.emit()
@@ -439,7 +441,7 @@ class CameraPage(Rearranged, Page):
         self._adjust(seen, inspection)
         if self._stray.outcome().value() != outcome:
             self._live.hurry()  # it searches
-            self._side.reveal(self._stray.outcome())
+            self._side.reveal(self._stray)
 
     def _on_connection_changed(self, connection: Connection) -> None:
         if connection in (Connection.OPENING, Connection.STREAMING):

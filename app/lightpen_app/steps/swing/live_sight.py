@@ -25,8 +25,10 @@ class SwingSight(QObject):
         self._seen = shown.seen
         frame = shown.seen.frame
         time = frame.host_ts_ns * 1e-9
-        if self._arrivals and not 0 < time - self._arrivals[-1][0] < RATE_S:
-            self._arrivals.clear()
+        if self._arrivals:
+            before, number = self._arrivals[-1]
+            if not 0 < time - before < RATE_S or frame.seq <= number:
+                self._arrivals.clear()  # of another stream
         self._arrivals.append((time, frame.seq))
         while time - self._arrivals[0][0] > RATE_S:
             self._arrivals.popleft()

@@ -41,7 +41,7 @@ def test_the_last_width_is_judged(
 def test_saturated_leds_are_not_called_sharp(meter: FocusMeter) -> None:
     meter.set_value((0.8,), is_saturated=True)
 
-    assert meter.verdict() == "Saturated: lower the exposure first"
+    assert meter.verdict() == "Saturated"
 
 
 def test_only_the_last_seconds_are_kept(meter: FocusMeter) -> None:
