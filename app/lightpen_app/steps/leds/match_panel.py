@@ -53,6 +53,7 @@ class MatchPanel(Translated, QGroupBox):
         self._why_none = ""
         self._has_frame = True
         self._can_mend = True
+        self._is_aside = False
 
         # Widgets
         self._view = ImageView()
@@ -126,6 +127,12 @@ class MatchPanel(Translated, QGroupBox):
             self._can_mend = can_mend
             self._refresh()
 
+    def set_aside(self, is_aside: bool) -> None:
+        """Say whether the images are looked at with another pen, that of a swing."""
+        if is_aside != self._is_aside:
+            self._is_aside = is_aside
+            self._refresh()
+
     def value(self) -> PenMatch | None:
         """Return how the pen fits the views so far."""
         return self._match
@@ -183,6 +190,10 @@ class MatchPanel(Translated, QGroupBox):
         sighting = self._sighting
         if sighting is None or self._why_none:
             return State(self.tr("No match yet"), "", Sign.WAIT, Tone.QUIET)
+        if self._is_aside:
+            word = self.tr("Swing under way")
+            text = self.tr("The rings show its LED file, the remarks this table.")
+            return State(word, text, Sign.WAIT, Tone.QUIET)
         if sighting.reason is not Reason.NONE:
             word = self.tr("Pen not found")
             text = reason_text(sighting.reason)
@@ -193,7 +204,8 @@ class MatchPanel(Translated, QGroupBox):
         word = self.tr("{0} of {1} LEDs").format(n_seen, n_leds)
         detail = self.tr("misfit {0} px").format(_pixels(sigma))
         good = n_seen == n_leds and sigma <= USUAL_SIGMA
-        if good and self._has_frame and not self.reasons():
+        is_doubtful = self._match is not None and bool(self._match.findings)
+        if good and self._has_frame and not is_doubtful:
             return State(word, detail, Sign.CHECK, Tone.GOOD)
         return State(word, detail, Sign.WARNING, Tone.WARN)
 

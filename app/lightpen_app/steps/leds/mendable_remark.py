@@ -1,7 +1,7 @@
 """A remark on the LEDs, with the button that mends what it tells."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from lightpen.pen_check.match import Finding, What
 from lightpen_app.look.theme import GRID
@@ -30,11 +30,11 @@ class MendableRemark(Translated, QWidget):
         self._mend = PushButton()
 
         # Layout
-        layout = QHBoxLayout(self)
+        layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID)
-        layout.addWidget(self._remark, 1)
-        layout.addWidget(self._mend, 0, Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self._remark)
+        layout.addWidget(self._mend)
 
         # Connections
         self._mend.clicked.connect(self._on_mend_clicked)

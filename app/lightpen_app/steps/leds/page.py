@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QUndoStack
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
@@ -13,6 +14,7 @@ from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
 from lightpen.formats.opened_files import PenFile
+from lightpen.model.pen import Pen
 from lightpen.pen_check.draft import DraftCheck, PenDraft, check_draft
 from lightpen.pen_check.match import Finding, PenMatch
 from lightpen.pen_check.mending import exchanged, leds_to_exchange, mended
@@ -396,7 +398,10 @@ class LedsPage(Rearranged, Page):
         pen = self._check.sought
         preparation = self._workbench.preparation
         self._watch.set_pen(preparation.camera, pen)
-        if not self._workbench.run.status.is_capturing:
+        status = self._workbench.run.status
+        swung = status.setup if status.is_capturing else None
+        self._match.set_aside(swung is not None and _differ(swung.pen, pen))
+        if not status.is_capturing:
             aimed = replace(preparation.aim, pen=pen)
             self._workbench.live.set_aim(aimed if self._is_pending else preparation.aim)
         self._refresh_live()
@@ -436,6 +441,11 @@ class LedsPage(Rearranged, Page):
         self._table.set_misfits(misfits)
         self._table.set_marked(self._match.reasons())
         self._refresh()
+
+
+def _differ(swung: Pen, pen: Pen | None) -> bool:
+    """Return whether the LEDs of a table are not those that a swing began with."""
+    return pen is None or not np.array_equal(swung.leds, pen.leds)
 
 
 def _misfits(match: PenMatch) -> dict[int, float]:
