@@ -11,7 +11,16 @@ from typing import TypeAlias
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QBuffer, QByteArray, QEvent, QPoint, QRectF, QSize, Qt
+from PySide6.QtCore import (
+    QBuffer,
+    QByteArray,
+    QEvent,
+    QPoint,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 from typing_extensions import override
@@ -102,7 +111,14 @@ class Plot(QWidget):
     """Base of the plots: its frame, its colours, and how it is saved.
 
     The mouse moves nothing: a plot always shows all of its data.
+
+    Signals
+    -------
+    titled()
+        It has other words.
     """
+
+    titled = Signal()
 
     def __init__(self, axes: Axes, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -138,6 +154,7 @@ class Plot(QWidget):
         self._axes = axes
         self.setAccessibleName(axes.title)
         self._restyle()
+        self.titled.emit()
 
     def save_png(self, path: Path) -> None:
         """Write the plot as a picture, at twice the size on the screen.

@@ -234,8 +234,16 @@ class ReviewPage(Rearranged, Page):
 
     @override
     def unsaved(self) -> str:
-        if self._run.status.solution is None or self._run.status.result is not None:
+        status = self._run.status
+        if status.solution is None or status.result is not None:
             return ""
+        taken = status.taken_back
+        if taken is not None and taken.record == status.record_folder:
+            # Its swing is over, however little is in force.
+            return self.tr(
+                "The tip was taken back and is not accepted. The swing is kept; the "
+                "file swing.lightpen in {0} opens it again."
+            ).format(status.record_folder)
         return self.tr(
             "The tip is not accepted. The swing is kept and offered again at the next "
             "start."

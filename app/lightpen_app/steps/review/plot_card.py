@@ -80,6 +80,7 @@ class PlotCard(Translated, QFrame):
         self._enlarge.toggled.connect(self.enlarge_toggled)
         self._save_png.triggered.connect(lambda _=False: self._ask_place(".png"))
         self._save_csv.triggered.connect(lambda _=False: self._ask_place(".csv"))
+        plot.titled.connect(self._retranslate)
 
         self._retranslate()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPoint, QPointF, QRectF, Signal
-from PySide6.QtGui import QColor, QPen
+from PySide6.QtGui import QColor, QPen, QResizeEvent
 from PySide6.QtWidgets import QGraphicsRectItem, QWidget
 from typing_extensions import override
 
@@ -16,6 +16,7 @@ from lightpen_app.widgets.plots import Axes, Plot
 LIMIT_REST = 1.1  # times the largest misfit, where nothing is above the line
 LIMIT_GRIP = 0.98  # of the width, where it has a grip
 LIMIT_LABEL = {"position": 0.5, "anchors": [(0.5, 1.0), (0.5, 1.0)]}  # above the line
+LEAST_WORDED = 22 * GRID  # px of height, from which the words fit above the line
 HEADROOM = 1.6  # times the largest misfit of a used image; worse ones are at the rim
 
 
@@ -109,6 +110,11 @@ class MisfitPlot(Plot):
         self._limit.setMovable(movable)
         self._limit.setVisible(movable and bool(self._in_use))
 
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._on_limit_moved()
+
     def limit_pixel(self) -> QPoint:
         """Return where the line can be gripped, in px of `canvas`."""
         left, right = self.ranges()[0]
@@ -176,6 +182,8 @@ class MisfitPlot(Plot):
         at_rest, above = self._limit_words
         words = above.format(len(numbers), number_text(self._limit.value(), 3))
         self._limit.label.setFormat(words if numbers else at_rest)
+        # At rest the line is at the top, where a low plot has no room for words.
+        self._limit.label.setVisible(bool(numbers) or self.height() >= LEAST_WORDED)
 
     def _on_limit_left(self, _line: object = None) -> None:
         numbers = self._numbers_above()

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeAlias
 
-from PySide6.QtCore import QObject, Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QApplication, QFileDialog, QWidget
 
 from lightpen.errors import FileError
@@ -13,6 +12,7 @@ from lightpen.record.exports import export_json, export_tables, tip_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.paper.showing import PaperShowing
 from lightpen_app.steps.review.result_tools import Export, ResultTools
+from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.save_place import SavePlace
 from lightpen_app.work.swing_run import SwingRun
@@ -76,7 +76,7 @@ class TakingAlong(QObject):
     def _open_folder(self) -> None:
         folder = self._run.status.record_folder
         if folder is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder)))
+            self.told.emit(open_folder(folder))
 
     def _copy_tip(self) -> None:
         solution = self._run.status.solution

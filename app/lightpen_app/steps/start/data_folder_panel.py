@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
 from lightpen_app.look.words import breakable
+from lightpen_app.widgets.opened_folder import open_folder
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
@@ -26,9 +26,12 @@ class DataFolderPanel(Translated, QGroupBox):
     -------
     change_requested()
         Another one is to be chosen.
+    told(str)
+        Why the folder is not shown; empty once it is.
     """
 
     change_requested = Signal()
+    told = Signal(str)
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -74,7 +77,7 @@ class DataFolderPanel(Translated, QGroupBox):
         self._retranslate()
 
     def _on_open_clicked(self) -> None:
-        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._folder)))
+        self.told.emit(open_folder(self._folder))
 
     def _retranslate(self) -> None:
         self.setTitle(self.tr("Data folder"))

@@ -138,6 +138,7 @@ class StartPage(Rearranged, Page):
         self._last.take_back_requested.connect(self._on_take_back_requested)
         self._last.verification_requested.connect(self._on_verification_requested)
         self._folder.change_requested.connect(self.data_folder_requested)
+        self._folder.told.connect(self.status_changed)
         workbench.folder_watch.counted.connect(self._folder.set_others)
         workbench.folder_watch.doubted.connect(self._folder.set_trouble)
         workbench.changed.connect(self._on_workbench_changed)

@@ -1,0 +1,16 @@
+"""Folders shown by the program that the system has for them."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QCoreApplication, QUrl
+from PySide6.QtGui import QDesktopServices
+
+
+def open_folder(folder: Path) -> str:
+    """Show a folder, or return the sentence that says where it is."""
+    if QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+        return ""
+    words = QCoreApplication.translate(
+        "opened_folder", "No program here shows folders. This one is {0}"
+    )
+    return words.format(folder)
