@@ -694,8 +694,10 @@ def test_space_pauses_even_after_a_click_on_the_simulated_hand(
     capturing.click("Slip")
 
     capturing.type(Key.Key_Space)
-
     until(qtbot, lambda: capturing.value.state.word == "PAUSED")
+
+    capturing.type(Key.Key_Space)
+    keep_on(qtbot, capturing)
 
 
 def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
