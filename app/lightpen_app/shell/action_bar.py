@@ -77,10 +77,13 @@ class ActionBar(Translated, QFrame):
         self._status.setAccessibleName(text)
         self._refresh_status()
 
-    def _refresh_status(self) -> None:
-        """Show the status, but not the same sentence twice."""
+    def _told_status(self) -> str:
+        """Return the status, but not the same sentence twice."""
         text = self._status.text()
-        self._status.setVisible(bool(text) and text != self._why_not.text())
+        return "" if text == self._why_not.text() else text
+
+    def _refresh_status(self) -> None:
+        self._status.setVisible(bool(self._told_status()))
 
     def set_room(self, room: Room) -> None:
         """Take less of a window that has little."""
@@ -90,7 +93,7 @@ class ActionBar(Translated, QFrame):
 
     def words(self) -> tuple[str, str]:
         """Return why the main button cannot be pressed, and the status."""
-        return self._why_not.text(), self._status.text()
+        return self._why_not.text(), self._told_status()
 
     def press_main(self) -> None:
         """Press the main button, if it can be pressed."""

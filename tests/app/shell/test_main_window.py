@@ -230,6 +230,33 @@ def test_a_main_action_that_is_not_possible_says_why(
     assert "Choose the pen first." in shell.window.words()
 
 
+def test_the_same_sentence_does_not_stand_twice_in_the_bar(shell: Shell) -> None:
+    page = shell.pages[0]
+    page.why_not = "Choose the pen first."
+    page.changed.emit()
+    page.status_changed.emit("Choose the pen first.")
+    assert shell.window.words().count("Choose the pen first.") == 1
+
+    page.why_not = ""
+    page.changed.emit()
+    assert shell.window.words().count("Choose the pen first.") == 1
+
+
+def test_a_control_that_vanishes_gives_its_focus_to_no_button(shell: Shell) -> None:
+    page = shell.pages[0]
+    shell.window.activateWindow()
+    going = QLineEdit()
+    layout = page.layout()
+    assert layout is not None
+    layout.addWidget(going)
+    going.show()
+    going.setFocus()
+
+    going.hide()
+
+    assert page.field.hasFocus()
+
+
 def test_the_main_button_keeps_the_focus_while_it_cannot_be_pressed(
     shell: Shell, press: Callable[[Key], None], qtbot: QtBot
 ) -> None:

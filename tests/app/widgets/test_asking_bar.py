@@ -1,8 +1,12 @@
 """A bar that asks borrows the focus, and gives it back."""
 
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLineEdit, QPushButton, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
+from typing_extensions import override
 
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.widgets.reason_bar import ReasonBar
@@ -32,3 +36,32 @@ def test_what_had_the_focus_before_a_question_has_it_again(
     leaving.setFocus()
     bar.hide()
     assert page.focusWidget() is leaving
+
+
+class Behind(QWidget):
+    """What lies behind a bar, and takes the keys that the bar leaves."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.keys: list[int] = []
+
+    @override
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        self.keys.append(event.key())
+
+
+def test_enter_without_a_reason_reaches_nothing_behind_the_bar(qtbot: QtBot) -> None:
+    page = Behind()
+    bar = ReasonBar()
+    QVBoxLayout(page).addWidget(bar)
+    qtbot.addWidget(page)
+    page.show()
+    bar.ask()
+    field = page.focusWidget()
+    assert isinstance(field, QLineEdit)
+
+    QTest.keyClick(field, Qt.Key.Key_Return)
+    QTest.keyClick(field, Qt.Key.Key_PageDown)
+
+    assert page.keys == [Qt.Key.Key_PageDown]
+    assert bar.isVisible()

@@ -24,6 +24,7 @@ from lightpen_app.widgets.translated import Translated
 
 US_PER_MS = 1000.0
 PADDING = 3 * GRID // 2
+EXPOSURE_WIDTH, GAIN_WIDTH = 100, 88  # px, at least: of "30.00 ms" and "24.0 dB"
 
 
 class ExposurePanel(Translated, QFrame):
@@ -58,6 +59,8 @@ class ExposurePanel(Translated, QFrame):
         self._exposure_name.setBuddy(self._exposure)
         self._gain_name = QLabel()
         self._gain = SettingField("dB", (0.0, 48.0), 1)
+        self._exposure.setMinimumWidth(EXPOSURE_WIDTH)
+        self._gain.setMinimumWidth(GAIN_WIDTH)
         self._gain_name.setBuddy(self._gain)
         self._adjust = PushButton()
         self._why_fixed = text_label(TextSize.BODY, Tone.QUIET)

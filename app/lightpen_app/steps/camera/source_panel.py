@@ -69,9 +69,8 @@ class SourcePanel(Translated, QGroupBox):
         self._outcome = Remark()
 
         # Widgets
-        self._kind = (
-            ChoiceField()
-        )  # no wider than its neighbours, however long its words
+        self._kind = ChoiceField()
+        # No wider than its neighbours, however long its words.
         self._kind.setSizeAdjustPolicy(
             ChoiceField.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )

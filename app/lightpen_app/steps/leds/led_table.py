@@ -187,17 +187,17 @@ class _DraftModel(QAbstractTableModel):
             self.endRemoveRows()
         elif n_after > n_before:
             self.endInsertRows()
-        self._tell_all()
+        self._tell(0, MISFIT)
 
     def set_misfits(self, misfits: Mapping[int, float]) -> None:
         if misfits != self._misfits:
             self._misfits = misfits
-            self._tell_all()
+            self._tell(MISFIT, MISFIT)
 
     def set_marked(self, reasons: Mapping[int, str]) -> None:
         if reasons != self._reasons:
             self._reasons = reasons
-            self._tell_all()
+            self._tell(0, 0)
 
     def retranslate(self) -> None:
         self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, N_COLUMNS - 1)
@@ -297,9 +297,10 @@ class _DraftModel(QAbstractTableModel):
         flaw = self._flaws.get((row, column - 1))
         return "" if flaw is None else worded(flaw.sentence)
 
-    def _tell_all(self) -> None:
-        last = self.index(self.rowCount() - 1, N_COLUMNS - 1)
-        self.dataChanged.emit(self.index(0, 0), last)
+    def _tell(self, first: int, last: int) -> None:
+        """Have columns shown anew; a cell among them that is typed in starts over."""
+        end = self.index(self.rowCount() - 1, last)
+        self.dataChanged.emit(self.index(0, first), end)
 
 
 class _SignDelegate(QStyledItemDelegate):

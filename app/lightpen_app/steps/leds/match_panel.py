@@ -192,7 +192,7 @@ class MatchPanel(Translated, QGroupBox):
             return State(self.tr("No match yet"), "", Sign.WAIT, Tone.QUIET)
         if self._is_aside:
             word = self.tr("Swing under way")
-            text = self.tr("The rings show its LED file, the remarks this table.")
+            text = self.tr("Rings: by its LED file")
             return State(word, text, Sign.WAIT, Tone.QUIET)
         if sighting.reason is not Reason.NONE:
             word = self.tr("Pen not found")

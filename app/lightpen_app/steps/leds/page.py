@@ -384,9 +384,11 @@ class LedsPage(Rearranged, Page):
             self._edit(PenDraft.of(self._check.sought))
 
     def _on_exchange_requested(self, pair: tuple[int, int]) -> None:
+        self._table.focus_cells()
         self._edit(exchanged(self._draft, pair))
 
     def _on_mend_requested(self, finding: Finding) -> None:
+        self._table.focus_cells()
         self._edit(mended(self._draft, finding))
 
     # Live images

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum, auto
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QGridLayout,
@@ -153,6 +153,10 @@ class LedTablePanel(Translated, QGroupBox):
     def set_marked(self, reasons: Mapping[int, str]) -> None:
         """Mark LEDs, by number, with what is wrong with them."""
         self._table.set_marked(reasons)
+
+    def focus_cells(self) -> None:
+        """Take the focus of a button that vanishes once the table is mended."""
+        self._table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def set_chosen(self, led: int) -> None:
         """Make the row of another LED current."""

@@ -54,8 +54,10 @@ from lightpen_app.look.sounds import Silence
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.camera.exposure_bar import ExposureBar
+from lightpen_app.steps.camera.exposure_panel import FocusPanel
 from lightpen_app.steps.camera.focus_meter import FocusMeter
 from lightpen_app.steps.camera.intrinsics_panel import IntrinsicsPanel
+from lightpen_app.steps.camera.live_panel import LivePanel
 from lightpen_app.steps.camera.page import CameraPage
 from lightpen_app.steps.camera.rig_panel import RigPanel
 from lightpen_app.steps.camera.source_panel import SourcePanel
@@ -238,6 +240,18 @@ def test_size_and_rate_of_the_images_are_told(live: "Seen") -> None:
     assert "Live" in live.words
 
 
+def test_what_a_narrow_image_has_no_room_for_is_left_out_from_the_end(
+    live: "Seen", qtbot: QtBot
+) -> None:
+    panel = live.child(LivePanel)
+    qtbot.waitUntil(lambda: panel.figures().endswith("1224 x 1024 px"))
+
+    panel.resize(300, panel.height())
+
+    assert panel.figures().startswith("10 of 10 LEDs")
+    assert "px" not in panel.figures()
+
+
 def test_the_simulated_pen_comes_by_itself(seen: "Seen") -> None:
     seen.page.entered()
 
@@ -296,10 +310,12 @@ def test_a_long_exposure_saturates_and_a_short_one_is_dark(live: "Seen") -> None
     live.enter("Exposure", "4")
     live.until(lambda: exposure(live) == "Saturated: 10 of 10 LEDs")
     assert "Shorten the exposure until no LED is saturated." in live.words
+    assert live.child(FocusPanel).hint().startswith("Lower the exposure first")
 
     live.enter("Exposure", "0.2")
     live.until(lambda: exposure(live) == "Too dark: 10 of 10 LEDs")
     assert "Lengthen the exposure until all LEDs are good." in live.words
+    assert live.child(FocusPanel).hint().startswith("Turn the focus ring")
 
 
 def test_gain_that_saturates_is_to_be_lowered(live: "Seen") -> None:
@@ -333,6 +349,7 @@ def test_recorded_images_have_no_exposure_to_set(
     seen.page.entered()
 
     seen.wait("Recorded: exposure and gain are as they were taken.")
+    seen.wait("Recorded: the focus is as it was.")
     with pytest.raises(AssertionError):
         seen.named("Exposure")
 

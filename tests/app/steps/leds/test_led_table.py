@@ -59,6 +59,26 @@ def test_typing_changes_the_draft(table: LedTable, qtbot: QtBot) -> None:
     assert table.value() == DRAFT.with_cell(2, 1, "121,5")
 
 
+def test_what_is_typed_outlives_what_the_live_match_tells_meanwhile(
+    table: LedTable,
+) -> None:
+    table.setCurrentIndex(cell(table, 3, 2))
+    QTest.keyClick(table, Qt.Key.Key_F2)
+    editor = QApplication.focusWidget()
+    assert isinstance(editor, QLineEdit)
+    editor.selectAll()
+    QTest.keyClicks(editor, "12")
+
+    table.set_misfits({3: 0.8})
+    table.set_marked({3: "LED 3 sits 0.80 mm off its place."})
+    QTest.keyClicks(editor, "1.5")
+    QTest.keyClick(editor, Qt.Key.Key_Return)
+    QApplication.processEvents()
+
+    assert shown(table, 3, 2) == "121.5"
+    assert shown(table, 3, MISFIT) == "0.80"
+
+
 def test_a_bad_cell_is_marked_and_told(table: LedTable) -> None:
     type_into(table, 3, 2, "12,4O")
 

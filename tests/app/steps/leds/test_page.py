@@ -697,6 +697,7 @@ def test_a_displaced_led_is_named_and_marked_everywhere(live: "Seen") -> None:
     assert live.child(StateBanner).value().tone is Tone.WARN
 
     live.click("Use the measured place")
+    assert led_table(live).hasFocus()
 
     live.wait("Every LED is within 0.1 mm of its place in the table, in")
     assert float(cell(live, 7, Y)) == pytest.approx(160, abs=0.05)

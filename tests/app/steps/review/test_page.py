@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QUrl
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -584,6 +584,8 @@ def test_an_acceptance_is_taken_back_and_the_tip_before_is_in_force(
     assert found.accepted == THEN
     assert banner(page).word == "CHECK: Tip has changed"
     assert len(list(workbench.run.archive.folder.glob("*.json"))) == 3
+    assert "taken back" in page.unsaved()
+    assert "offered again" not in page.unsaved()
 
 
 def test_the_acceptance_of_a_simulated_tip_is_no_force(bed: Bed) -> None:
@@ -667,14 +669,25 @@ def test_the_folder_of_the_swing_is_opened(
     bed: Bed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     opened: list[str] = []
-    monkeypatch.setattr(
-        "PySide6.QtGui.QDesktopServices.openUrl",
-        lambda url: opened.append(url.toLocalFile()),
-    )
-    bed.solve()
-    click(bed.show(), "Open folder")
+    can_show = True
 
+    def open_url(url: QUrl) -> bool:
+        opened.append(url.toLocalFile())
+        return can_show
+
+    monkeypatch.setattr("PySide6.QtGui.QDesktopServices.openUrl", open_url)
+    bed.solve()
+    page = bed.show()
+    told: list[str] = []
+    page.status_changed.connect(told.append)
+
+    click(page, "Open folder")
     assert opened == [str(bed.swing)]
+    assert told[-1] == ""
+
+    can_show = False
+    click(page, "Open folder")
+    assert told[-1] == f"No program here shows folders. This one is {bed.swing}"
 
 
 def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(

@@ -686,6 +686,20 @@ def test_enter_presses_the_main_button_unless_another_was_chosen(
     capturing.click("Go on swinging")
 
 
+def test_space_pauses_even_after_a_click_on_the_simulated_hand(
+    qtbot: QtBot, capturing: Desk
+) -> None:
+    capturing.window.go_to(0)
+    capturing.window.go_to(1)
+    capturing.click("Slip")
+
+    capturing.type(Key.Key_Space)
+    until(qtbot, lambda: capturing.value.state.word == "PAUSED")
+
+    capturing.type(Key.Key_Space)
+    keep_on(qtbot, capturing)
+
+
 def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     qtbot: QtBot, capturing: Desk
 ) -> None:
