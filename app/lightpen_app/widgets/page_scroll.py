@@ -23,6 +23,12 @@ class PageScroll(QScrollArea):
         super().__init__(parent)
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._revealed: QWidget | None = None  # until its user scrolls
+
+        # Connections
+        bar = self.verticalScrollBar()
+        bar.rangeChanged.connect(self._on_range_changed)
+        bar.actionTriggered.connect(self._forget_revealed)
 
     @override
     def setWidget(self, widget: QWidget) -> None:
@@ -41,7 +47,21 @@ class PageScroll(QScrollArea):
                 layout.activate()  # as the events that are under way would by and by
             around = around.parentWidget()
         content.resize(content.width(), content.heightForWidth(content.width()))
+        self._revealed = widget
         self.ensureWidgetVisible(widget, 0, 0)
+
+    @override
+    def focusNextPrevChild(self, next: bool) -> bool:
+        self._forget_revealed()
+        return super().focusNextPrevChild(next)
+
+    def _on_range_changed(self) -> None:
+        """Keep in view what was revealed while other words around it change."""
+        if self._revealed is not None:
+            self.ensureWidgetVisible(self._revealed, 0, 0)
+
+    def _forget_revealed(self) -> None:
+        self._revealed = None
 
     @override
     def resizeEvent(self, event: QResizeEvent) -> None:

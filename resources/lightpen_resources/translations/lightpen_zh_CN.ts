@@ -2561,8 +2561,8 @@
         <translation>摆动进行中</translation>
     </message>
     <message>
-        <source>The rings show its LED file, the remarks this table.</source>
-        <translation>圆环对应该摆动的 LED 文件，说明对应此表。</translation>
+        <source>Rings: by its LED file</source>
+        <translation>圆环：按其 LED 文件</translation>
     </message>
     <message>
         <source>Pen not found</source>
