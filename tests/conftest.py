@@ -60,8 +60,8 @@ sys.exit(status)
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Let one more process work than there are cores: some tests wait, for a camera."""
-    return (os.cpu_count() or 1) + 1
+    """Let two more processes work than there are cores: tests wait for cameras."""
+    return (os.cpu_count() or 1) + 2
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -19,6 +19,11 @@ from lightpen.sentences import Sentence, sentence
 
 MEMORY_A_PIXEL = 5  # bytes: 16 bits, its 8, and what is made of them
 EXAMINED = 3  # images in which a board is looked for that is another
+# Seen in a mirror they are others; a larger chessboard holds a smaller one either way.
+TELLS_SIDES = (
+    *(BoardKind.CHARUCO, BoardKind.LEGACY_CHARUCO, BoardKind.MARKERS),
+    BoardKind.ASYMMETRIC_CIRCLES,
+)
 OTHER_LAYOUT = {
     BoardKind.CHARUCO: BoardKind.LEGACY_CHARUCO,
     BoardKind.LEGACY_CHARUCO: BoardKind.CHARUCO,
@@ -117,7 +122,8 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence 
     images : callable
         Gives them anew, one at a time: they may be large.
     """
-    if _is_found((image[:, ::-1].copy() for image in images()), board):
+    mirrored = (image[:, ::-1].copy() for image in images())
+    if board.kind in TELLS_SIDES and _is_found(mirrored, board):
         return sentence(
             "intrinsics.mirrored",
             "The images show the board {board} mirrored. Switch off the mirroring of "
