@@ -9,7 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from lightpen.archive.late_logbook import LateLogbook
 from lightpen.errors import ArchiveError
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.folder_archive import FolderArchive
 from lightpen.record.standing import Standings
 from lightpen.record.tip_library import Library, read_library
@@ -29,8 +29,8 @@ class LibraryWatch(QObject):
         The data folder.
     logbook : LateLogbook
         Of that folder.
-    rule : callable
-        Returns how long a tip may be in force that has no rule of its own.
+    rule : DueRule
+        How long a tip may be in force that has no rule of its own.
     now : callable
         Returns the date and time by which tips are due.
 
@@ -56,7 +56,7 @@ class LibraryWatch(QObject):
         self,
         folder: Path,
         logbook: LateLogbook,
-        rule: Callable[[], DueRule],
+        rule: DueRule,
         now: Callable[[], datetime],
         parent: QObject | None = None,
     ) -> None:
@@ -85,6 +85,12 @@ class LibraryWatch(QObject):
         """The library as it was read last."""
         return self._standings.library
 
+    def set_rule(self, rule: DueRule) -> None:
+        """Let tips be due by another rule."""
+        if rule != self._rule:
+            self._rule = rule
+            self.refresh()
+
     def refresh(self) -> None:
         """Read it anew; the last to ask is told."""
         if self._reading is not None:
@@ -93,7 +99,7 @@ class LibraryWatch(QObject):
         folder, logbook, rule, now = (
             self._folder,
             self._logbook,
-            self._rule(),
+            self._rule,
             self._now,
         )
 

@@ -19,8 +19,8 @@ from lightpen.cameras.protocol import CameraSettings, Region, TriggerMode
 from lightpen.errors import LightpenError
 from lightpen.formats.own_json import DamagedError, in_shape
 from lightpen.model.assumptions import USUAL
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import SwingLimits
-from lightpen.record.due_rule import DueRule
 from lightpen.sentences import Sentence
 from lightpen.streaming.server import StreamPlace
 from lightpen_app.look.languages import Language

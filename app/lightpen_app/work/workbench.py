@@ -16,10 +16,10 @@ from lightpen.live.sources import (
     sample_files,
 )
 from lightpen.model.assumptions import USUAL
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits, SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.camera_calibrations import CameraTrial, keep_camera_trial
-from lightpen.record.due_rule import DueRule
 from lightpen.record.folder_archive import SIMULATED
 from lightpen.record.leftovers import sweep_leftovers
 from lightpen.record.names import Names
@@ -127,7 +127,7 @@ class Workbench(QObject):
         self.streaming = Streaming(self.run.archive, self._around.clock, self)
         self.live = LiveView(self.run, self.verification, self.streaming.stream, self)
         self.library = LibraryWatch(
-            folder, self.run.logbook, settings.due_rule, self._around.now, self
+            folder, self.run.logbook, settings.due_rule(), self._around.now, self
         )
         self.folder_watch = FolderWatch(folder, self)
         self.search = CameraSearch(self.live, self)
@@ -310,13 +310,14 @@ class Workbench(QObject):
         self._settings.set_export_folder(folder)
 
     def due_rule(self) -> DueRule:
-        """Return how long a tip may be in force."""
-        return self._settings.due_rule()
+        """Return how long a tip may be in force: as laid down, or as was chosen."""
+        laid_down = self._supervision.limits.get(self._preparation.names.station)
+        return self._settings.due_rule() if laid_down is None else laid_down.due
 
     def set_due_rule(self, rule: DueRule) -> None:
-        """Remember how long a tip may be in force."""
+        """Remember how long a tip may be in force where nothing is laid down."""
         self._settings.set_due_rule(rule)
-        self.library.refresh()
+        self.library.set_rule(rule)
 
     def use_files(self, files: FilesBeside) -> None:
         """Choose the files that stand beside recorded images, once they are read."""
@@ -441,6 +442,7 @@ class Workbench(QObject):
         self.run.runner.choose(self._preparation)
         self.verification.runner.choose(self._preparation, self._choices)
         self.streaming.choose(self._preparation)
+        self.library.set_rule(self.due_rule())
 
     def _read_supervision(self) -> None:
         folder = self._folder

@@ -14,7 +14,7 @@ from lightpen.archive.entries import Kind, Written, since_us
 from lightpen.archive.history import known_names
 from lightpen.archive.queries import calibrating, last_accepted, of_chain
 from lightpen.archive.tables import ENTRIES
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.tip_library import Library
 
 EMPTY = Library()

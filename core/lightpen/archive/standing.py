@@ -4,7 +4,7 @@ from datetime import datetime
 
 from lightpen.archive.database import Database
 from lightpen.archive.due import due_tips
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.standing import InForce, Standings
 from lightpen.record.tip_library import Library
 

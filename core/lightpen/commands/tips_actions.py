@@ -25,7 +25,7 @@ from lightpen.formats.camera_files import read_camera
 from lightpen.formats.images import find_images
 from lightpen.formats.pen_files import read_pen
 from lightpen.local_time import local_now
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
     add_item,

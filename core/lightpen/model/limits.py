@@ -5,6 +5,8 @@ from math import isfinite
 
 import numpy as np
 
+from lightpen.model.due_rule import DueRule
+
 
 @dataclass(frozen=True)
 class SwingLimits:
@@ -76,7 +78,8 @@ class VerificationLimits:
 
 @dataclass(frozen=True)
 class StationLimits:
-    """All limits of a station."""
+    """All limits of a station, and when its tips are due."""
 
     swing: SwingLimits = field(default_factory=SwingLimits)
     verification: VerificationLimits = field(default_factory=VerificationLimits)
+    due: DueRule = field(default_factory=DueRule)

@@ -16,6 +16,7 @@ from datetime import datetime
 from pathlib import Path
 
 from msgspec import Struct, to_builtins
+from msgspec import field as kept
 
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.report import record_bytes
@@ -26,6 +27,7 @@ from lightpen.formats.own_json import (
     parse_checked,
     require_usual,
 )
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
 from lightpen.record.numbered_files import add_numbered, numbered_files
 from lightpen.sentences import sentence
@@ -72,17 +74,19 @@ class _SwingLimits(Struct):
 
 
 class KeptLimits(Struct):
-    """Limits as they are kept."""
+    """Limits as they are kept; those of earlier versions say nothing of due dates."""
 
     swing: _SwingLimits
     verification_mm: VerificationLimits
+    due: DueRule = kept(default_factory=DueRule)
 
     def entries(self) -> dict[str, float]:
         """Return each limit by its name."""
         verification = asdict(self.verification_mm)
         of_verification = {f"max_{name}_mm": v for name, v in verification.items()}
         swing: dict[str, float] = to_builtins(self.swing)
-        return swing | of_verification
+        of_due = {f"due_{name}": number for name, number in asdict(self.due).items()}
+        return swing | of_verification | of_due
 
 
 class LimitsChange(Struct):
@@ -195,7 +199,7 @@ def set_limits(
     swing = limits.swing
     entry = KeptLimits(
         _SwingLimits(swing.max_uncertainty, swing.min_images, swing.max_images),
-        limits.verification,
+        *(limits.verification, limits.due),
     )
     _add(data, LimitsChange(FORMAT, now, signature.name, station=station, limits=entry))
 
@@ -282,5 +286,5 @@ def _limits_of(entry: KeptLimits) -> StationLimits:
     swing = entry.swing
     return StationLimits(
         SwingLimits(swing.max_uncertainty_mm, swing.min_images, swing.max_images),
-        entry.verification_mm,
+        *(entry.verification_mm, entry.due),
     )

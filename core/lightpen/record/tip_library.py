@@ -29,8 +29,8 @@ from lightpen.formats.own_json import (
     parse_json,
     require_usual,
 )
+from lightpen.model.due_rule import DueRule
 from lightpen.record.assumed import Plain
-from lightpen.record.due_rule import DueRule
 from lightpen.record.numbered_files import numbered_files
 from lightpen.sentences import Sentence, sentence
 

@@ -520,6 +520,10 @@
         <translation>不限</translation>
     </message>
     <message>
+        <source>A supervisor lays it down, at Start: All limits...</source>
+        <translation>由主管在“开始”步骤的“所有限值...”中规定。</translation>
+    </message>
+    <message>
         <source>Each swing, with whatever tip, wears the seat of all tips.</source>
         <translation>无论使用哪个测头，每次摆动都会磨损所有测头共用的安装座。</translation>
     </message>
@@ -2372,6 +2376,18 @@
     <message>
         <source>Drift of a witness</source>
         <translation>监视点的漂移</translation>
+    </message>
+    <message>
+        <source>Tips: days in force at most</source>
+        <translation>测头：最长有效天数</translation>
+    </message>
+    <message>
+        <source>Tips: swings of their pen at most</source>
+        <translation>测头：其光笔的最多摆动次数</translation>
+    </message>
+    <message>
+        <source>any number</source>
+        <translation>不限</translation>
     </message>
     <message>
         <source>Usual: {0}.</source>

@@ -19,8 +19,8 @@ from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.history import TipState, known_names, lines, remarks_on
 from lightpen.archive.listing import COLUMNS, save_entries
 from lightpen.archive.queries import Wanted, n_wanted
+from lightpen.model.due_rule import DueRule
 from lightpen.model.origin import Origin
-from lightpen.record.due_rule import DueRule
 
 ALL = Wanted()
 IN_FORCE, REPLACED = TipState.IN_FORCE, TipState.REPLACED

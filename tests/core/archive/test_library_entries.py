@@ -18,7 +18,7 @@ from lightpen.archive.history import known_names
 from lightpen.archive.logbook import ARCHIVE, Logbook
 from lightpen.archive.standing import standings
 from lightpen.formats.decoding import encode_png
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
     add_item,

@@ -17,7 +17,7 @@ from lightpen.archive.history import lines, remarks_on
 from lightpen.archive.logbook import Logbook
 from lightpen.archive.queries import Wanted, last_accepted
 from lightpen.errors import AcceptanceError, ArchiveError
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.folder_archive import RECORDS, FolderArchive
 from lightpen.record.library_changes import Author, add_item, retire_item
 from lightpen.record.names import Names

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lightpen.errors import AcceptanceError, FileError
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
 from lightpen.record.supervision import (
     LIMITS,
@@ -21,7 +22,9 @@ from lightpen.record.supervision import (
 NOON = datetime(2031, 5, 1, 12, tzinfo=UTC)
 SECRET = "correct horse"
 EVE = Signature("Eve", SECRET)
-TIGHT = StationLimits(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005))
+TIGHT = StationLimits(
+    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7, 50))
+)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from msgspec import structs
 
 from lightpen.errors import AcceptanceError, FileError, UsageError
 from lightpen.formats.decoding import encode_png
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.library_changes import (
     Author,
     add_item,

@@ -15,7 +15,7 @@ from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.history import Line
 from lightpen.archive.listing import save_entries
 from lightpen.archive.queries import Wanted
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.results import Result
 from lightpen.verification.trend import Trend
 from lightpen_app.look.theme import GRID
@@ -73,7 +73,7 @@ class HistoryContent(Translated, QWidget):
         self._entry = EntryPanel()
         self._trend_panel = TrendPanel()
         self._selection = SelectionPanel()
-        self._due = DuePanel(self._workbench.due_rule(), self._workbench.around.now)
+        self._due = DuePanel(workbench.around.now)
         self._archive = ArchivePanel()
         for panel in self._panels():
             tab = PageScroll()
@@ -113,6 +113,9 @@ class HistoryContent(Translated, QWidget):
         self._archive.import_requested.connect(self._ask_import)
         self._archive.save_requested.connect(self._ask_save)
 
+        workbench.changed.connect(self._on_workbench_changed)
+
+        self._show_rule()
         self._retranslate()
 
     def table(self) -> HistoryTable:
@@ -191,6 +194,16 @@ class HistoryContent(Translated, QWidget):
         selected = [entry for entry in entries if entry is not None]
         self._selection.set_limits(self._workbench.choices.limits)
         self._selection.set_value(selected, self._trend)
+
+    def _show_rule(self) -> None:
+        is_guarded = self._workbench.supervision.is_guarded
+        self._due.set_rule(self._workbench.due_rule(), is_guarded=is_guarded)
+
+    def _on_workbench_changed(self) -> None:
+        before = self._due.rule()
+        self._show_rule()
+        if self._due.rule() != before:
+            self._reader.read_due(self._due.rule(), self._workbench.library.library)
 
     def _on_rule_changed(self, rule: DueRule) -> None:
         self._workbench.set_due_rule(rule)

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from datetime import datetime
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from lightpen.archive.due import DueTip
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen_app.look.theme import GRID, TextSize, text_label
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.widgets.labelled import field_label, stacked
@@ -15,12 +15,13 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import Figures, NumberTable
 from lightpen_app.widgets.translated import Translated
 
-MOST_DAYS, MOST_SWINGS = 3650, 10_000
 FIELD_WIDTH = 20 * GRID
 
 
 class DuePanel(Translated, QWidget):
     """Shows the tips in force with their due dates, by a rule that can be changed.
+
+    Where a password guards the limits, it is changed with them, at Start.
 
     Parameters
     ----------
@@ -37,13 +38,13 @@ class DuePanel(Translated, QWidget):
 
     def __init__(
         self,
-        rule: DueRule,
         now: Callable[[], datetime],
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._now = now
         self._tips: tuple[DueTip, ...] = ()
+        self._is_guarded = False
 
         # Widgets
         self._days = NumberField("", (1, MOST_DAYS), 0)
@@ -69,9 +70,6 @@ class DuePanel(Translated, QWidget):
         layout.addWidget(self._table)
         layout.addStretch(1)
 
-        self._days.setValue(rule.max_days)
-        self._swings.setValue(rule.max_swings)
-
         # Connections
         for field in self._fields:
             field.valueChanged.connect(self._on_edited)
@@ -81,6 +79,17 @@ class DuePanel(Translated, QWidget):
     def rule(self) -> DueRule:
         """Return the rule as it is typed."""
         return DueRule(round(self._days.value()), round(self._swings.value()))
+
+    def set_rule(self, rule: DueRule, *, is_guarded: bool) -> None:
+        """Show the rule, and whether only a supervisor can change it."""
+        for field, number in zip(
+            self._fields, (rule.max_days, rule.max_swings), strict=True
+        ):
+            with QSignalBlocker(field):
+                field.setValue(number)
+            field.setEnabled(not is_guarded)
+        self._is_guarded = is_guarded
+        self._retranslate()
 
     def set_tips(self, tips: Sequence[DueTip]) -> None:
         """Show other tips."""
@@ -103,9 +112,10 @@ class DuePanel(Translated, QWidget):
             label.setText(text)
             field.setAccessibleName(text)
         self._swings.setSpecialValueText(self.tr("any number"))
-        self._swings.setToolTip(
-            self.tr("Each swing, with whatever tip, wears the seat of all tips.")
-        )
+        laid_down = self.tr("A supervisor lays it down, at Start: All limits...")
+        swings = self.tr("Each swing, with whatever tip, wears the seat of all tips.")
+        self._days.setToolTip(laid_down if self._is_guarded else "")
+        self._swings.setToolTip(laid_down if self._is_guarded else swings)
         now = self._now()
         n_due = sum(tip.is_due(now) for tip in self._tips)
         self._head.setText(

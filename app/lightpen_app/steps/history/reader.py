@@ -13,7 +13,7 @@ from lightpen.archive.history import KnownNames, Line, known_names, lines, remar
 from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import Delivered
 from lightpen.archive.queries import Wanted, n_wanted
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.tip_library import Library
 from lightpen.verification.trend import trend_of
 from lightpen_app.work.job import Job, Report

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
+from lightpen.model.due_rule import MOST_DAYS, MOST_SWINGS, DueRule
 from lightpen.model.limits import StationLimits, VerificationLimits
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -26,6 +27,7 @@ from lightpen_app.widgets.translated import Translated
 SMALLEST, LARGEST = 0.0001, 10.0  # mm
 SWING = ("max_uncertainty", "min_images", "max_images")
 VERIFICATION = tuple(item.name for item in fields(VerificationLimits))
+DUE = {"max_days": (1, MOST_DAYS), "max_swings": (0, MOST_SWINGS)}
 
 
 class LimitsDialog(Translated, QDialog):
@@ -53,6 +55,7 @@ class LimitsDialog(Translated, QDialog):
             else NumberField("mm", (SMALLEST, LARGEST), 4)
             for name in (*SWING, *VERIFICATION)
         }
+        self._fields |= {name: NumberField("", most, 0) for name, most in DUE.items()}
         self._labels: dict[str, QLabel] = {}
         for name, field in self._fields.items():
             label = text_label(TextSize.SMALL, Tone.QUIET)
@@ -112,7 +115,8 @@ class LimitsDialog(Translated, QDialog):
             max_images=most,
         )
         own = {name: typed[name] for name in VERIFICATION}
-        return StationLimits(swing, VerificationLimits(**own))
+        due = DueRule(*(round(typed[name]) for name in DUE))
+        return StationLimits(swing, VerificationLimits(**own), due)
 
     def set_value(self, limits: StationLimits, *, is_guarded: bool) -> None:
         """Show limits, and whether there is a password already."""
@@ -120,6 +124,7 @@ class LimitsDialog(Translated, QDialog):
         for part, names in (
             (limits.swing, SWING),
             (limits.verification, VERIFICATION),
+            (limits.due, DUE),
         ):
             for name in names:
                 self._fields[name].setValue(getattr(part, name))
@@ -181,10 +186,19 @@ class LimitsDialog(Translated, QDialog):
             "location": self.tr("Location error"),
             "repeatability": self.tr("Repeatability: std of the tip"),
             "drift": self.tr("Drift of a witness"),
+            "max_days": self.tr("Tips: days in force at most"),
+            "max_swings": self.tr("Tips: swings of their pen at most"),
         }
+        self._fields["max_swings"].setSpecialValueText(self.tr("any number"))
         usual = StationLimits()
+        parts = {
+            **dict.fromkeys(SWING, usual.swing),
+            **dict.fromkeys(VERIFICATION, usual.verification),
+            **dict.fromkeys(DUE, usual.due),
+        }
         for name, field in self._fields.items():
             self._labels[name].setText(texts[name])
             field.setAccessibleName(texts[name])
-            part = usual.swing if name in SWING else usual.verification
-            field.setToolTip(self.tr("Usual: {0}.").format(f"{getattr(part, name):g}"))
+            number = getattr(parts[name], name)
+            usually = f"{number:g}" if number else self.tr("any number")
+            field.setToolTip(self.tr("Usual: {0}.").format(usually))

@@ -311,7 +311,8 @@ class StartPage(Rearranged, Page):
 
     def _on_all_limits_requested(self) -> None:
         now, choices = self._workbench.preparation, self._workbench.choices
-        limits = StationLimits(now.limits, choices.limits)
+        due = self._workbench.due_rule()
+        limits = StationLimits(now.limits, choices.limits, due)
         is_guarded = self._workbench.supervision.is_guarded
         self._all_limits.set_value(limits, is_guarded=is_guarded)
         self._all_limits.open()

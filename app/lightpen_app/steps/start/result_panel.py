@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
 
 from lightpen.estimation.verdict import Grade
 from lightpen.local_time import local_time
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 from lightpen.record.results import Result
 from lightpen.record.standing import TipStanding
 from lightpen_app.look.grades import GRADE_MARKS

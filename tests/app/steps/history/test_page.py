@@ -31,6 +31,7 @@ from lightpen.archive.entries import Event, Kind
 from lightpen.archive.exchange import export_entries, import_entries
 from lightpen.archive.late_logbook import LateLogbook
 from lightpen.archive.logbook import ARCHIVE
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
@@ -537,6 +538,23 @@ def test_when_tips_are_due_follows_a_rule_that_is_remembered(
     QTest.keyClick(days, Qt.Key.Key_Return)
     desk.until(lambda: panel.figures().cells[0][1] == "2026-01-11")
     assert settings.due_rule().max_days == 7
+
+
+def test_what_a_supervisor_laid_down_is_not_changed_by_anybody(desk: Desk) -> None:
+    desk.enter(3)
+    folder, eve = desk.workbench.folder, Signature("Eve", "correct horse")
+    limits = StationLimits(due=DueRule(7))
+    names = replace(desk.workbench.preparation.names, station="Hall 2")
+    desk.workbench.set_preparation(replace(desk.workbench.preparation, names=names))
+    desk.open()
+    laid_down = lay_down(folder, "Hall 2", limits, eve, "", NOON)
+    desk.workbench.set_supervision(laid_down)
+
+    panel = desk.child(DuePanel)
+    desk.until(lambda: panel.figures().rows)
+    desk.until(lambda: panel.figures().cells[0][1] == "2026-01-11")
+    assert not any(field.isEnabled() for field in panel.findChildren(NumberField))
+    assert panel.rule() == DueRule(7)
 
 
 def test_what_was_changed_is_said_in_the_list_and_by_a_check(desk: Desk) -> None:

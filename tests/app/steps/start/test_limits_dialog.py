@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtWidgets import QDialogButtonBox, QLineEdit
 from pytestqt.qtbot import QtBot
 
+from lightpen.model.due_rule import DueRule
 from lightpen.model.limits import StationLimits, SwingLimits, VerificationLimits
 from lightpen.record.supervision import Signature, Supervision
 from lightpen_app.steps.start.limits_dialog import LimitsDialog
@@ -14,7 +15,9 @@ from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.work.workbench import Workbench
 
-TIGHT = StationLimits(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005))
+TIGHT = StationLimits(
+    *(SwingLimits(0.008, 80, 200), VerificationLimits(radius=0.005), DueRule(7, 50))
+)
 
 
 @pytest.fixture

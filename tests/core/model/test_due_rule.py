@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from lightpen.record.due_rule import DueRule
+from lightpen.model.due_rule import DueRule
 
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 USUAL_DAYS = 30
+MOST_DAYS, MOST_SWINGS = 3650, 10_000  # that a rule is chosen with
 
 
 @dataclass(frozen=True)
