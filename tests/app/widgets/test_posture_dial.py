@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QColor, QImage
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen.arrays import IntArray
 from lightpen.model.coverage import measure_coverage
 from lightpen.model.posture import Posture, posture_of, rotations_of
 from lightpen.simulator.sample_pens import eight_led_pen
-from lightpen_app.look.theme import DARK
+from lightpen_app.look.theme import DARK, LIGHT, apply_theme
 from lightpen_app.widgets.posture_dial import (
     BAR_SHARE,
     DialValue,
@@ -24,6 +25,7 @@ from lightpen_app.widgets.posture_dial import (
 SIDE = 600
 RIM = 0.435 * SIDE
 RIGHT, AWAY, LEFT, TOWARDS = (quarter * math.pi / 2 for quarter in range(4))
+FIRST = (0.35, 0.0)  # in a field, beside its number
 WANTED: IntArray = np.full((2, 8), 6, dtype=np.int64)
 
 
@@ -186,6 +188,22 @@ def test_the_camera_is_named_from_whichever_side_it_looks(
 
     # Words that are turned are shaded otherwise, by 2 %; the word is a quarter of all.
     assert n_muted(seen(dial)) == pytest.approx(wanted, rel=0.05)
+
+
+def test_the_fields_are_drawn_anew_for_what_else_changes_them(
+    dial: PostureDial, dressed: QApplication
+) -> None:
+    dial.set_value(DialValue(needed=WANTED, n_upright_needed=6))
+    dark = seen(dial)
+    apply_theme(dressed, LIGHT)
+    light = seen(dial)
+
+    assert color_at(dark, *FIRST) == DARK.raised
+    assert color_at(light, *FIRST) == LIGHT.raised
+
+    dial.resize(SIDE // 2, round(SIDE // 2 * (1 + BAR_SHARE)))
+    place = QPointF(0.5 + FIRST[0] * 0.435, 0.5 - FIRST[1] * 0.435) * (SIDE // 2)
+    assert seen(dial).pixelColor(place.toPoint()).name() == LIGHT.raised
 
 
 def n_muted(image: QImage) -> float:
