@@ -154,14 +154,10 @@ def open_file(path: Path) -> Database:
         raise ArchiveError(error.sentence) from error
 
     def connect() -> sqlite3.Connection:
-        connection = _connected(str(path))
-        try:
+        with _closed_on_failure(_connected(str(path))) as connection:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = FULL")
-        except sqlite3.Error:
-            connection.close()
-            raise
-        return connection
+            return connection
 
     return _brought_up_to_date(Database(_sqlite_engine(connect), name, path))
 
@@ -249,9 +245,9 @@ def _read_only(path: Path) -> Database:
     place = f"{path.absolute().as_uri()}?{mode}"
 
     def connect() -> sqlite3.Connection:
-        connection = _connected(place)
-        earlier.show_as_now(connection)
-        return connection
+        with _closed_on_failure(_connected(place)) as connection:
+            earlier.show_as_now(connection)
+            return connection
 
     engine = _sqlite_engine(connect)
     return Database(engine, printable(str(path)), path)
@@ -276,6 +272,15 @@ def _connected(place: str) -> sqlite3.Connection:
     # A text that was damaged is read all the same, to be named.
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return connection
+
+
+@contextmanager
+def _closed_on_failure(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
 
 
 def _begin(connection: Connection) -> None:
