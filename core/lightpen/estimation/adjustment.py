@@ -22,12 +22,7 @@ from lightpen.estimation.contradictions import (
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import (
-    Forms,
-    drift_forms,
-    inverse,
-    lean_forms,
-)
+from lightpen.estimation.unknowns import Forms, drift_forms, inverse, lean_forms
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit

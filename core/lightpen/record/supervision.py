@@ -16,7 +16,6 @@ from datetime import datetime
 from pathlib import Path
 
 from msgspec import Struct, to_builtins
-from msgspec import field as kept
 
 from lightpen.errors import AcceptanceError, FileError
 from lightpen.estimation.report import record_bytes
@@ -78,7 +77,7 @@ class KeptLimits(Struct):
 
     swing: _SwingLimits
     verification_mm: VerificationLimits
-    due: DueRule = kept(default_factory=DueRule)
+    due: DueRule = DueRule()
 
     def entries(self) -> dict[str, float]:
         """Return each limit by its name."""

@@ -42,9 +42,10 @@ from lightpen.swing.rules import (
     resume,
     stillness,
 )
-from lightpen.swing.serial_queue import Act, OneTask, Report, Start
+from lightpen.swing.serial_queue import OneTask, Report, Start
 from lightpen.swing.state import Happening, Phase, SwingEvent, SwingSetup, SwingState
 from lightpen.swing.status import Activity, SwingListener, SwingStatus
+from lightpen.swing.troubles import Troubles
 
 T = TypeVar("T")
 
@@ -79,14 +80,14 @@ class SwingCourse:
         self._archive = archive
         self._listener = listener
         self._now = now
-        self._entries = LogbookEntries(logbook, start, self._tell_trouble)
+        self._troubles = Troubles(listener)
+        self._entries = LogbookEntries(logbook, start, self._troubles.tell)
         self._status = SwingStatus()
         self._attendance = Attendance()
         self._intake: Intake | None = None
         self._record: Record | None = None  # as it was when it was entered
         self._wanted: Mapping[int, str] = {}  # images that are to be taken out
         self._tried: Mapping[int, str] = {}  # of them, those being computed without
-        self._trouble: Sentence | None = None
         self._task = OneTask(start, self.cancel, listener.on_progress)
         self._stopped_at: SwingStatus | None = None  # by a bug
 
@@ -105,7 +106,7 @@ class SwingCourse:
         try:
             self.pause()
             self._republish()
-            self._tell_trouble(
+            self._troubles.tell(
                 sentence(
                     "swing.bug",
                     "The program made a mistake of its own. The images kept so far "
@@ -130,23 +131,7 @@ class SwingCourse:
 
     def go_on(self, swing: Resumable) -> None:
         """Go on with a swing that was read back, or say why it cannot be."""
-        self._trying(lambda: self._enter(swing))
-
-    def _trying(self, act: Act) -> None:
-        """Do something that may fail; then it is told, and all stays as it was."""
-        try:
-            act()
-        except LightpenError as error:
-            self._tell_trouble(error.sentence)
-
-    def _tell_trouble(self, trouble: Sentence) -> None:
-        self._trouble = trouble
-        self._listener.on_trouble(trouble)
-
-    def _relieve(self) -> None:
-        trouble, self._trouble = self._trouble, None
-        if trouble is not None:
-            self._listener.on_relief(trouble)
+        self._troubles.trying(lambda: self._enter(swing))
 
     # Attendance
 
@@ -203,7 +188,7 @@ class SwingCourse:
             self._enter(read_resumable(folder))  # so with the files as recorded
         except LightpenError as error:
             self._attendance = replace(self._attendance, refusal=error.sentence)
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence)
             self._republish()
 
     def _enter(self, swing: Resumable) -> None:
@@ -218,7 +203,7 @@ class SwingCourse:
         self._intake, self._record = intake, record
         if record.folder != status.record_folder:
             self._attendance = self._attendance.begun()
-        self._relieve()
+        self._troubles.end()
         self._publish(
             SwingStatus(
                 setup=swing.setup,
@@ -272,12 +257,12 @@ class SwingCourse:
             )
         except LightpenError as error:
             self._become(Transition(pause(before)), is_troubled=True)
-            self._tell_trouble(error.sentence)
+            self._troubles.tell(error.sentence)
             return
         if transition is None:
             return
         if any(event.what is Happening.KEPT for event in transition.events):
-            self._relieve()
+            self._troubles.end()
         self._become(transition)
 
     def _watch(self, before: SwingState, sighting: Sighting, frame: Frame) -> None:
@@ -325,7 +310,7 @@ class SwingCourse:
 
     def set_aside(self) -> None:
         """Leave the swing for good, or say why it cannot be noted."""
-        self._trying(self._discard)
+        self._troubles.trying(self._discard)
 
     def _discard(self) -> None:
         status = self._status
@@ -336,7 +321,9 @@ class SwingCourse:
         else:
             self._intake.discard()
         self.abandon()
-        self._trying(lambda: self._entries.enter_set_aside(status, self._now()))
+        self._troubles.trying(
+            lambda: self._entries.enter_set_aside(status, self._now())
+        )
 
     def start_over(self) -> None:
         """Set the swing aside, if its tip is not in force, and begin anew."""
@@ -369,7 +356,7 @@ class SwingCourse:
             self._on_unread(error.sentence)
 
     def _on_unread(self, why: Sentence) -> None:
-        self._tell_trouble(why)
+        self._troubles.tell(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _close_record(self) -> None:
@@ -457,7 +444,7 @@ class SwingCourse:
             except LightpenError as error:
                 self._keep_solution(before, error.sentence)
                 return
-        self._relieve()
+        self._troubles.end()
         verdict = solved.assessment.verdict
         goes_on = self._wanted != solution.taken_out
         activity = Activity.SOLVING if goes_on else Activity.NONE
@@ -492,7 +479,7 @@ class SwingCourse:
             self._solve_again(solution)
             return
         self._wanted = solution.taken_out
-        self._tell_trouble(why)
+        self._troubles.tell(why)
         self._publish(replace(self._status, activity=Activity.NONE))
 
     def _conclude(self, status: SwingStatus, reason: Sentence, passed: bool) -> None:
@@ -504,7 +491,7 @@ class SwingCourse:
 
     def accept(self, reason: str, signature: Signature | None = None) -> None:
         """Put the tip in force, or say why it cannot be."""
-        self._trying(lambda: self._store(reason, signature))
+        self._troubles.trying(lambda: self._store(reason, signature))
 
     def _store(self, reason: str, signature: Signature | None) -> None:
         status, solution = self._status, self._status.solution
@@ -515,8 +502,8 @@ class SwingCourse:
             now = self._now()
             result = accept(self._archive, solution, now, reason, signature)
             status = replace(status, result=result)
-            self._relieve()
-            self._trying(self._entries.enter_owed)
+            self._troubles.end()
+            self._troubles.trying(self._entries.enter_owed)
         except AcceptanceError:  # something else has come into force meanwhile
             record = open_record(solution.source.folder)
             assessment = assess(self._archive, record, solution)
@@ -527,14 +514,14 @@ class SwingCourse:
 
     def take_back(self, result: Result, operator: str) -> None:
         """Let the result before one in force be in force again, or say why not."""
-        self._trying(lambda: self._withdraw(result, operator))
+        self._troubles.trying(lambda: self._withdraw(result, operator))
 
     def _withdraw(self, result: Result, operator: str) -> None:
         self._archive.take_back(result, operator, self._now())
         status, own = self._status, self._status.result
         if own is not None and own.record == result.record:
             status = replace(status, result=None)
-        self._trying(self._entries.enter_owed)
+        self._troubles.trying(self._entries.enter_owed)
         self._publish(replace(status, taken_back=result))
 
     def open_logbook(self) -> None:
@@ -545,7 +532,7 @@ class SwingCourse:
         """Leave the swing as it is on the disk, and let go of the archive."""
         self.abandon()
         self._entries.stop()
-        self._trying(self._entries.close)
+        self._troubles.trying(self._entries.close)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ takes long done elsewhere.
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
+from enum import Enum, auto
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -23,6 +24,7 @@ from lightpen.record.supervision import Signature
 from lightpen.sentences import Sentence, sentence
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.serial_queue import OneTask, Report, Start
+from lightpen.swing.troubles import Troubles
 from lightpen.verification.acceptance import accepting_supervisor
 from lightpen.verification.choices import WANTING, TaskKind, VerificationChoices
 from lightpen.verification.conclusion import Conclusion
@@ -49,7 +51,6 @@ from lightpen.verification.status import (
 from lightpen.verification.tip_in_force import TipInForce, read_tip_in_force
 from lightpen.verification.touch_images import NewRecord, new_record
 from lightpen.verification.touching import read_rules
-from lightpen.verification.troubles import Cause, Troubles
 from lightpen.verification.under_way import InterruptedVerification, ReadImages
 from lightpen.verification.witness import LampWatch
 
@@ -70,6 +71,13 @@ BUG = sentence(
 )
 
 T = TypeVar("T")
+
+
+class Cause(Enum):
+    """What a trouble comes of that can end by itself."""
+
+    IMAGES = auto()  # of touches cannot be kept
+    NOTE = auto()  # what it takes to go on cannot be kept
 
 
 class VerificationCourse:
@@ -166,10 +174,7 @@ class VerificationCourse:
 
     def accept(self, reason: str, signature: Signature | None) -> None:
         """Accept the tip though something was found against it, or say why not."""
-        try:
-            self._accept(reason.strip(), signature)
-        except LightpenError as error:
-            self._troubles.tell(error.sentence)
+        self._troubles.trying(lambda: self._accept(reason.strip(), signature))
 
     def _accept(self, reason: str, signature: Signature | None) -> None:
         self._write()  # what is accepted is named by its files
