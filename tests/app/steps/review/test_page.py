@@ -140,6 +140,12 @@ class Bed:
         )
         return workbench
 
+    def solve_uncertain(self) -> Workbench:
+        """Solve the swing with a limit that its U is beyond."""
+        solution = self.solve().run.status.solution
+        assert solution is not None
+        return self.solve(0.7 * solution.calibration.budget.weakest_uncertainty)
+
     def solve_after(self, difference: Sequence[float], pen: str = "LP-04") -> Workbench:
         """Solve the swing after another tip, so far away, was put in force, mm."""
         tip_then = tip(self.solve()) - difference
@@ -383,10 +389,7 @@ def test_the_tip_is_shown_to_the_digit_of_its_uncertainty(
 def test_an_uncertain_tip_is_to_be_checked_and_more_images_are_advised(
     bed: Bed,
 ) -> None:
-    workbench = bed.solve()
-    assert workbench.run.status.solution is not None
-    uncertainty = workbench.run.status.solution.calibration.budget.weakest_uncertainty
-    bed.solve(0.7 * uncertainty)
+    workbench = bed.solve_uncertain()
     page = bed.show()
 
     assert banner(page).word == "CHECK: Not certain enough"
@@ -404,10 +407,7 @@ def test_the_settings_are_to_be_checked_where_no_file_makes_the_tip_uncertain(
 ) -> None:
     folder = bed.workbench.run.records_folder / "swing"
     bed.rewrite_header(folder, {PREFIX + assumed: value})
-    workbench = bed.solve()
-    assert workbench.run.status.solution is not None
-    uncertainty = workbench.run.status.solution.calibration.budget.weakest_uncertainty
-    bed.solve(0.7 * uncertainty)
+    bed.solve_uncertain()
     page = bed.show()
 
     assert banner(page).word == "CHECK: Not certain enough"
