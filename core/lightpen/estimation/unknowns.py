@@ -425,14 +425,15 @@ class Unknowns:
             Right side that belongs to it.
         """
         find = partial(find_beside, information, right)
-        alone = find(self.oval, np.diag(self._seat_variances(NO_COMPONENTS)))
-        waves_alone = self._found_waves(find, NO_COMPONENTS)
+        truest = self._seat_variances(NO_COMPONENTS)
+        alone = find(self.oval, np.diag(truest))
+        waves_alone = found = self._found_waves(find, truest, NONE)
         ahead = 0.5 * (alone.gain - max(wave.gain for wave in waves_alone))
         oval = _likely(alone) if ahead >= 0 else NONE
-        waves = tuple(
-            _likely(wave, self.priors.form_error)
-            for wave in self._found_waves(find, before._replace(oval=oval))
-        )
+        variances = self._seat_variances(before)
+        if oval.sigma > 0 or (variances > truest).any():
+            found = self._found_waves(find, variances, oval)
+        waves = tuple(_likely(wave, self.priors.form_error) for wave in found)
         if oval.sigma > 0:
             doubt = float(np.exp(-0.5 * np.logaddexp(0.0, ahead)))
             waves = tuple(
@@ -447,10 +448,10 @@ class Unknowns:
         return oval, waves
 
     def _found_waves(
-        self, find: Callable[..., Component], beside: Components
+        self, find: Callable[..., Component], variances: FloatArray, oval: Component
     ) -> list[Component]:
-        variances = self._seat_variances(beside)
-        by_oval = beside.oval.sigma**2 * self.oval @ self.oval.T
+        """Return the component of each kind, beside the variances of the others."""
+        by_oval = oval.sigma**2 * self.oval @ self.oval.T
         first = self.columns.whole_seat.start
         waves = []
         for place in self.columns.seat:

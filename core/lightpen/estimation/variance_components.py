@@ -106,9 +106,10 @@ def find_beside(
     stated : float
         Standard deviation beside which it is judged, mm.
     """
-    beside = np.linalg.inv(np.eye(len(others)) + information @ others)
-    S = moves.T @ beside @ information @ moves
-    return find_component(0.5 * (S + S.T), moves.T @ beside @ right, stated)
+    own = np.column_stack([information @ moves, right])
+    left = moves.T @ np.linalg.solve(np.eye(len(others)) + information @ others, own)
+    S = left[:, :-1]
+    return find_component(0.5 * (S + S.T), left[:, -1], stated)
 
 
 def _expected(sigmas: FloatArray, costs: FloatArray) -> float:
