@@ -300,6 +300,8 @@ def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
     middle = pen.leds.mean(axis=0)
     scale = 1 + float(_drawn(priors.size_covariance, rng)[0])
     leds = middle + scale * (pen.leds - middle) + moves.reshape(-1, 3)
+    if priors.reading is not None:
+        leds += priors.reading.shift * rng.standard_normal() * pen.normals
     diameter = pen.diameter + float(_drawn(priors.diameter.covariance, rng)[0])
     return replace(pen, leds=leds, diameter=diameter)
 

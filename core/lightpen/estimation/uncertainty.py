@@ -25,7 +25,7 @@ from lightpen.estimation.bundle import Z_99, Bundle
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import N_CONE
 from lightpen.estimation.priors import Priors
-from lightpen.estimation.unknowns import FORMS
+from lightpen.estimation.unknowns import FORMS, whole_moves
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
@@ -220,6 +220,9 @@ def shares_of(
     # Centres that are off in each posture its own way.
     biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
     biased *= (priors.center_bias / bundle.sigma) ** 2
+    if priors.reading is not None:
+        along_normals = priors.reading.shift * _by_shift_along_normals(bundle)
+        biased += np.outer(along_normals, along_normals)
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [
@@ -285,6 +288,20 @@ def _by_forms(bundle: Bundle, variances: Sequence[float]) -> FloatArray:
     goes_once = np.arange(len(by_form)) < FORMS[0]
     once, others = (np.where(some, by_form, 0.0) for some in (goes_once, ~goes_once))
     return np.asarray(np.kron(np.diag(once), axes) + np.kron(np.diag(others), alike))
+
+
+def _by_shift_along_normals(bundle: Bundle) -> FloatArray:
+    """Return what tip and cone are off by where all LEDs stand 1 mm along, (6,)."""
+    pen, tip = bundle.unknowns.start.pen, bundle.state.tip_pen
+    moves = pen.normals.ravel()
+    shift, turn = np.linalg.lstsq(whole_moves(pen.leds), moves, rcond=None)[0].reshape(
+        2, 3
+    )
+    at, shape = bundle.columns.leds, bundle.unknowns.basis.T @ moves
+    off = -bundle.covariance[:6, at] @ bundle.prior_information[at, at] @ shape
+    # A move of the pen as a whole is no error of its LEDs: the tip is off by it.
+    off[:3] += np.cross(turn, pen.leds.mean(axis=0) - tip) - shift
+    return np.asarray(off)
 
 
 def once_round(rotations: FloatArray) -> FloatArray:

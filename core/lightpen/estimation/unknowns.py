@@ -521,10 +521,17 @@ def _likely(found: Component, stated: float = 0.0) -> Component:
 
 def led_basis(leds: FloatArray) -> FloatArray:
     """Return all moves of LEDs but those of the pen as a whole, (3 L, 3 L - 6)."""
+    return np.asarray(np.linalg.qr(whole_moves(leds), mode="complete")[0][:, 6:])
+
+
+def whole_moves(leds: FloatArray) -> FloatArray:
+    """Return the moves of LEDs by those of the pen as a whole, (3 L, 6).
+
+    Its shifts, mm, and its turns about the middle of the LEDs, rad.
+    """
     shifts = np.tile(np.eye(3), (len(leds), 1))
     turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
-    whole = np.concatenate([shifts, turns], axis=1)
-    return np.asarray(np.linalg.qr(whole, mode="complete")[0][:, 6:])
+    return np.concatenate([shifts, turns], axis=1)
 
 
 def _information(covariance: FloatArray) -> FloatArray:
