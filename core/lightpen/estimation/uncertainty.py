@@ -25,7 +25,7 @@ from lightpen.estimation.bundle import Z_99, Bundle
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import N_CONE
 from lightpen.estimation.priors import Priors
-from lightpen.estimation.unknowns import FORMS, whole_moves
+from lightpen.estimation.unknowns import FORMS, axes_of_cone, whole_moves
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
@@ -310,8 +310,7 @@ def once_round(rotations: FloatArray) -> FloatArray:
     Times the variance that the other forms have, by direction in the rig; rotations
     (N, 3, 3) are of rig_from_pen.
     """
-    along = rotations[:, :, 1].mean(axis=0)
-    along /= np.linalg.norm(along)
+    along = axes_of_cone(rotations)[2]
     return np.eye(3) - (1 - ALONG**2) * np.outer(along, along)
 
 

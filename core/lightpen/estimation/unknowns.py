@@ -27,6 +27,7 @@ from lightpen.model.rigid import rotation_from_vector, skew
 ROUNDS = 3  # of finding each component beside the others
 FULL_LEAN = 0.15  # sine of the tilt from which on a seat shows most of its form
 FORMS = (2, 2, 2, 1)  # of one, two, three waves round the cone, and of the tilt
+SMALLEST = 1e-9  # size of a form; less is rounding
 EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
 NONE = Component(0.0, 0.0)
 
@@ -156,22 +157,43 @@ def oval_seat(rotations: FloatArray) -> FloatArray:
     """
     _, sizes = _lean(rotations)
     cos1, sin1, _, _, cos3, sin3, _ = np.eye(len(sizes)) * sizes
-    x, _, z = np.eye(N_CONE)
-    cosine = np.outer(cos1 + cos3, x) + np.outer(sin3 - sin1, z)
-    sine = np.outer(sin1 + sin3, x) + np.outer(cos1 - cos3, z)
+    right, away, _ = axes_of_cone(rotations)
+    cosine = np.outer(cos1 + cos3, right) + np.outer(sin3 - sin1, away)
+    sine = np.outer(sin1 + sin3, right) + np.outer(cos1 - cos3, away)
     return np.stack([0.5 * cosine.ravel(), 0.5 * sine.ravel()], axis=1)
+
+
+def axes_of_cone(rotations: FloatArray) -> FloatArray:
+    """Return the axes of the cone in the rig, one a row: two across, one along, (3, 3).
+
+    It opens to where the pen points on average, wherever the camera looks from; before
+    a camera that looks at it from its side the three are right, away, and up.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of rig_from_pen.
+    """
+    along = rotations[:, :, 1].mean(axis=0)
+    along /= np.linalg.norm(along)
+    most_across = np.eye(N_CONE)[np.argmin(np.abs(along).round(1))]
+    right = most_across - (most_across @ along) * along
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(along, right), along])
 
 
 def _lean(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the forms of the lean less their means, (N, 7), and their sizes, (7,)."""
-    x, z = rotations[:, 0, 1], rotations[:, 2, 1]
-    radius = np.hypot(x, z)
+    right, away, _ = axes_of_cone(rotations) @ rotations[:, :, 1].T
+    radius = np.hypot(right, away)
     weight = radius / (radius + FULL_LEAN)
-    angle = np.arctan2(z, x)
+    angle = np.arctan2(away, right)
     waves = [f(n * angle) * weight for n in (1, 2, 3) for f in (np.cos, np.sin)]
     forms = np.stack([*waves, weight**2], axis=1)
     forms -= forms.mean(axis=0)
-    return forms, np.sqrt(np.mean(forms**2, axis=0))
+    sizes = np.sqrt(np.mean(forms**2, axis=0))
+    is_there = sizes > SMALLEST
+    return np.where(is_there, forms, 0.0), np.where(is_there, sizes, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
