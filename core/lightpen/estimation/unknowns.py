@@ -27,6 +27,7 @@ from lightpen.model.rigid import rotation_from_vector, skew
 ROUNDS = 3  # of finding each component beside the others
 FULL_LEAN = 0.15  # sine of the tilt from which on a seat shows most of its form
 FORMS = (2, 2, 2, 1)  # of one, two, three waves round the cone, and of the tilt
+UPRIGHT = 0.966  # cosine of 15 degrees, to which 15 images tell where a cone opens
 SMALLEST = 1e-9  # size of a form; less is rounding
 EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
 NONE = Component(0.0, 0.0)
@@ -166,8 +167,9 @@ def oval_seat(rotations: FloatArray) -> FloatArray:
 def axes_of_cone(rotations: FloatArray) -> FloatArray:
     """Return the axes of the cone in the rig, one a row: two across, one along, (3, 3).
 
-    It opens to where the pen points on average, wherever the camera looks from; before
-    a camera that looks at it from its side the three are right, away, and up.
+    Before a camera that looks at it from its side they are right, away, and up. Where
+    the pen points elsewhere on average by more than images are drawn unevenly, it is
+    the camera that looks down or lies on its side: the cone opens to where it points.
 
     Parameters
     ----------
@@ -176,6 +178,8 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
     """
     along = rotations[:, :, 1].mean(axis=0)
     along /= np.linalg.norm(along)
+    if abs(along[1]) > UPRIGHT:
+        along = np.array([0.0, np.copysign(1.0, along[1]), 0.0])
     most_across = np.eye(N_CONE)[np.argmin(np.abs(along).round(1))]
     right = most_across - (most_across @ along) * along
     right /= np.linalg.norm(right)
