@@ -32,7 +32,7 @@ from lightpen.swing.state import Phase
 from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:
-    from tests.app.conftest import OpenWizard, Walker
+    from tests.app.conftest import OpenWizard, SolvingOn, Walker
 
 # Of raising a window and grabbing the keyboard, which menus do.
 pytestmark = pytest.mark.qt_log_ignore("^This plugin does not support ")
@@ -302,9 +302,10 @@ def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
 ) -> None:
     n_inputs = capturing.n_inputs
 
-    capturing.operator.cover(2.0)
+    capturing.operator.cover()
     capturing.until_says("PEN LOST")
     assert capturing.tells("nothing is lost meanwhile")
+    capturing.operator.uncover()
     keep_on(capturing)
 
     capturing.operator.lift()
@@ -375,12 +376,15 @@ def finish_now(walker: "Walker") -> None:
     walker.click("Finish now")
 
 
-def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
+def test_computing_is_cancelled_and_begun_again(
+    capturing: "Walker", solving_on: "SolvingOn"
+) -> None:
     keep_on(capturing, 20)
-    finish_now(capturing)
-    capturing.until(lambda: capturing.offers("Stop computing"))
-    capturing.click("Stop computing")
-    capturing.until_says("STOPPED")
+    with solving_on():
+        finish_now(capturing)
+        capturing.until(lambda: capturing.offers("Stop computing"))
+        capturing.click("Stop computing")
+        capturing.until_says("STOPPED")
     assert capturing.says("The tip is not computed yet.")
 
     capturing.click("Compute again")
