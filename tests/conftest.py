@@ -125,7 +125,9 @@ def loopback() -> Iterator[str]:
     require_library("aravis")
     from tests.gige_simulator import ADDRESS
 
-    with FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock"):
+    lock = FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock")
+    # Asked for so often that no process with one such test after the other keeps it.
+    with lock.acquire(poll_interval=0.002):
         yield ADDRESS
 
 

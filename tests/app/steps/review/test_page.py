@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from threading import Event
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pytest
@@ -77,6 +77,9 @@ from lightpen_app.widgets.reason_bar import ReasonBar
 from lightpen_app.widgets.sign_label import SignLabel
 from lightpen_app.widgets.state_banner import State, StateBanner
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.conftest import SolvingOn
 
 W = TypeVar("W", bound=QWidget)
 
@@ -1043,17 +1046,18 @@ def test_taking_out_too_many_is_refused_and_nothing_is_lost(
 
 
 def test_a_computation_shows_its_progress_and_can_be_cancelled(
-    bed: Bed, monkeypatch: pytest.MonkeyPatch
+    bed: Bed, monkeypatch: pytest.MonkeyPatch, solving_on: "SolvingOn"
 ) -> None:
     monkeypatch.setattr("lightpen_app.steps.review.page.PATIENCE_MS", 0)
     workbench = bed.solve()
     page = bed.show()
     before = workbench.run.status.solution
 
-    workbench.run.runner.solve()
-    bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
-    click(page, "Cancel")
-    bed.qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
+    with solving_on():
+        workbench.run.runner.solve()
+        bed.qtbot.waitUntil(lambda: button(page, "Cancel").isVisible())
+        click(page, "Cancel")
+        bed.qtbot.waitUntil(lambda: not workbench.run.status.is_solving)
 
     assert not button(page, "Cancel").isVisible()
     assert workbench.run.status.solution is before
