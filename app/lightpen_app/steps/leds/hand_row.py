@@ -7,7 +7,6 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import LiveView
-from lightpen_app.work.swing_run import SwingRun
 
 COVERED = (1, 2, 3)  # LEDs
 COVER_S = 3.0
@@ -20,16 +19,11 @@ class HandRow(Translated, QWidget):
     ----------
     live : LiveView
         Whose operator it is.
-    run : SwingRun
-        While a swing is captured, the pen is left to it.
     """
 
-    def __init__(
-        self, live: LiveView, run: SwingRun, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, live: LiveView, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._live = live
-        self._run = run
 
         # Widgets
         self._lean = PushButton()
@@ -48,7 +42,6 @@ class HandRow(Translated, QWidget):
         self._lean.toggled.connect(self._on_lean_toggled)
         self._cover.clicked.connect(self._on_cover_clicked)
         live.connection_changed.connect(self._refresh)
-        run.changed.connect(self._refresh)
 
         self._retranslate()
         self._refresh()
@@ -58,15 +51,14 @@ class HandRow(Translated, QWidget):
         self._lean.setChecked(False)
 
     def _refresh(self) -> None:
-        is_ours = self._live.operator is not None
-        is_ours = is_ours and not self._run.status.is_capturing
-        self.setVisible(is_ours)
-        if not is_ours:
+        is_simulated = self._live.operator is not None
+        self.setVisible(is_simulated)
+        if not is_simulated:
             self._lean.setChecked(False)
 
     def _on_lean_toggled(self, leans: bool) -> None:
         operator = self._live.operator
-        if operator is None or self._run.status.is_capturing:
+        if operator is None:
             return
         if leans:
             operator.swing()

@@ -72,7 +72,7 @@ class LedsPage(Rearranged, Page):
         self._file = LedFilePanel()
         self._table = LedTablePanel(UndoButtons(self._edits, self))
         self._space = FramePanel()
-        self._hand = HandRow(workbench.live, workbench.run)
+        self._hand = HandRow(workbench.live)
         self._match = MatchPanel(self._hand)
         self._watch = PenWatch(self)
 
