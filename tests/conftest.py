@@ -84,6 +84,14 @@ def no_power_cut() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def one_thread_of_opencv() -> None:
+    """OpenCV does not spread an image over threads, as in the program."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
 def no_broadcast() -> Iterator[None]:
     """No test asks the network for cameras, whatever keys it presses."""
     from lightpen.cameras import aravis, basler

@@ -120,7 +120,7 @@ def measured(state: SessionState) -> list[object]:
         None if state.circle is None else state.circle.uncertainty,
         None if state.length is None else state.length.errors.tolist(),
         None if state.length is None else state.length.uncertainties.tolist(),
-        [task for task, _ in state.unwitnessed],
+        [each.task for each in state.unwitnessed],
     ]
 
 
