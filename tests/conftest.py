@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# How long an example takes depends on what else the machine does.
-settings.register_profile("patient", deadline=None)
+# How long an example takes depends on what else the machine does. The examples are the
+# same in every run, as all that is random here.
+settings.register_profile("patient", deadline=None, derandomize=True)
 settings.load_profile("patient")
 
 HOLDER = """
