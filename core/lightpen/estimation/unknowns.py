@@ -346,13 +346,11 @@ class Unknowns:
         at, priors = self.columns, self.priors
         prior = np.zeros((self.number, self.number))
         for place, each in zip(at.cameras, priors.cameras, strict=True):
-            prior[place, place] = _information(each.covariance)
+            prior[place, place] = known_by(each.covariance)
         if priors.extrinsics is not None:
-            prior[at.extrinsics, at.extrinsics] = _information(
-                priors.extrinsics.covariance
-            )
-        prior[at.diameter, at.diameter] = _information(priors.diameter.covariance)
-        prior[at.scale, at.scale] = _information(priors.size_covariance)
+            prior[at.extrinsics, at.extrinsics] = known_by(priors.extrinsics.covariance)
+        prior[at.diameter, at.diameter] = known_by(priors.diameter.covariance)
+        prior[at.scale, at.scale] = known_by(priors.size_covariance)
         return prior
 
     def measured(
@@ -560,7 +558,8 @@ def whole_moves(leds: FloatArray) -> FloatArray:
     return np.concatenate([shifts, turns], axis=1)
 
 
-def _information(covariance: FloatArray) -> FloatArray:
+def known_by(covariance: FloatArray) -> FloatArray:
+    """Return the information in what is stated; what is so as exact may be rounded."""
     floor = np.maximum(np.diag(covariance) * EXACT, EXACT**2)
     return inverse(covariance + np.diag(floor))
 
