@@ -244,6 +244,13 @@ class Change:
         )
 
 
+def repeats(doubt: Sentence, reason: Sentence) -> bool:
+    """Return whether a doubt only says again what is the reason of the verdict."""
+    if (doubt.code, reason.code) == ("warning.led-displaced", Code.LED_DISPLACED):
+        return doubt.values["led"] == reason.values["led"]
+    return doubt.code == reason.code
+
+
 def change_since(
     tip_pen: FloatArray,
     uncertainty: FloatArray,

@@ -18,6 +18,7 @@ from lightpen.estimation.verdict import (
     judge,
     judge_change,
     judge_unknown,
+    repeats,
 )
 from lightpen.local_time import local_time
 from lightpen.messages import last_unknown, too_little_tilt
@@ -97,7 +98,7 @@ def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
         _bare_sides(solution, limits) if is_of_recording(record) else [],
         warnings_of(solution.calibration),
     )
-    doubts = tuple(each for each in all_doubts if each.code != verdict.reason.code)
+    doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
     return Assessment(verdict, last, change, doubts, limit)
 
 
