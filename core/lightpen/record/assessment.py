@@ -154,6 +154,6 @@ def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Sentence]:
     """Name the postures that recorded images lack: nobody was asked to lean there."""
     counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
     bare = np.flatnonzero(counts == 0)
-    if not len(bare):
+    if not (len(bare) and limits.min_per_field):
         return []
     return [too_little_tilt(limits.min_per_field * len(bare), map(int, bare))]
