@@ -194,13 +194,3 @@ def test_a_reading_goes_on_with_its_own_recording_only(
     assert not swing.is_of([SourceChoice(SourceKind.RECORDED, str(tmp_path))])
     assert not swing.is_of([SourceChoice(SourceKind.SIMULATED)])
     assert source(swing.record).origin is Origin.SIMULATED
-
-
-def test_the_curves_of_the_tip_grow_while_images_are_read(
-    recording: Recording, station: "Station"
-) -> None:
-    recording.show(12)
-
-    trace = station.state.trace
-    assert len(trace.n_images) > 5
-    assert trace.n_images[-1] == station.state.n_kept
