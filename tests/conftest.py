@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# How long an example takes depends on what else the machine does.
-settings.register_profile("patient", deadline=None)
+# How long an example takes depends on what else the machine does. The examples are the
+# same in every run, as all that is random here.
+settings.register_profile("patient", deadline=None, derandomize=True)
 settings.load_profile("patient")
 
 HOLDER = """
@@ -133,7 +134,9 @@ def loopback() -> Iterator[str]:
     require_library("aravis")
     from tests.gige_simulator import ADDRESS
 
-    with FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock"):
+    lock = FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock")
+    # Asked for so often that no process with one such test after the other keeps it.
+    with lock.acquire(poll_interval=0.002):
         yield ADDRESS
 
 

@@ -350,6 +350,8 @@ def test_recorded_images_have_no_exposure_to_set(
 
     seen.wait("Recorded: exposure and gain are as they were taken.")
     seen.wait("Recorded: the focus is as it was.")
+    seen.wait("SIMULATED")  # as the files in use are of the simulated pen
+    assert "Live" not in seen.words
     with pytest.raises(AssertionError):
         seen.named("Exposure")
 
