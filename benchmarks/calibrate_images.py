@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from lightpen.cli import main
+from lightpen.__main__ import main
 
 
 def peak_memory() -> float:
@@ -14,7 +14,7 @@ def peak_memory() -> float:
 
 
 if __name__ == "__main__":
-    exit_status = main(sys.argv[1:])
+    exit_status = main()
     if sys.platform == "linux":
         print(peak_memory())
     sys.exit(exit_status)

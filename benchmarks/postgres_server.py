@@ -6,9 +6,11 @@ import shutil
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 PASSWORD = "a-secret-of-the-plant"
+FIRST_PORT, N_PORTS = 20_000, 10_000  # below those that systems give to anybody
 START_S = 60.0  # on a machine that does other things besides
 
 
@@ -20,13 +22,25 @@ def postgres_programs() -> Path | None:
     return programs[-1].parent if programs else None
 
 
+def free_port() -> int:
+    """Return a port of the loopback that nobody gets who asks for any.
+
+    What starts late or again still finds it free.
+    """
+    start = os.getpid() % N_PORTS
+    for n in range(N_PORTS):
+        port = FIRST_PORT + (start + n) % N_PORTS
+        with suppress(OSError), socket.create_server(("127.0.0.1", port)):
+            return port
+    raise OSError("Every port is taken.")
+
+
 class Postgres:
     """A server on the loopback, which can be stopped and started again."""
 
     def __init__(self, folder: Path, programs: Path) -> None:
         self._folder, self._programs = folder, programs
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            self.port: int = free.getsockname()[1]
+        self.port = free_port()
         self._user = "postgres" if os.geteuid() == 0 else None
         secret = folder / "password"
         secret.write_text(PASSWORD)

@@ -29,8 +29,9 @@ if TYPE_CHECKING:
 # As the program does; NumPy reads it when it is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# How long an example takes depends on what else the machine does.
-settings.register_profile("patient", deadline=None)
+# How long an example takes depends on what else the machine does. The examples are the
+# same in every run, as all that is random here.
+settings.register_profile("patient", deadline=None, derandomize=True)
 settings.load_profile("patient")
 
 HOLDER = """
@@ -84,6 +85,14 @@ def no_power_cut() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def one_thread_of_opencv() -> None:
+    """OpenCV does not spread an image over threads, as in the program."""
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
 def no_broadcast() -> Iterator[None]:
     """No test asks the network for cameras, whatever keys it presses."""
     from lightpen.cameras import aravis, basler
@@ -125,7 +134,9 @@ def loopback() -> Iterator[str]:
     require_library("aravis")
     from tests.gige_simulator import ADDRESS
 
-    with FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock"):
+    lock = FileLock(Path(tempfile.gettempdir()) / "lightpen-gige.lock")
+    # Asked for so often that no process with one such test after the other keeps it.
+    with lock.acquire(poll_interval=0.002):
         yield ADDRESS
 
 
@@ -271,13 +282,14 @@ MakeOnce = Callable[[str, Callable[[Path], object]], Path]
 
 
 @pytest.fixture(scope="session")
-def once(worker_id: str, tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
+def once(tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
     """Return a function that has a folder made once, by whoever needs it first.
 
     It belongs to all processes of a parallel run: copy it before you change it.
     """
     own = tmp_path_factory.getbasetemp()
-    shelf = (own if worker_id == "master" else own.parent) / "made-once"
+    is_parallel = "PYTEST_XDIST_WORKER" in os.environ
+    shelf = (own.parent if is_parallel else own) / "made-once"
     shelf.mkdir(exist_ok=True)
 
     def made(what: str, make: Callable[[Path], object]) -> Path:

@@ -1,7 +1,6 @@
 """Tests of the commands about cameras: intrinsics, extrinsics, board, check-camera."""
 
 import json
-from datetime import date
 from pathlib import Path
 
 import cv2
@@ -51,6 +50,7 @@ def test_a_camera_file_is_made_of_a_folder_of_images(
     pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     camera_file, record_file = tmp_path / "camera.yaml", tmp_path / "record.json"
+    today = local_now().date()
     status = run(
         *("intrinsics", pairs / "left", "--board", BOARD, "--out", camera_file),
         *("--serial", "DEV-7", "--temperature", "21.5", "--json", record_file),
@@ -62,7 +62,7 @@ def test_a_camera_file_is_made_of_a_folder_of_images(
     sigmas = np.sqrt(np.diag(camera.covariance))[:4]
     assert np.all(np.abs(camera.intrinsics - CAMERA.intrinsics)[:4] < 4 * sigmas)
     assert (camera.serial, camera.temperature_c) == ("DEV-7", 21.5)
-    assert camera.calibrated_on in (local_now().date(), date.today())
+    assert camera.calibrated_on in (today, local_now().date())
     assert record["rms_px"] < 0.05
     assert len(record["views"]) == N_VIEWS
     assert "U (k = 2)" in capsys.readouterr().out
@@ -145,6 +145,7 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
     text = text.replace("4638.1999999999998", "4598.2").replace(
         "4637.1000000000004", "4597.1"
     )
+    text = text.replace(" 1031.3", " 1051.3")
     deviations = "0.5, 0.5, 0.6, 0.6, 4e-4, 4e-3, 4e-5, 4e-5, 0.0"
     (tmp_path / "camera.yaml").write_text(
         f"{text}\nstd_deviations_intrinsics: [{deviations}]\n"
@@ -156,6 +157,7 @@ def test_a_file_of_another_focus_is_contradicted_by_a_swing(
 
     assert status == 1
     printed = capsys.readouterr()
-    assert "contradict the camera file" in printed.err
+    assert "they want the focal length" in printed.err  # the worst of them
+    assert "they want the principal point cy" in printed.out
     fx_of_file, u_of_file = printed.out.split("fx")[1].split()[:2]
     assert (float(fx_of_file), float(u_of_file)) == (4598.2, 1.0)

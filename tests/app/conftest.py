@@ -5,11 +5,11 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, NoReturn, TypeAlias
 
 import pytest
 from PySide6.QtCore import QDeadlineTimer, QEvent, QLocale, QPoint, Qt, QTimer
@@ -39,7 +39,10 @@ from typing_extensions import override
 from lightpen.cameras.clock import SkippingClock
 from lightpen.live.sources import Surroundings, sample_files
 from lightpen.record.names import Names
+from lightpen.record.reading import Record
+from lightpen.record.solving import solve_record
 from lightpen.simulator.hand import Operator
+from lightpen.simulator.motion import Pursuit
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
@@ -47,6 +50,7 @@ from lightpen_app.look.languages import LanguageSwitch
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.garbage import collect_if_due
+from lightpen_app.work.job import Report
 from lightpen_app.work.settings import Settings
 from lightpen_app.work.workbench import Workbench
 
@@ -54,6 +58,8 @@ from lightpen_app.work.workbench import Workbench
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
+# Brings the pen within a few images, where a person needs 2.5 s.
+QUICK_ARM = Pursuit(gain=12.0, lag=0.0325, top_speed=3000.0)
 PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
@@ -114,8 +120,12 @@ def look(dressed: QApplication) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Images come, and plots are drawn, less often than usual: each takes long."""
+    """Images come, and plots are drawn, less often than usual: each takes long.
+
+    The pen comes sooner, which takes fewer of them.
+    """
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
+    monkeypatch.setattr("lightpen.simulator.hand.ARM", QUICK_ARM)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 300)
 
 
@@ -155,6 +165,7 @@ def around(small_scene: Scene) -> Surroundings:
     return Surroundings(small_scene, HastyClock())
 
 
+SolvingOn: TypeAlias = Callable[[], AbstractContextManager[None]]
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
 
@@ -183,6 +194,25 @@ def choose_samples(workbench: Workbench, folder: Path) -> None:
             pen_file=files.pen_file,
         )
     )
+
+
+@pytest.fixture
+def solving_on(monkeypatch: pytest.MonkeyPatch) -> SolvingOn:
+    """Return a context in which a tip is computed until that is cancelled."""
+
+    def solve(record: Record, report: Report) -> NoReturn:
+        solve_record(record, report)
+        while True:
+            report(1.0)
+            time.sleep(0.01)
+
+    @contextmanager
+    def patched() -> Iterator[None]:
+        with monkeypatch.context() as endless:
+            endless.setattr("lightpen.swing.course.solve_record", solve)
+            yield
+
+    return patched
 
 
 # The whole wizard, used as an operator uses it

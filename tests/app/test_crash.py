@@ -65,7 +65,7 @@ def test_a_bug_in_a_slot_or_a_thread_leaves_the_program_running(
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=120,
     )
 
     assert result.returncode == 0, result.stderr

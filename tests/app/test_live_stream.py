@@ -5,6 +5,7 @@ import socket
 from typing import TYPE_CHECKING
 
 import pytest
+from benchmarks.postgres_server import free_port
 from pyigtl import OpenIGTLinkClient
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -32,35 +33,28 @@ def test_nothing_is_streamed_unless_chosen() -> None:
     "^This plugin does not support (raise|grabbing)", extend=True
 )
 def test_who_listens_follows_the_pen_and_every_page_says_so(
-    walker: "Walker", settings: Settings, free_port: int
+    walker: "Walker", settings: Settings
 ) -> None:
+    chosen = free_port()
     assert not walker.tells("Live stream at")
     walker.press(Qt.Key.Key_F10)
     walker.choose("Live stream...")
     (dialog,) = walker.window.findChildren(StreamDialog)
     walker.until(dialog.isVisible)
     (port,) = dialog.findChildren(NumberField)
-    port.setValue(free_port)
+    port.setValue(chosen)
     walker.click_on(walker.control("Stream pose and tip", dialog))
 
-    walker.until_tells(f"Live stream at {LOOPBACK}:{free_port}, listening: 0")
+    walker.until_tells(f"Live stream at {LOOPBACK}:{chosen}, listening: 0")
     assert settings.preferences().streams
     assert "On at" in dialog.words()
     dialog.close()
     walker.operator.seat()
-    client = OpenIGTLinkClient(port=free_port)
+    client = OpenIGTLinkClient(port=chosen)
     walker.until_tells("listening: 1")
     walker.until(lambda: client.wait_for_message("PenToCamera", timeout=0) is not None)
     client.stop()
     walker.until_tells("listening: 0")
-
-
-@pytest.fixture
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_the_tip_in_force_is_streamed_and_one_that_comes_into_force(

@@ -1,6 +1,7 @@
 """What can go wrong on the way through the wizard is told, and loses nothing."""
 
 import os
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -31,7 +32,7 @@ from lightpen.swing.state import Phase
 from lightpen_app.work.settings import Settings, Station
 
 if TYPE_CHECKING:
-    from tests.app.conftest import OpenWizard, Walker
+    from tests.app.conftest import OpenWizard, SolvingOn, Walker
 
 # Of raising a window and grabbing the keyboard, which menus do.
 pytestmark = pytest.mark.qt_log_ignore("^This plugin does not support ")
@@ -83,8 +84,11 @@ def cameras(monkeypatch: pytest.MonkeyPatch) -> list[SimulatedCamera]:
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Callable[[str], None]]:
-    """Put what the program writes on a disk of its own; returns what resizes it."""
+def small_disk(tmp_path: Path) -> Iterator[Callable[[int], None]]:
+    """Put what the program writes on a disk of its own.
+
+    Returns a function that leaves so much room there, bytes.
+    """
     if not hasattr(os, "geteuid") or os.geteuid() != 0:
         pytest.skip("only root can mount a disk")
     place = tmp_path / "data"
@@ -97,10 +101,11 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[str], None]]:
     if not mount("size=64m"):
         pytest.skip("no disk can be mounted here")
 
-    def resize(size: str) -> None:
-        assert mount(f"remount,size={size}")
+    def leave(room: int) -> None:
+        while not mount(f"remount,size={shutil.disk_usage(place).used + room}"):
+            pass  # more was written meanwhile
 
-    yield resize
+    yield leave
     subprocess.run(("umount", "-l", str(place)), check=True)
 
 
@@ -297,9 +302,10 @@ def test_what_befalls_the_pen_is_told_and_the_swing_goes_on(
 ) -> None:
     n_inputs = capturing.n_inputs
 
-    capturing.operator.cover(2.0)
+    capturing.operator.cover()
     capturing.until_says("PEN LOST")
     assert capturing.tells("nothing is lost meanwhile")
+    capturing.operator.uncover()
     keep_on(capturing)
 
     capturing.operator.lift()
@@ -370,12 +376,15 @@ def finish_now(walker: "Walker") -> None:
     walker.click("Finish now")
 
 
-def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
+def test_computing_is_cancelled_and_begun_again(
+    capturing: "Walker", solving_on: "SolvingOn"
+) -> None:
     keep_on(capturing, 20)
-    finish_now(capturing)
-    capturing.until(lambda: capturing.offers("Stop computing"))
-    capturing.click("Stop computing")
-    capturing.until_says("STOPPED")
+    with solving_on():
+        finish_now(capturing)
+        capturing.until(lambda: capturing.offers("Stop computing"))
+        capturing.click("Stop computing")
+        capturing.until_says("STOPPED")
     assert capturing.says("The tip is not computed yet.")
 
     capturing.click("Compute again")
@@ -396,29 +405,24 @@ def test_computing_is_cancelled_and_begun_again(capturing: "Walker") -> None:
 
 
 def test_a_full_disk_pauses_the_swing_until_there_is_room(
-    small_disk: Callable[[str], None], prepared: "Walker"
+    small_disk: Callable[[int], None], prepared: "Walker"
 ) -> None:
     go_to(prepared, "Swing")
     prepared.swing()
     keep_on(prepared)
 
-    used = disk_use(record_folder(prepared).parents[1])
-    small_disk(f"{used + 300_000}")
+    small_disk(300_000)
     prepared.until_says("PAUSED")
     prepared.until_tells("cannot be written: the disk is full.")
     prepared.until_tells("then press Space")
     n_before = n_kept(prepared)
     assert len(open_record(record_folder(prepared)).used_images) == n_before
 
-    small_disk("64m")
+    small_disk(50_000_000)
     prepared.press(Key.Key_Space)
     keep_on(prepared)
     assert len(open_record(record_folder(prepared)).used_images) >= n_before + 4
     prepared.until(lambda: not prepared.tells("the disk is full"))
-
-
-def disk_use(folder: Path) -> int:
-    return sum(path.stat().st_blocks * 512 for path in folder.rglob("*"))
 
 
 # Back and forth

@@ -70,6 +70,8 @@ def _check_camera(options: argparse.Namespace) -> None:
         }
         write_record(options.json, plain(record))
     if denied:
+        for each in denied[1:]:
+            print(shown(str(each.sentence)))
         raise CalibrationError(denied[0].sentence)
     print("\nFile and camera agree.")
 

@@ -16,17 +16,19 @@ from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle, fit_bundle
 from lightpen.estimation.contradictions import (
     Contradiction,
-    find_contradictions,
+    Denied,
+    contradictions_of,
+    deny,
     find_pen_contradictions,
 )
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import Forms, drift_forms, inverse, lean_forms
+from lightpen.estimation.unknowns import forms_of, inverse
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
-MAX_DENIED = 8  # files, or numbers of a rig's file, that are let go
+MAX_DENIED = 8  # times that it is looked at anew what is to be let go
 HELD = 0.01  # of what is assumed of a camera, where its images show nothing of it
 
 
@@ -86,7 +88,7 @@ def adjust(
         The iteration does not settle.
     """
     rig = state.rig
-    forms = Forms(lean_forms(state.rotations), drift_forms(len(pixels), shifts))
+    forms = forms_of(state.rotations, shifts)
     fit = partial(fit_bundle, pixels, state, forms=forms, places=places)
 
     def measured(priors: Priors, factor: float) -> tuple[Bundle, Correlation]:
@@ -97,14 +99,15 @@ def adjust(
         factor: float,
     ) -> tuple[Bundle, tuple[Contradiction, ...], Priors, Correlation]:
         bundle, correlation = measured(priors, factor)
-        found: tuple[Contradiction, ...] = ()
-        freed = priors
-        for _ in range(1 if rig.n_cameras == 1 else MAX_DENIED):
-            denied, freed = find_contradictions(rig, bundle, freed, correlation.excess)
-            if not denied:
+        denied = Denied(priors)
+        for _ in range(MAX_DENIED):
+            now = deny(rig, bundle, priors, correlation.excess, denied)
+            if now.numbers == denied.numbers:
                 break
-            found += denied
-            bundle, correlation = measured(freed, factor)
+            denied = now
+            bundle, correlation = measured(denied.priors, factor)
+        found = contradictions_of(rig, bundle, priors, correlation.excess, denied)
+        freed = denied.priors
         of_pen, freed = find_pen_contradictions(
             state.pen, bundle, freed, correlation.excess
         )

@@ -1,11 +1,10 @@
 """What the images say against the files of camera and pen.
 
-A prior is contradicted where what was fitted lies farther from the file than both the
-file's uncertainty and that of the images explain: the deviation of a posterior mean
-from a prior mean has the covariance of the prior less that of the posterior.
+What is contradicted of a file is told with what the images want of it where all else
+that is contradicted is let go as well.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import floor, log10
 
 import numpy as np
@@ -13,15 +12,13 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import inverse
+from lightpen.estimation.refutation import FileFit, Statement
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.sentences import Sentence, sentence
 
-LIMIT = 3.0  # standard deviations
 VAGUE = 0.2  # of a value, U (k = 2): centres alone may want a negative diameter
-ROUNDING = 1e-6  # of a variance
 RELEASED = 10.0  # times the deviation: what a contradicted prior still says
 
 FOCAL_LENGTH = sentence("file.focal-length", "focal length")
@@ -133,53 +130,86 @@ class Contradiction:
 
 
 @dataclass(frozen=True, eq=False)
-class _Entry:
-    """A combination of unknowns that people know by a name.
+class Denied:
+    """What is contradicted of the files of cameras and rig.
 
-    ``by`` takes it from the unknowns, ``along`` moves them by one of it, (n,) each;
-    ``size`` is what that is in its unit.
+    Attributes
+    ----------
+    numbers : dict of tuple of int
+        Of the statements of each file that has some; the rig's is the last.
+    priors : Priors
+        Without them.
     """
 
-    what: Sentence
-    unit: str
-    value: float
-    by: FloatArray
-    along: FloatArray
-    size: float = 1.0
-    camera: str = ""  # of the rig, if its file says so
+    priors: Priors
+    numbers: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
 
-def find_contradictions(
-    rig: Rig, bundle: Bundle, priors: Priors, excess: FloatArray | None = None
-) -> tuple[tuple[Contradiction, ...], Priors]:
-    """Find what the images say against the file of a camera, or of the rig.
+def deny(
+    rig: Rig,
+    bundle: Bundle,
+    priors: Priors,
+    excess: FloatArray | None,
+    before: Denied,
+) -> Denied:
+    """Return what the images say against the files of the cameras, or of the rig.
 
-    Of several files that are contradicted it is the one that is so most, and of a rig's
-    the one number: it may be what moves the others.
+    Of several files it is the one that is contradicted most, and one more each time:
+    it may be what moves the others.
 
     Parameters
     ----------
-    excess : (p, p) array, optional
+    bundle : Bundle
+        Fitted without what was contradicted before.
+    priors : Priors
+        As stated.
+    excess : (p, p) array or None
         By what the covariance of the fitted values is larger than the fit has it, as
         noise lasts.
 
     Returns
     -------
-    contradictions : tuple of Contradiction
-        By the fit as it is, the worst first.
-    priors : Priors
-        Without what was contradicted.
+    Denied
+        With the same numbers as before, if nothing else is contradicted.
     """
-    files = [_of_camera(rig, c, bundle, priors, excess) for c in range(rig.n_cameras)]
-    if priors.extrinsics is not None:
-        place, stated = bundle.columns.extrinsics, priors.extrinsics
-        each = [
-            _denied([entry], bundle, place, stated, excess) for entry in _places(rig)
-        ]
-        denied, extrinsics = max(each, key=_most)
-        files.append((denied, replace(priors, extrinsics=extrinsics)))
-    found, freed = max(files, key=_most)
-    return tuple(sorted(found, key=lambda each: -each.deviations)), freed
+    fits = _fits(rig, bundle, priors, excess)
+    numbers = {f: fits[f].refuted for f in before.numbers if fits[f].refuted}
+    if numbers == before.numbers:
+        others = [f for f in range(len(fits)) if f not in numbers and fits[f].refuted]
+        if not others:
+            return before
+        worst = max(others, key=lambda f: fits[f].most)
+        numbers = {**numbers, worst: fits[worst].refuted}
+    cameras, extrinsics = list(priors.cameras), priors.extrinsics
+    for f, let_go in numbers.items():
+        if f < rig.n_cameras:
+            cameras[f] = _without(cameras[f], fits[f], let_go)
+        elif extrinsics is not None:
+            extrinsics = _without(extrinsics, fits[f], let_go)
+    freed = replace(priors, cameras=tuple(cameras), extrinsics=extrinsics)
+    return Denied(freed, numbers)
+
+
+def contradictions_of(
+    rig: Rig,
+    bundle: Bundle,
+    priors: Priors,
+    excess: FloatArray | None,
+    denied: Denied,
+) -> tuple[Contradiction, ...]:
+    """Return what is denied of the files of cameras and rig, the worst first.
+
+    The parameters are as of `deny`; the bundle is the one without all that is denied.
+    """
+    if not denied.numbers:
+        return ()
+    fits = _fits(rig, bundle, priors, excess)
+    found = []
+    for f, let_go in denied.numbers.items():
+        name = rig.names[f] if f < rig.n_cameras and rig.names else ""
+        of_file = _contradictions(fits[f], let_go)
+        found += [replace(each, camera=name) for each in of_file] if name else of_file
+    return tuple(sorted(found, key=lambda each: -each.deviations))
 
 
 def find_pen_contradictions(
@@ -202,37 +232,76 @@ def find_pen_contradictions(
     at, one = bundle.columns, np.ones(1)
 
     def denied(
-        entry: _Entry, place: slice, stated: Prior
+        statement: Statement, place: slice, stated: FloatArray, prior: Prior
     ) -> tuple[list[Contradiction], Prior]:
-        found, freed = _denied([entry], bundle, place, stated, excess)
+        fit = FileFit.of([statement], stated, bundle, place, excess)
+        found = _contradictions(fit, fit.refuted)
         if any(each.wanted_uncertainty > VAGUE * each.stated for each in found):
-            return [], stated
-        return found, freed
+            return [], prior
+        return found, _without(prior, fit, fit.refuted)
 
     discs, diameter = denied(
-        _Entry(DIAMETER, "mm", pen.diameter, one, one), at.diameter, priors.diameter
+        Statement(DIAMETER, "mm", pen.diameter, one, one),
+        at.diameter,
+        priors.diameter.covariance,
+        priors.diameter,
     )
-    size, scale = denied(_Entry(SCALE, "", 1.0, one, one), at.scale, priors.scale)
+    size, scale = denied(
+        Statement(SCALE, "", 1.0, one, one),
+        at.scale,
+        priors.size_covariance,
+        priors.scale,
+    )
     found = tuple(replace(each, of_pen=True) for each in (*discs, *size))
     return found, replace(priors, diameter=diameter, scale=scale)
 
 
-def _most(denied: tuple[list[Contradiction], object]) -> float:
-    """Return by how many standard deviations something is contradicted at most."""
-    return max((each.deviations for each in denied[0]), default=0.0)
+def _fits(
+    rig: Rig, bundle: Bundle, priors: Priors, excess: FloatArray | None
+) -> list[FileFit]:
+    """Return what the images say of each camera's file, and last of the rig's."""
+    columns = bundle.columns
+    fits = [
+        FileFit.of(_of_camera(*both), prior.covariance, bundle, place, excess)
+        for *both, prior, place in zip(
+            *(rig.cameras, bundle.state.rig.cameras, priors.cameras, columns.cameras),
+            strict=True,
+        )
+    ]
+    if priors.extrinsics is not None:
+        stated, place = priors.extrinsics.covariance, columns.extrinsics
+        fits.append(FileFit.of(_places(rig), stated, bundle, place, excess))
+    return fits
 
 
-def _of_camera(
-    rig: Rig, c: int, bundle: Bundle, priors: Priors, excess: FloatArray | None
-) -> tuple[list[Contradiction], Priors]:
-    """Return what is contradicted of a camera's file, and the priors without it."""
-    place, cameras = bundle.columns.cameras[c], list(priors.cameras)
-    denied, cameras[c] = _denied(
-        _entries(rig.cameras[c]), bundle, place, cameras[c], excess
-    )
-    name = rig.names[c] if rig.names else ""
-    named = [replace(each, camera=name) for each in denied]
-    return named, replace(priors, cameras=tuple(cameras))
+def _contradictions(fit: FileFit, let_go: tuple[int, ...]) -> list[Contradiction]:
+    """Return in people's units what is contradicted of a file."""
+    found = []
+    for i in let_go:
+        each, wanted = fit.statements[i], fit.wanted(i, let_go)
+        found.append(
+            Contradiction(
+                what=each.what,
+                unit=each.unit,
+                stated=each.value,
+                stated_uncertainty=2 * each.size * wanted.stated_sigma,
+                wanted=each.value + each.size * wanted.change,
+                wanted_uncertainty=2 * each.size * wanted.sigma,
+                deviations=wanted.deviations,
+                camera=each.camera,
+                of_rig=bool(each.camera),
+            )
+        )
+    return found
+
+
+def _without(prior: Prior, fit: FileFit, let_go: tuple[int, ...]) -> Prior:
+    """Return a prior that lets go of numbers."""
+    covariance = prior.covariance
+    for i in let_go:
+        along, change = fit.statements[i].along, fit.wanted(i, let_go).change
+        covariance = covariance + (RELEASED * change) ** 2 * np.outer(along, along)
+    return replace(prior, covariance=covariance)
 
 
 def _known_digits(value: float, uncertainty: float) -> float:
@@ -240,64 +309,17 @@ def _known_digits(value: float, uncertainty: float) -> float:
     return round(value, 1 - floor(log10(uncertainty)))
 
 
-def _denied(
-    entries: list[_Entry],
-    bundle: Bundle,
-    place: slice,
-    stated: Prior,
-    excess: FloatArray | None,
-) -> tuple[list[Contradiction], Prior]:
-    """Return what is contradicted of unknowns, and their prior that lets go of it."""
-    # As it was fitted with: what a file has as exact is let be off by rounding.
-    prior = inverse(bundle.prior_information[place, place])
-    posterior = bundle.covariance[place, place]
-    lasting = np.zeros_like(posterior) if excess is None else excess[place, place]
-    found = []
-    for entry in entries:
-        before = float(entry.by @ prior @ entry.by)
-        after = float(entry.by @ posterior @ entry.by)
-        learned = before - after
-        if learned <= ROUNDING * before:
-            continue
-        change = float(entry.by @ bundle.values[place])
-        by_noise = float(entry.by @ lasting @ entry.by)
-        deviations = abs(change) / np.sqrt(max(learned + by_noise, ROUNDING * before))
-        if deviations <= LIMIT:
-            continue
-        # Variance by the images alone.
-        gain = learned / before
-        own = max((after + by_noise / gain) / gain, ROUNDING * before)
-        wanted = entry.value + entry.size * change * before / learned
-        found.append(
-            Contradiction(
-                what=entry.what,
-                unit=entry.unit,
-                stated=entry.value,
-                stated_uncertainty=2 * entry.size * float(np.sqrt(before)),
-                wanted=wanted,
-                wanted_uncertainty=2 * entry.size * float(np.sqrt(own)),
-                deviations=float(deviations),
-                camera=entry.camera,
-                of_rig=bool(entry.camera),
-            )
-        )
-        freed = (RELEASED * (wanted - entry.value) / entry.size) ** 2
-        freed_covariance = freed * np.outer(entry.along, entry.along)
-        stated = replace(stated, covariance=stated.covariance + freed_covariance)
-    return found, stated
-
-
-def _places(rig: Rig) -> list[_Entry]:
+def _places(rig: Rig) -> list[Statement]:
     """Return what the rig's file says of all cameras but the first."""
     n = 6 * (rig.n_cameras - 1)
     unit = np.eye(n)
-    entries = []
+    statements = []
     for c in range(1, rig.n_cameras):
         for k, axis in enumerate("xyz"):
             row = 6 * (c - 1) + k
             turn, shift = unit[row], unit[row + 3]
-            entries += [
-                _Entry(
+            statements += [
+                Statement(
                     sentence(
                         "file.rig-turn",
                         "further turn of cam_from_rig about {axis}",
@@ -310,7 +332,7 @@ def _places(rig: Rig) -> list[_Entry]:
                     size=float(np.degrees(1.0)),
                     camera=rig.names[c],
                 ),
-                _Entry(
+                Statement(
                     sentence(
                         "file.rig-translation",
                         "translation of cam_from_rig along {axis}",
@@ -323,31 +345,32 @@ def _places(rig: Rig) -> list[_Entry]:
                     camera=rig.names[c],
                 ),
             ]
-    return entries
+    return statements
 
 
-def _entries(camera: Camera) -> list[_Entry]:
+def _of_camera(camera: Camera, fitted: Camera) -> list[Statement]:
+    """Return what a camera's file says of the camera that was fitted."""
     n = len(camera.intrinsics)
     unit = np.eye(n)
     focal = 0.5 * (camera.fx + camera.fy)
     along = (camera.fx * unit[0] + camera.fy * unit[1]) / focal
     ratio = camera.fy / camera.fx
-    entries = [
-        _Entry(FOCAL_LENGTH, "px", focal, 0.5 * (unit[0] + unit[1]), along),
-        _Entry(
+    statements = [
+        Statement(FOCAL_LENGTH, "px", focal, 0.5 * (unit[0] + unit[1]), along),
+        Statement(
             ASPECT,
             "",
             ratio,
-            (unit[1] - ratio * unit[0]) / camera.fx,
-            0.5 * camera.fx * (unit[1] - unit[0]),
+            (unit[1] - ratio * unit[0]) / fitted.fx,  # exact, as it is a quotient
+            0.5 * fitted.fx * (unit[1] - unit[0]),
         ),
     ]
-    entries += [
-        _Entry(what, "px", float(camera.intrinsics[k]), unit[k], unit[k])
+    statements += [
+        Statement(what, "px", float(camera.intrinsics[k]), unit[k], unit[k])
         for k, what in zip((2, 3), PRINCIPAL_POINT, strict=True)
     ]
-    entries += [
-        _Entry(
+    statements += [
+        Statement(
             sentence(
                 "file.distortion",
                 "distortion coefficient {name}",
@@ -360,4 +383,4 @@ def _entries(camera: Camera) -> list[_Entry]:
         )
         for k in range(n - 4)
     ]
-    return entries
+    return statements

@@ -17,6 +17,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -251,8 +252,8 @@ def view_information(
     inside = (pixels >= 0).all(axis=-1) & (pixels < np.array(image_size)).all(axis=-1)
     pixels[~inside | (points[..., 2] <= 0)] = np.nan
     names = ("",) * len(pixels)
-    system = _system(Views(board, names, pixels, (image_size,)), state)
-    return _eliminated(system)[0]
+    views = Views(board, names, pixels, (image_size,))
+    return _eliminated(_system(views, state, _residuals(views, state)))[0]
 
 
 def board_points(board: Board, shape: FloatArray) -> FloatArray:
@@ -264,7 +265,8 @@ def _settled(
     views: Views, start: BoardState, origin: BoardState, prior: FloatArray, sigma: float
 ) -> tuple[BoardState, _System]:
     state, damping = start, FIRST_DAMPING
-    if np.isinf(_residuals(views, state)).any():
+    residuals = _residuals(views, state)
+    if np.isinf(residuals).any():
         raise CalibrationError(
             sentence(
                 "intrinsics.no-start",
@@ -274,7 +276,7 @@ def _settled(
                 board=views.board.name,
             )
         )
-    system = _system(views, state)
+    system = _system(views, state, residuals)
     cost = _cost_of(system.residuals, state, origin, prior, sigma)
     for _ in range(MAX_STEPS):
         step, poses_step = _step(system, state, origin, prior, sigma, damping)
@@ -288,7 +290,7 @@ def _settled(
             continue
         gained = cost - reached
         state, cost, damping = moved, reached, max(damping / 10, 1e-12)
-        system = _system(views, state)
+        system = _system(views, state, there)
         if gained <= CONVERGED * (cost + 1e-12):
             return state, system
     raise CalibrationError(
@@ -429,10 +431,9 @@ def _residuals(views: Views, state: BoardState) -> FloatArray:
     return residuals
 
 
-def _system(views: Views, state: BoardState) -> _System:
+def _system(views: Views, state: BoardState, residuals: FloatArray) -> _System:
     turned, points = _points_cam(views.board, state)
     deformations = _deformations(views.board)
-    residuals = _residuals(views, state)
     seen = views.seen
     n_views, _, n_points, _ = views.pixels.shape
     intrinsics_at, places = _intrinsics_at(state.cameras), _places_at(state.cameras)
@@ -476,6 +477,7 @@ def _system(views: Views, state: BoardState) -> _System:
     return total
 
 
+@cache
 def _deformations(board: Board) -> FloatArray:
     """Return how each error of a board moves its points, (N, 3, 5)."""
     points = board.points
@@ -486,6 +488,7 @@ def _deformations(board: Board) -> FloatArray:
     moves[:, 0, 1], moves[:, 1, 1] = 0.5 * y, 0.5 * x
     for k, bend in enumerate((u * u, u * v, v * v), 2):
         moves[:, 2, k] = bend - bend.mean()
+    moves.flags.writeable = False
     return moves
 
 

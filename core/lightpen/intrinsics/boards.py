@@ -22,6 +22,7 @@ looks at it; its origin is the middle of its points.
 import re
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -98,17 +99,19 @@ class Board:
             parts.append(f"{self.detail:g}")
         return ":".join([*parts, self.dictionary] if self.dictionary else parts)
 
-    @property
+    @cached_property
     def points(self) -> FloatArray:
-        """Points in the frame of the board, (N, 3), mm."""
-        points = np.zeros((len(self._grid), 3))
-        points[:, :2] = self._grid - self._middle
+        """Points in the frame of the board, (N, 3), mm; only to be read."""
+        grid = self._grid
+        points = np.zeros((len(grid), 3))
+        points[:, :2] = grid - 0.5 * (grid.min(axis=0) + grid.max(axis=0))
+        points.flags.writeable = False
         return points
 
     @property
     def n_points(self) -> int:
         """Number of points."""
-        return len(self._grid)
+        return len(self.points)
 
     @property
     def outline(self) -> FloatArray:
@@ -127,10 +130,6 @@ class Board:
             quarter = np.rot90(numbers.reshape(self.rows, self.columns)).ravel()
             turned += [quarter, quarter[::-1]]
         return tuple(turned)
-
-    @property
-    def _middle(self) -> FloatArray:
-        return np.asarray(0.5 * (self._grid.min(axis=0) + self._grid.max(axis=0)))
 
     @property
     def _grid(self) -> FloatArray:

@@ -4,7 +4,7 @@ One thread looks at the images. While nothing is captured it takes the newest an
 over those that came meanwhile; during a swing or a verification it takes them all, in
 order, of two cameras those of one moment together. Where nothing moves it looks twice a
 second, in the midst of a swing or a verification after a while only; where nobody looks
-on, not at all.
+on, not at all. Recorded images, none of which is new after a pass, count as what rests.
 """
 
 from collections.abc import Mapping, Sequence
@@ -137,6 +137,8 @@ class Live:
         self._scene = Spots.none()
         self._moved_ns: int | None = None
         self._seen_ns = 0
+        self._seen_seq = 0
+        self._pass_seq = 0  # where the pass through a recording began
         self._stage: object = None
         self._measures = False
         self._ready = Event()
@@ -183,6 +185,7 @@ class Live:
     def set_aim(self, aim: Aim) -> None:
         """Look for something else from the next image on; a swing keeps its own."""
         self._aim = aim
+        self._pass_seq = self._seen_seq
 
     def set_watched(self, watched: bool) -> None:
         """Say whether anybody looks on; a swing that is captured goes on anyway."""
@@ -283,9 +286,19 @@ class Live:
     def _notice(self, image: LiveImage) -> None:
         """Remember when anything was seen to move last, however slowly."""
         self._seen_ns = image.frame.host_ts_ns
-        if self._moved_ns is None or have_moved(self._scene, image.spots):
+        self._seen_seq = image.frame.seq
+        is_first = self._moved_ns is None
+        has_moved = not self._is_passed() and have_moved(self._scene, image.spots)
+        if is_first or has_moved:
             self._moved_ns = self._seen_ns
             self._scene = image.spots
+
+    def _is_passed(self) -> bool:
+        """Return whether a recording was seen to its end, and nothing is captured."""
+        caps = self._workers[0].caps
+        if self._measures or caps is None or caps.n_images is None:
+            return False
+        return self._seen_seq - self._pass_seq >= caps.n_images
 
     def _tell_others(self, image: LiveImage) -> None:
         """Stream what an image shows."""

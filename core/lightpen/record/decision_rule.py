@@ -11,8 +11,8 @@ References
    section 8.2.
 """
 
-from lightpen.estimation.contradictions import LIMIT as CONTRADICTED
 from lightpen.estimation.led_quality import DISPLACED
+from lightpen.estimation.refutation import LIMIT as CONTRADICTED
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.verdict import (
     CHANGE_GATE,

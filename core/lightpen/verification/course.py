@@ -32,13 +32,13 @@ from lightpen.verification.going_on import GoneOn, go_on_with
 from lightpen.verification.happenings import ending, happenings
 from lightpen.verification.live_touches import LiveTouches
 from lightpen.verification.other_choices import with_choices
-from lightpen.verification.recorded_runs import Done, read_runs
+from lightpen.verification.recorded_runs import ReadRuns, read_runs
 from lightpen.verification.session import (
     SessionTransition,
     end_task,
     setup_of,
     touched_anew,
-    with_found,
+    with_read,
 )
 from lightpen.verification.session_keeping import SessionKeeping
 from lightpen.verification.session_state import SessionState, with_drift
@@ -209,7 +209,7 @@ class VerificationCourse:
         self._become(transition)
 
     def read(self, task: TaskKind, place: str, *, is_still: bool) -> None:
-        """Do a task with recorded images; a witness that was read before counts in it.
+        """Do a task with recorded images; a witness counts in it, read before or after.
 
         Parameters
         ----------
@@ -408,15 +408,16 @@ class VerificationCourse:
 
     # Recorded images
 
-    def _on_runs_read(self, images: ReadImages, done: Done) -> None:
+    def _on_runs_read(self, images: ReadImages, read: ReadRuns) -> None:
         status = replace(self._status, reading=Reading.NOTHING)
-        if status.state is None:
+        setup, state, done = status.setup, status.state, read.done
+        if setup is None or state is None:
             return
         self._troubles.end()
         self._status = replace(status, began=status.began or self._now())
-        self._touch_again(with_found(status.state, done.found))
-        self._keeping.add_read(images, done, self._status)
-        self._write()
+        self._touch_again(with_read(setup, state, read.touched, done.found))
+        self._keeping.add_read(images, done)
+        self._keep()
         self._conclude_done()
         self._publish(self._status, ending(self._status))
 

@@ -26,12 +26,12 @@ from lightpen.verification.choices import TaskKind
 from lightpen.verification.conclusion import Conclusion, conclusion_record
 from lightpen.verification.keeping import keep_verification, verifications_folder
 from lightpen.verification.places import touch_place
-from lightpen.verification.recorded_runs import read_runs
+from lightpen.verification.recorded_runs import Done, read_runs
 from lightpen.verification.session import (
     run_again,
     setup_of,
     touch_again,
-    with_found,
+    with_read,
 )
 from lightpen.verification.session_state import SessionSetup, SessionState, with_drift
 from lightpen.verification.sources import observe_place
@@ -60,6 +60,8 @@ class GoneOn:
         Tasks that are done and have no record yet.
     lamps : LampWatch
         What the images of the touches show of fixed lamps.
+    read : tuple of Done
+        What recorded images had found, as they find it now.
     """
 
     under_way: UnderWay
@@ -69,6 +71,7 @@ class GoneOn:
     files: tuple[Path, ...]
     unwritten: tuple[TaskKind, ...]
     lamps: LampWatch
+    read: tuple[Done, ...]
 
 
 def go_on_with(
@@ -96,13 +99,15 @@ def go_on_with(
     root = _root(data, under_way)
     setup, state = setup_of(tip, under_way.choices), SessionState()
     n_all = len(under_way.read) + len(under_way.runs)
+    done: list[Done] = []
     for n, images in enumerate(under_way.read, start=1):
         rules = read_rules(images.is_still, under_way.choices.n_frames)
         drifted = with_drift(setup, state.drift)  # which was read before
-        done = read_runs(
+        read = read_runs(
             *(images.task, images.place, tip, drifted, rules), lambda _: None
         )
-        state = with_found(state, done.found)
+        state = with_read(setup, state, read.touched, read.done.found)
+        done.append(read.done)
         report(n / n_all)
     lamps, cameras = LampWatch(), setup.instrument.rig.cameras
     for n, run in enumerate(under_way.runs, start=1 + len(under_way.read)):
@@ -119,7 +124,7 @@ def go_on_with(
     since = written_since(root, under_way)
     files = tuple(root / name for name in (*under_way.files, *since.files))
     unwritten = tuple(task for task in under_way.unwritten if task not in since.kinds)
-    return GoneOn(under_way, tip, setup, state, files, unwritten, lamps)
+    return GoneOn(*(under_way, tip, setup, state, files, unwritten, lamps), tuple(done))
 
 
 def abandon_interrupted(

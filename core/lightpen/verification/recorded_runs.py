@@ -7,12 +7,16 @@ from lightpen.swing.serial_queue import Report
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.keeping import TouchedImages
 from lightpen.verification.places import runs_at, touch_place
-from lightpen.verification.session import measure
-from lightpen.verification.session_state import Found, SessionSetup, with_drift
+from lightpen.verification.session import measure_with_drift
+from lightpen.verification.session_state import (
+    Found,
+    SessionSetup,
+    Unwitnessed,
+    with_drift,
+)
 from lightpen.verification.sources import touch_run, witness_of
 from lightpen.verification.tip_in_force import TipInForce, tip_at
 from lightpen.verification.touching import TouchRules
-from lightpen.verification.witness import judged_with
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +29,20 @@ class Done:
     images: TouchedImages
 
 
+@dataclass(frozen=True, eq=False)
+class ReadRuns:
+    """What recorded images have found.
+
+    Attributes
+    ----------
+    touched : Unwitnessed
+        Their touches, in which a witness that is read later may count.
+    """
+
+    done: Done
+    touched: Unwitnessed
+
+
 def read_runs(
     task: TaskKind,
     place: str,
@@ -32,7 +50,7 @@ def read_runs(
     setup: SessionSetup,
     rules: TouchRules,
     report: Report,
-) -> Done:
+) -> ReadRuns:
     """Return what recorded images have found.
 
     Parameters
@@ -50,13 +68,13 @@ def read_runs(
         runs.append(touch_run(each, tip.instrument, rules))
         report(i / len(places))
     witness = witness_of(runs, tip.instrument, setup.choices.limits)
-    setup = with_drift(setup, witness)
-    found = measure(setup, task, [(run.name, run.touches) for run in runs])
-    found = replace(found, assessment=judged_with(found.assessment, witness))
+    named = [(run.name, run.touches) for run in runs]
+    touched = Unwitnessed(task, named, with_drift(setup, witness), witness)
+    found = measure_with_drift(setup, touched)
     images = TouchedImages(
         origin=places[0].origin,
         files=all_hashed([file for each in places for file in each.files]),
         rejected=tuple(image for run in runs for image in run.rejected),
         witness=witness,
     )
-    return Done(task, found, tip, images)
+    return ReadRuns(Done(task, found, tip, images), touched)

@@ -38,7 +38,9 @@ from lightpen.verification.session_state import (
     Runs,
     SessionSetup,
     SessionState,
+    Unwitnessed,
     n_visits,
+    with_drift,
     without_touches,
 )
 from lightpen.verification.tip_in_force import TipInForce
@@ -50,6 +52,7 @@ from lightpen.verification.touching import (
     taken_again,
 )
 from lightpen.verification.touching import advance as advance_touch
+from lightpen.verification.witness import judged_with
 
 NEW_PLACE = 3.0  # mm, on a ring
 OTHER_END = 10.0  # mm
@@ -221,6 +224,37 @@ def measure(setup: SessionSetup, task: TaskKind, runs: Runs) -> Found:
             return measure_drift(runs, instrument, choices.limits)
 
 
+def measure_with_drift(
+    setup: SessionSetup, done: Unwitnessed, drift: Drift | None = None
+) -> Found:
+    """Return what the touches of a task find, by a camera that may have moved.
+
+    Raises
+    ------
+    CalibrationError
+        They do not suffice.
+    """
+    by = with_drift(setup if done.setup is None else done.setup, drift)
+    found = measure(by, done.task, done.runs)
+    return replace(found, assessment=judged_with(found.assessment, done.lamps))
+
+
+def with_read(
+    setup: SessionSetup, state: SessionState, read: Unwitnessed, found: Found
+) -> SessionState:
+    """Return it with what recorded images have found.
+
+    A witness that they are of counts in what was found before it, and one that is yet
+    to come will count in what they have found.
+    """
+    if isinstance(found, Drift):
+        return with_found(_counting(setup, state, found), found)
+    if state.is_witnessed(setup):
+        others = (each for each in state.unwitnessed if each.task is not read.task)
+        state = replace(state, unwitnessed=(*others, read))
+    return with_found(state, found)
+
+
 def with_found(state: SessionState, found: Found) -> SessionState:
     """Return it with what a task has found; the next begins when the pen moves on."""
     state = without_touches(state)
@@ -242,7 +276,7 @@ def touched_anew(state: SessionState, task: TaskKind) -> SessionState:
 
     The witness is visited once more after it.
     """
-    others = tuple(each for each in state.unwitnessed if each[0] is not task)
+    others = tuple(each for each in state.unwitnessed if each.task is not task)
     state = replace(without_touches(state), drift=None, unwitnessed=others)
     match task:
         case TaskKind.FIXED_POINT:
@@ -331,7 +365,9 @@ def _done(
         state = _witnessed(setup, state, runs)
     found = measure(setup, task, runs)
     if task is not TaskKind.DRIFT and state.is_witnessed(setup):
-        state = replace(state, unwitnessed=(*state.unwitnessed, (task, runs)))
+        state = replace(
+            state, unwitnessed=(*state.unwitnessed, Unwitnessed(task, runs))
+        )
     return with_found(state, found)
 
 
@@ -349,9 +385,13 @@ def _witnessed(setup: SessionSetup, state: SessionState, visits: Runs) -> Sessio
     if len(visits) < MIN_VISITS:
         return state
     around = measure_drift(visits[-MIN_VISITS:], setup.instrument, setup.choices.limits)
-    drifted = replace(setup, drift=np.maximum(setup.drift, around.share))
-    for task, runs in state.unwitnessed:
-        state = with_found(state, measure(drifted, task, runs))
+    return _counting(setup, state, around)
+
+
+def _counting(setup: SessionSetup, state: SessionState, drift: Drift) -> SessionState:
+    """Count a drift in what was found since the visit before."""
+    for each in state.unwitnessed:
+        state = with_found(state, measure_with_drift(setup, each, drift))
     return replace(state, unwitnessed=())
 
 

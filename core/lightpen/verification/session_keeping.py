@@ -37,9 +37,10 @@ from lightpen.verification.witness import LampWitness
 
 @dataclass(frozen=True, eq=False)
 class _TaskDone:
-    """A task that is done, and the images of its touches."""
+    """A task that is done, with which tip, and the images of its touches."""
 
     task: TaskKind
+    tip: TipInForce
     images: TouchedImages
 
 
@@ -100,27 +101,25 @@ class SessionKeeping:
         """Keep what a task found by live touches, when its witness is known."""
         records = self.images.records(task)
         images = TouchedImages(tip.origin, witness=witness, records=records)
-        self._unkept = (*self._unkept, _TaskDone(task, images))
+        self._unkept = (*self._unkept, _TaskDone(task, tip, images))
 
-    def add_read(
-        self, images: ReadImages, done: Done, status: VerificationStatus
-    ) -> None:
-        """Keep what a task found by recorded images."""
+    def add_read(self, images: ReadImages, done: Done) -> None:
+        """Keep what a task found by recorded images, when its witness is known."""
         self._read = (*self._read, images)
-        self._add(done, status)
+        self._unkept = (*self._unkept, _TaskDone(done.task, done.tip, done.images))
 
     def settle(self, status: VerificationStatus) -> None:
         """Have written what was found, unless a witness will tell more of it."""
-        tip, state = status.tip, status.state
-        if tip is None or state is None:
+        state = status.state
+        if state is None:
             return
-        waiting = {task for task, _ in state.unwitnessed}
+        waiting = {each.task for each in state.unwitnessed}
         done = self._unkept
         self._unkept = tuple(each for each in done if each.task in waiting)
         for each in done:
             found = state.found(each.task)
             if each.task not in waiting and found is not None:
-                self._add(Done(each.task, found, tip, each.images), status)
+                self._add(Done(each.task, found, each.tip, each.images), status)
 
     def forget_but(self, state: SessionState) -> None:
         """Forget the images of what is to be touched again."""
@@ -229,8 +228,13 @@ class SessionKeeping:
             raise
         self._file, self._read = file, under_way.read
         self._records.begin(before.files)
+        read = {done.task: done for done in before.read}
         for kind in before.unwritten:
-            self.add_task(kind, before.tip, witness)
+            if kind in read:
+                done = read[kind]
+                self._unkept = (*self._unkept, _TaskDone(kind, done.tip, done.images))
+            else:
+                self.add_task(kind, before.tip, witness)
 
     def _add(self, done: Done, status: VerificationStatus) -> None:
         """Have a task written, now or as soon as it can be."""

@@ -56,6 +56,24 @@ def with_drift(
 
 
 @dataclass(frozen=True, eq=False)
+class Unwitnessed:
+    """Touches of a task that is done, until the witness is visited again.
+
+    Attributes
+    ----------
+    setup : SessionSetup or None
+        By which recorded images were measured; None where it is the session's.
+    lamps : LampWitness or None
+        What fixed lamps in recorded images tell.
+    """
+
+    task: TaskKind
+    runs: Runs
+    setup: SessionSetup | None = None
+    lamps: LampWitness | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class SessionState:
     """A verification at one moment.
 
@@ -72,7 +90,7 @@ class SessionState:
         though they are as many as needed.
     visits : tuple of tuple of Touch
         Of the cone that is the witness, so far.
-    unwitnessed : tuple of (TaskKind, Runs)
+    unwitnessed : tuple of Unwitnessed
         What was found since the last visit, which does not count the drift yet.
     """
 
@@ -86,7 +104,7 @@ class SessionState:
     articulation: Articulation | None = None
     drift: Drift | None = None
     visits: tuple[tuple[Touch, ...], ...] = ()
-    unwitnessed: tuple[tuple[TaskKind, Runs], ...] = ()
+    unwitnessed: tuple[Unwitnessed, ...] = ()
 
     def found(self, kind: TaskKind) -> Found | None:
         """Return what a task has found; None until it is done."""

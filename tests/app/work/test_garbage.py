@@ -48,7 +48,7 @@ def test_garbage_of_any_thread_is_collected_in_that_of_the_window(
     threads.clear()
 
     in_a_thread()
-    qtbot.waitUntil(lambda: bool(threads), timeout=60_000)
+    qtbot.waitUntil(lambda: bool(threads))
 
     assert set(threads) == {threading.get_ident()}
 

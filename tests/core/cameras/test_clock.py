@@ -24,8 +24,8 @@ def test_a_time_that_is_over_is_not_waited_for(
     clock: Clock, wake: Event | None
 ) -> None:
     before = clock.now_ns()
-    assert not clock.wait(-1e-6, wake)
-    assert 0 <= clock.now_ns() - before < 1_000_000_000
+    assert not clock.wait(-600.0, wake)
+    assert 0 <= clock.now_ns() - before < 60_000_000_000
 
 
 def test_a_wait_ends_when_woken(clock: Clock) -> None:

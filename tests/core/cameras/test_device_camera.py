@@ -1,6 +1,7 @@
 """A camera that a library drives, when what it is told does not arrive."""
 
 import pytest
+from typing_extensions import override
 
 from lightpen.cameras.basler import BASLER
 from lightpen.cameras.clock import MachineClock
@@ -9,6 +10,18 @@ from lightpen.cameras.protocol import CameraSettings, FrameTimeout, TriggerMode
 from lightpen.cameras.source import SourcePlace
 
 TRIGGERED = CameraSettings(trigger=TriggerMode.SOFTWARE, frame_rate=50)
+
+
+class TickingClock(MachineClock):
+    """A clock that goes on by a tenth of a second whenever it is looked at."""
+
+    def __init__(self) -> None:
+        self._now_ns = 0
+
+    @override
+    def now_ns(self) -> int:
+        self._now_ns += 100_000_000
+        return self._now_ns
 
 
 def test_a_trigger_that_never_reached_the_camera_is_given_again(
@@ -24,7 +37,7 @@ def test_a_trigger_that_never_reached_the_camera_is_given_again(
 
     monkeypatch.setattr(GenapiFeatures, "execute", lose_the_first)
     assert BASLER.camera is not None
-    camera = BASLER.camera(basler, MachineClock())
+    camera = BASLER.camera(basler, TickingClock())
     camera.open()
     try:
         camera.configure(TRIGGERED)

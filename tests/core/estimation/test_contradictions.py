@@ -47,6 +47,27 @@ def off_by(covariance: FloatArray | None, **changes: float) -> Camera:
     return replace(CAMERA.with_intrinsics(intrinsics), covariance=covariance)
 
 
+def wrong_file(**changes: float) -> Camera:
+    """Return one that states f to 0.1 %: ``f`` and ``aspect`` off by a share."""
+    covariance = drawn_covariance()
+    covariance[:2, :2] /= 9
+    intrinsics = CAMERA.intrinsics
+    intrinsics[:2] *= 1 + changes.get("f", 0.0)
+    intrinsics[1] *= 1 + changes.get("aspect", 0.0)
+    intrinsics[2:5] += [changes.get(name, 0.0) for name in ("cx", "cy", "k1")]
+    return replace(CAMERA.with_intrinsics(intrinsics), covariance=covariance)
+
+
+def named_numbers(camera: Camera) -> dict[str, float]:
+    return {
+        "focal length": 0.5 * (camera.fx + camera.fy),
+        "ratio fy / fx of the focal lengths": camera.fy / camera.fx,
+        "principal point cx": camera.cx,
+        "principal point cy": camera.cy,
+        "distortion coefficient k1": float(camera.distortion[0]),
+    }
+
+
 def calibrated(
     file: Camera, seed: int, n_images: int = 60
 ) -> tuple[Swing, Calibration]:
@@ -160,6 +181,35 @@ def test_what_lies_far_beyond_the_files_own_uncertainty_is_named_with_both_value
     # What is refuted no longer pulls at the tip.
     error = np.abs(result.joint.tip_pen - swing.tip_pen)
     assert (error <= 1.5 * result.budget.expanded_uncertainty[:3]).all()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"f": 0.01, "aspect": 0.003},
+        {"f": 0.01, "cy": 25.0},
+        {"f": -0.01, "cx": -15.0, "k1": 0.15},
+        {"f": 0.01, "cx": 15.0, "cy": 25.0},
+    ],
+    ids=str,
+)
+def test_several_wrong_numbers_are_told_as_the_images_want_them_together(
+    changes: dict[str, float],
+) -> None:
+    file = wrong_file(**changes)
+    _, result = calibrated(file, 1)
+    fitted = named_numbers(result.bundle.state.rig.cameras[0])
+    stated, true = named_numbers(file), named_numbers(CAMERA)
+    wrong = {name for name in true if abs(stated[name] - true[name]) > 1e-9}
+    found = {str(each.what): each for each in result.contradictions}
+    deviations = [each.deviations for each in result.contradictions]
+
+    assert set(found) == wrong
+    assert deviations == sorted(deviations, reverse=True)
+    for name, each in found.items():
+        assert abs(each.wanted - true[name]) <= 1.5 * each.wanted_uncertainty
+        # Next to nothing of what the file says of them is left.
+        assert abs(each.wanted - fitted[name]) <= 0.02 * each.wanted_uncertainty
 
 
 def test_noise_that_lasts_contradicts_no_true_file() -> None:

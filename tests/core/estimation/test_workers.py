@@ -1,5 +1,6 @@
 """Tests of `lightpen.estimation.workers`: processes here, and a real Dask cluster."""
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ def square(number: int) -> int:
 
 def touch_file(place: str) -> None:
     Path(place).touch()
+    time.sleep(0.1)
 
 
 @pytest.fixture(scope="module")

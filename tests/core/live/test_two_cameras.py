@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 TIMEOUT = 60.0  # s until a test gives up
 TINY = Camera(width=102, height=86, fx=193, fy=193, cx=51, cy=43)
 HOUR_NS = 3_600_000_000_000
+ON_THEIR_WAY_NS = 5_000_000
 HELD_UP_NS, N_HELD_UP = 100_000_000, 20
 SETTINGS = CameraSettings(frame_rate=25.0, region=Region(0, 0, 160, 120))
 
@@ -119,12 +120,22 @@ def make_live(
         live.stop()
 
 
+class PunctualCamera(SimulatedCamera):
+    """Its images take the same time on their way, whatever else the machine does."""
+
+    @override
+    def read(self, timeout_s: float) -> Frame:
+        frame = super().read(timeout_s)
+        assert frame.device_ts_ns is not None
+        return replace(frame, host_ts_ns=frame.device_ts_ns + ON_THEIR_WAY_NS)
+
+
 @pytest.fixture
 def simulated() -> tuple[SimulatedCamera, SimulatedCamera]:
     scene, clock = Scene(camera=TINY), MachineClock()
-    first = SimulatedCamera(scene, clock)
+    first = PunctualCamera(scene, clock)
     rig = beside(scene.camera, scene.cone_cam)
-    return first, SimulatedCamera(scene, clock, first.operator, rig=rig)
+    return first, PunctualCamera(scene, clock, first.operator, rig=rig)
 
 
 def test_images_of_two_simulated_cameras_come_by_moments(
@@ -134,6 +145,7 @@ def test_images_of_two_simulated_cameras_come_by_moments(
 ) -> None:
     live = make_live(simulated)
     screen.wait_for_moments(15)
+    screen.wait_until(lambda: live.lag_ms is not None)
     assert live.lag_ms == pytest.approx(0.0, abs=0.01)  # as one signal triggers both
     for one, other in screen.moments():
         assert one.frame.others[0] is other.frame
@@ -156,17 +168,17 @@ def test_a_second_camera_is_looked_at_before_it_is_known_what_for(
     assert screen.failures == []
 
 
-class HeldUpCamera(SimulatedCamera):
+class HeldUpCamera(PunctualCamera):
     """Has a clock of its own; its first images are held up on their way."""
 
     @override
     def read(self, timeout_s: float) -> Frame:
         frame = super().read(timeout_s)
         assert frame.device_ts_ns is not None
-        late_ns = HELD_UP_NS if frame.seq < N_HELD_UP else 0
+        late_ns = HELD_UP_NS if self.stats().delivered <= N_HELD_UP else 0
         return replace(
             frame,
-            host_ts_ns=frame.device_ts_ns + late_ns,
+            host_ts_ns=frame.host_ts_ns + late_ns,
             device_ts_ns=frame.device_ts_ns + HOUR_NS,
         )
 
@@ -186,8 +198,7 @@ def test_images_held_up_at_first_are_told_and_paired_rightly_afterwards(
 
     said = re.search(r"(\d+) ms apart", screen.troubles[0])
     assert said is not None
-    # The images of the first camera take some milliseconds, more on a busy machine.
-    assert HELD_UP_NS - 20_000_000 < 1_000_000 * int(said[1]) <= HELD_UP_NS
+    assert 1_000_000 * int(said[1]) == HELD_UP_NS
     assert len(screen.troubles) == 1
     for one, other in screen.moments()[n_before + 1 :]:
         assert one.frame.device_ts_ns is not None
@@ -207,6 +218,7 @@ def test_a_lost_image_costs_its_moment_and_is_counted(
     simulated[1].faults.stall(0.3)
     screen.wait_until(lambda: live.stats.unpaired >= before + 4)
     screen.wait_for_moments(3)
+    live.stop()
     assert live.stats.delivered == sum(
         live.worker(camera).stats.delivered for camera in (0, 1)
     )
@@ -254,13 +266,18 @@ def test_two_cameras_are_still_paired_when_nothing_has_moved_for_long(
     screen.wait_until(lambda: Connection.LOST in screen.connections[1])
     gige_pair[1].plug_in()
     screen.wait_until(lambda: screen.connections[1][-1] is Connection.STREAMING)
-    back_ns = MachineClock().now_ns()
-    screen.wait_for_moments(4)
+    screen.wait_for_moments(6)
 
-    assert screen.shown_ns()[-4] - back_ns < 5e9
-    gaps = np.diff(screen.shown_ns()[-4:]) * 1e-9
+    gaps = np.diff(screen.shown_ns()[-6:]) * 1e-9
     assert np.all(gaps > 0.9 * UNHURRIED)
-    assert np.all(gaps < 2 * UNHURRIED)
+    assert np.median(gaps) < 2 * UNHURRIED  # a busy machine may miss some moments
+
+
+def period_ms(images: Sequence[LiveImage]) -> float:
+    """Return the time from one image of a camera to the next."""
+    taken_ns = np.array([image.frame.device_ts_ns for image in images], np.int64)
+    seqs = np.array([image.frame.seq for image in images])
+    return float(np.median(np.diff(taken_ns) / np.diff(seqs))) * 1e-6
 
 
 def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
@@ -276,7 +293,7 @@ def test_two_gige_cameras_are_paired_and_each_comes_back_by_itself(
         assert other.frame.image[0, 0] == 20
     assert [live.worker(camera).serial for camera in (0, 1)] == ["LP01", "LP02"]
     assert live.lag_ms is not None  # nothing triggers them together
-    assert abs(live.lag_ms) <= 20.5
+    assert abs(live.lag_ms) <= 0.52 * period_ms([one for one, _ in screen.moments()])
 
     n_before = len(screen.images[0])
     gige_pair[1].unplug()

@@ -9,6 +9,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from tests.accepted_tip import (
@@ -253,6 +254,71 @@ def test_recorded_images_do_a_task(at_it: Verifier, recorded: Path) -> None:
     (record,) = at_it.records
     assert len(record["inputs"]["images"]) == 5
     assert len(record["touches"]) == 5
+
+
+@pytest.fixture
+def bumped(recorded: Path, tmp_path: Path) -> Path:
+    """Two visits of a witness, between which the camera moved by one pixel."""
+    for visit in range(2):
+        folder = tmp_path / "visits" / f"{visit}"
+        folder.mkdir(parents=True)
+        for file in recorded.glob("[012].png"):
+            image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+            assert image is not None
+            moved = np.roll(image, visit, axis=1).astype(np.uint8)
+            (folder / file.name).write_bytes(encode_png(moved))
+    return tmp_path / "visits"
+
+
+WITNESSED = replace(CHOICES, kinds=(TaskKind.FIXED_POINT, TaskKind.DRIFT))
+
+
+def test_a_task_read_before_its_witness_is_kept_with_the_drift_in_its_budget(
+    at_it: Verifier, recorded: Path, bumped: Path
+) -> None:
+    at_it.come(WITNESSED)
+    at_it.read(TaskKind.FIXED_POINT, recorded)
+    assert at_it.status.state is not None
+    assert at_it.status.state.fixed_point is not None
+    before = at_it.status.state.fixed_point.uncertainty
+    assert at_it.records == []  # its witness will tell more of it
+
+    at_it.read(TaskKind.DRIFT, bumped)
+    assert at_it.status.is_done
+    assert at_it.status.state.drift is not None
+    share = at_it.status.state.drift.share
+    found = {each["verification"]: each for each in at_it.records}
+    after = np.array(found[TaskKind.FIXED_POINT]["expanded_uncertainty_mm"])
+    assert len(at_it.records) == len(found) == 2
+    assert share[0] > 0.1  # a pixel where the pen is, over the root of 3
+    assert after == pytest.approx(np.hypot(before, 2 * share), rel=1e-3)
+    assert len(at_it.conclusions[0]["records"]) == 2
+
+
+def test_a_task_read_before_a_kill_still_waits_for_its_witness(
+    at_it: Verifier, recorded: Path, bumped: Path
+) -> None:
+    at_it.come(WITNESSED)
+    at_it.read(TaskKind.FIXED_POINT, recorded)
+    folder = at_it.folder.parent / "killed"
+    shutil.copytree(at_it.folder, folder)  # what a kill would have left
+    again = Verifier(folder, at_it.preparation)
+    again.runner.choose(again.preparation, WITNESSED)
+    (interrupted,) = find_interrupted(folder)
+    again.runner.go_on(interrupted)
+    again.ear.wait_until(lambda: again.status.began is not None)
+    assert again.records == []
+
+    again.read(TaskKind.DRIFT, bumped)
+    point, drift = again.records
+    assert again.ear.troubles == []
+    again.runner.shut_down()
+    assert again.runner.await_end(TIMEOUT)
+    assert point["verification"] == TaskKind.FIXED_POINT
+    assert len(point["inputs"]["images"]) == 5
+    assert point["expanded_uncertainty_mm"][0] > (
+        2 * drift["standard_uncertainty_share_mm"][0]
+    )
 
 
 def test_a_folder_without_images_is_told(at_it: Verifier, tmp_path: Path) -> None:

@@ -173,7 +173,8 @@ class SwingWords(QObject):
         limit = moment.setup.limits.max_images
         text = self.tr("at most {0} images").format(limit)
         if moment.setup.is_recording:
-            text = self.tr("recorded images")
+            text = self._read(moment) if moment.state.phase in ENDED else ""
+            text = text or self.tr("recorded images")
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
@@ -192,8 +193,9 @@ class SwingWords(QObject):
 
     def warning(self, moment: Moment) -> Remark:
         """Return what no swing can mend, told as soon as it is known."""
-        why = out_of_reach(moment.setup.limits, moment.state)
-        if why is None or moment.state.phase is Phase.VERDICT:
+        why = out_of_reach(moment.setup.limits, moment.state, moment.short)
+        is_asked = not moment.setup.is_recording
+        if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
             return Remark()
         return Remark(worded(why), Sign.WARNING, Tone.WARN)
 
@@ -259,9 +261,9 @@ class SwingWords(QObject):
         if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
         if moment.is_away and is_recording:
-            hint = self.tr("The review is open at the screen.")
+            hint = self.tr("Go on at the screen.")
         elif moment.is_away:
-            hint = self.tr("Put the pen down. The review is open at the screen.")
+            hint = self.tr("Put the pen down. Go on at the screen.")
         elif is_recording:
             hint = self.tr("Go on to the review.")
         else:
@@ -326,15 +328,19 @@ class SwingWords(QObject):
         if state.phase in ENDED:
             return n_images_text(n_kept)
         if moment.setup.is_recording:
-            progress = state.progress
-            if not progress.n_images:
-                return ""
-            words = self.tr("{0} of {1} read")
-            return words.format(progress.n_read, progress.n_images)
+            return self._read(moment)
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)
         return self.tr("{0} kept, {1} to go").format(n_kept, _to_go(moment).n_images)
+
+    def _read(self, moment: Moment) -> str:
+        """Return how many images of a recording are read; nothing before the first."""
+        progress = moment.state.progress
+        if not progress.n_images:
+            return ""
+        words = self.tr("{0} of {1} read")
+        return words.format(progress.n_read, progress.n_images)
 
     def _time_left(self, moment: Moment) -> str:
         """Return how long the swing goes on at the pace of the last images."""

@@ -90,7 +90,7 @@ def test_a_folder_of_images_becomes_a_camera_file_in_use(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
     window.read_folder(written(tmp_path, images))
-    qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
     path = str(tmp_path / "camera.yaml")
     with qtbot.waitSignal(window.saved) as saved:
         window.save(path)
@@ -123,11 +123,11 @@ def test_a_view_that_is_left_out_takes_no_part(
     window: BoardWindow, images: list[Image], tmp_path: Path, qtbot: QtBot
 ) -> None:
     window.read_folder(written(tmp_path, images))
-    qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+    qtbot.waitUntil(lambda: views_listed(window) == 7)
     window.findChildren(QListWidget)[0].setCurrentRow(0)
     press(window, "Leave out and calibrate again")
 
-    qtbot.waitUntil(lambda: views_listed(window) == 6, timeout=60_000)
+    qtbot.waitUntil(lambda: views_listed(window) == 6)
 
 
 def test_a_board_that_is_none_is_refused(window: BoardWindow) -> None:
@@ -142,7 +142,7 @@ def test_images_without_a_board_are_refused_with_the_reason(
 ) -> None:
     window.read_folder(written(tmp_path, [np.full((160, 200), 40, np.uint8)]))
 
-    qtbot.waitUntil(lambda: "None of the 1 images" in remark(window), timeout=60_000)
+    qtbot.waitUntil(lambda: "None of the 1 images" in remark(window))
 
 
 def test_a_board_held_still_is_kept_by_itself(
@@ -156,7 +156,7 @@ def test_a_board_held_still_is_kept_by_itself(
             count += 1
             shown = _shown(image, count)
             workbench.live.image_shown.emit(shown)
-            qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+            qtbot.waitUntil(lambda: window._searching is None)
 
     overlay = view.overlay()
     assert overlay.cells is not None
@@ -174,7 +174,7 @@ def test_another_board_held_before_the_camera_is_named(
     told = []
     for count in range(6):  # in 4 s
         workbench.live.image_shown.emit(_shown(images[0], 2 * count))
-        qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+        qtbot.waitUntil(lambda: window._searching is None)
         told.append(remark(window))
 
     assert "not seen" in told[0]
@@ -195,7 +195,7 @@ def test_whatever_becomes_of_an_attempt_is_kept_with_the_hash_of_each_image(
     folder = written(tmp_path, images)
     for _ in range(2):  # the first is not used
         window.read_folder(folder)
-        qtbot.waitUntil(lambda: views_listed(window) == 7, timeout=60_000)
+        qtbot.waitUntil(lambda: views_listed(window) == 7)
     with qtbot.waitSignal(window.saved):
         window.save(str(tmp_path / "camera.yaml"))
     window.close()
@@ -222,7 +222,7 @@ def test_views_that_were_kept_and_never_computed_are_abandoned(
     press(window, "Start")
     for count in range(1, 4):
         workbench.live.image_shown.emit(_shown(images[0], count))
-        qtbot.waitUntil(lambda: window._searching is None, timeout=60_000)
+        qtbot.waitUntil(lambda: window._searching is None)
     window.close()
 
     (trial,) = told

@@ -4,7 +4,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,8 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 from typing_extensions import override
 
+from lightpen.live.sources import Surroundings
+from lightpen.local_time import local_now
 from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.folder_archive import FolderArchive
@@ -59,6 +61,7 @@ Key = Qt.Key
 LEFT = Qt.MouseButton.LeftButton
 BLACK = np.zeros((8, 8), np.uint8)
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
+NOON = local_now().replace(hour=12, minute=0)  # in a test no day ends
 ODD = 'Ä/\\ 王 %41, "x"; \'' + 170 * "w"
 
 
@@ -155,6 +158,12 @@ def focused() -> QWidget:
     return widget
 
 
+@pytest.fixture(scope="module")
+def around(around: Surroundings) -> Surroundings:
+    """Return what is around everywhere, always at the same moment."""
+    return replace(around, now=lambda: NOON)
+
+
 @pytest.fixture
 def fresh(settings: Settings, tmp_path: Path) -> Iterator[Workbench]:
     """A workbench on which nothing was ever chosen."""
@@ -197,7 +206,7 @@ def accepted(
     names = replace(named, pen=pen or named.pen, tip=tip or named.tip)
     result = Result(
         names=replace(names, ball_diameter=ball or named.ball_diameter),
-        accepted=datetime.now().astimezone() - age,
+        accepted=NOON - age,
         grade=grade,
         record=workbench.run.records_folder / "elsewhere",
         images=(),
@@ -224,7 +233,7 @@ def interrupted(
     """Leave a swing without a verdict on the disk."""
     now = workbench.preparation
     given = replace(now, names=names or now.names)
-    created = datetime.now().astimezone() - timedelta(hours=hours_ago)
+    created = NOON - timedelta(hours=hours_ago)
     setup, rng = given.swing_setup(), np.random.default_rng(5)
     swing = swing_poses(n_images, rng)
     pixels = simulate_centers(
@@ -977,8 +986,31 @@ def test_without_a_camera_it_is_told_where_to_choose_one(
     qtbot.wait_until(lambda: bool(start.notices))
 
     assert start.notices[-1].startswith("No camera is open. Choose the source")
+    assert "at the step Camera: Simulated pen. Then" in start.notices[-1]
     assert start.steps == []
     assert workbench.run.status.state is None
+
+
+def test_a_swing_of_another_source_names_the_source_that_it_wants(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    tmp_path: Path,
+) -> None:
+    simulated = workbench.preparation
+    recorded = SourceChoice(SourceKind.RECORDED, str(tmp_path / "monday"))
+    workbench.set_preparation(replace(simulated, source=recorded))
+    interrupted(workbench, "a")
+    workbench.set_preparation(simulated)
+    workbench.open_camera()
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    wanted = f"another source of images: Recorded images, {tmp_path / 'monday'}."
+    assert wanted in start.notices[-1]
+    assert start.steps == []
 
 
 def test_a_swing_does_not_go_on_with_images_of_another_size(

@@ -11,7 +11,14 @@ from lightpen.messages import PEN_LOST, tip_is_good
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.swing.shortfall import measure_shortfall
-from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState, start_swing
+from lightpen.swing.state import (
+    Pause,
+    Phase,
+    Progress,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
 from lightpen_app.steps.swing.moment import Moment, SwingWords
 from lightpen_app.steps.swing.to_go import ToGo, in_true_steps
 from lightpen_app.widgets.sign_label import Remark
@@ -65,6 +72,23 @@ def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
     assert value.dial.target is None
 
 
+def test_at_the_end_of_a_recording_it_is_told_how_much_of_it_was_read(
+    words: SwingWords,
+) -> None:
+    done = at_verdict(setup=RECORDING)
+    state = replace(done.state, progress=Progress(60, 60))
+
+    assert words.note(replace(done, state=state)) == "60 of 60 read"
+
+
+def test_away_from_the_swing_nobody_is_told_that_the_review_is_open(
+    words: SwingWords,
+) -> None:
+    hint = words.operator_value(at_verdict(is_away=True)).hint
+
+    assert hint == "Put the pen down. Go on at the screen."
+
+
 def test_without_a_swing_nothing_is_wrong_on_the_other_steps(words: SwingWords) -> None:
     value = words.resting_value()
 
@@ -97,10 +121,17 @@ def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -
     state = replace(state, kept=replace(state.kept, reached=vague))
     setup = replace(SETUP, limits=SwingLimits(max_uncertainty=0.002))
 
-    told = words.warning(replace(moment(state), setup=setup))
+    early = replace(moment(state), setup=setup)
+    short = replace(early.short, fields=np.zeros_like(early.short.fields))
+    late = replace(early, short=short)
+
+    told = words.warning(late)
 
     assert "cannot get below 4.2 \N{MICRO SIGN}m with this LED file" in told.text
-    assert words.warning(moment(state)) == Remark()
+    assert words.warning(early) == Remark()
+    assert words.warning(replace(late, setup=SETUP)) == Remark()
+    is_read = replace(setup, is_recording=True)
+    assert words.warning(replace(late, setup=is_read)) == Remark()
 
 
 def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
+from typing import TYPE_CHECKING
 
 import pytest
 from PySide6.QtCore import Qt
@@ -48,6 +49,9 @@ from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.question_bar import QuestionBar
 from lightpen_app.work.settings import Preferences, Settings
 from lightpen_app.work.workbench import Workbench
+
+if TYPE_CHECKING:
+    from tests.app.conftest import SolvingOn
 
 Key = Qt.Key
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
@@ -436,19 +440,20 @@ def test_after_the_verdict_more_can_be_captured(
 
 
 def test_computing_can_be_stopped_and_begun_again(
-    qtbot: QtBot, at_verdict: Desk
+    qtbot: QtBot, at_verdict: Desk, solving_on: "SolvingOn"
 ) -> None:
     desk = at_verdict
     desk.let_operator_swing()
     desk.click("Capture more")
     until(qtbot, lambda: desk.value.state.word == "CAPTURING")
-    desk.finish()
-    until(qtbot, lambda: desk.run.status.is_solving)
-    until(qtbot, lambda: desk.offers("Stop computing"))
+    with solving_on():
+        desk.finish()
+        until(qtbot, lambda: desk.run.status.is_solving)
+        until(qtbot, lambda: desk.offers("Stop computing"))
 
-    desk.click("Stop computing")
+        desk.click("Stop computing")
 
-    until(qtbot, lambda: desk.value.instruction == "Not computed")
+        until(qtbot, lambda: desk.value.instruction == "Not computed")
     assert desk.value.state.word == "STOPPED"
     assert "The tip is not computed yet." in desk.words()
     assert "is offered again" in desk.page.unsaved()
@@ -485,11 +490,16 @@ def test_an_accepted_swing_is_left_alone_and_the_next_one_begins(
 def test_a_covered_pen_is_told_and_the_swing_goes_on_by_itself(
     qtbot: QtBot, capturing: Desk
 ) -> None:
+    n_told, n_played = len(capturing.shown), len(capturing.recorder.played)
+
+    def lost() -> list[OperatorValue]:
+        return [v for v in capturing.shown[n_told:] if v.state.word == "PEN LOST"]
+
     capturing.click("Cover")
 
-    until(qtbot, lambda: capturing.value.state.word == "PEN LOST")
-    assert capturing.value.instruction == "Pen not seen"
-    assert capturing.recorder.sounds()[-1] is Sound.LOST
+    until(qtbot, lambda: bool(lost()))
+    assert lost()[0].instruction == "Pen not seen"
+    assert Sound.LOST in capturing.recorder.sounds()[n_played:]
     keep_on(qtbot, capturing)
 
 
