@@ -265,8 +265,9 @@ def test_the_program_itself_writes_to_a_record_once_at_a_time(
 
 
 def test_a_writer_waits_for_one_who_is_about_to_close(
-    tmp_path: Path, header: Header
+    tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("lightpen.record.lock.PATIENCE", 60.0)
     folder = recorded(tmp_path / "swing", header, 1)
     first = RecordWriter.resume(open_record(folder))
     closing = Timer(0.1, first.close)

@@ -47,7 +47,7 @@ class LivePanel(Translated, QWidget):
         super().__init__(parent)
         self._connection = Connection.CLOSED
         self._sentence = ""
-        self._is_recorded = False
+        self._recorded: Origin | None = None
         self._shown = 0  # of the cameras
         self._arrivals: deque[tuple[int, int]] = deque(maxlen=N_TIMED)  # ns, number
         self._seen: LiveImage | None = None
@@ -135,10 +135,10 @@ class LivePanel(Translated, QWidget):
         self._connection, self._sentence = connection, sentence
         self._refresh()
 
-    def set_recorded(self, is_recorded: bool) -> None:
-        """Say whether the images were recorded before, and are shown again."""
-        if is_recorded != self._is_recorded:
-            self._is_recorded = is_recorded
+    def set_recorded(self, origin: Origin | None) -> None:
+        """Say what recorded images are of, which are shown again; None for others."""
+        if origin is not self._recorded:
+            self._recorded = origin
             self._refresh()
 
     def _forget(self) -> None:
@@ -180,8 +180,8 @@ class LivePanel(Translated, QWidget):
         match self._connection:
             case Connection.OPENING:
                 return Remark(self.tr("Connecting"), Sign.WAIT, Tone.ACTIVE)
-            case Connection.STREAMING if self._is_recorded:
-                return origin_remark(Origin.RECORDED)
+            case Connection.STREAMING if self._recorded is not None:
+                return origin_remark(self._recorded)
             case Connection.STREAMING:
                 return Remark(self.tr("Live"), Sign.PLAY, Tone.GOOD)
             case Connection.SILENT:

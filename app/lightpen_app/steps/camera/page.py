@@ -244,7 +244,7 @@ class CameraPage(Rearranged, Page):
         self._show_camera(self._live.chosen)
         self._show_connection()  # what is missing to open one may be another
         is_recorded = now.source.kind == SourceKind.RECORDED
-        self._images.set_recorded(is_recorded)
+        self._images.set_recorded(now.origin if is_recorded else None)
         self._focus.set_recorded(is_recorded)
         self._stray.set_n_masked(len(self._mask))
         self._mark()

@@ -349,6 +349,9 @@ def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     assert left < 1 < 4 < right
     assert low < 0.0061 < 0.012 < high  # the limit is in sight
     assert panel.words().startswith("Pen LP-04, tip T-10: 4 calibrations, 2026-01-02")
+    desk.select(0)
+    desk.until(lambda: len(panel.value().tips) == 1)
+    assert panel.words().startswith("Pen LP-04, tip T-11: one calibration, 2026-01")
 
 
 def test_two_that_are_selected_are_compared(desk: Desk) -> None:

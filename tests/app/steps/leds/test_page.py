@@ -742,6 +742,19 @@ def test_changes_of_the_table_are_undone_and_redone_by_keys(seen: "Seen") -> Non
     assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", "162")
 
 
+def test_the_focus_goes_from_undo_to_redo_and_back_when_nothing_is_left_to_do(
+    seen: "Seen",
+) -> None:
+    type_cell(seen, 7, Y, "161")
+    undo, redo = seen.named("Undo"), seen.named("Redo")
+    undo.setFocus()
+
+    QTest.keyClick(undo, Qt.Key.Key_Space)
+    assert undo.window().focusWidget() is redo
+    QTest.keyClick(redo, Qt.Key.Key_Space)
+    assert undo.window().focusWidget() is undo
+
+
 def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None:
     tip = seen.named("Nominal centre of the tip, x, mm")
     QTest.keyClicks(tip, "12.5")

@@ -889,6 +889,22 @@ def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
     assert view.markers()
 
 
+def test_of_another_swing_the_worst_image_is_shown_first(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    panel, solution = the(page, ImagesPanel), workbench.run.status.solution
+    assert solution is not None
+    worst = table(page).value()[0].number
+    table(page).choose(table(page).value()[4].number)
+    panel.set_value(solution)
+    assert table(page).number() != worst  # it stays chosen
+
+    source = replace(solution.source, folder=solution.source.folder / "other")
+    panel.set_value(replace(solution, source=source))
+    assert table(page).number() == worst
+    assert len(table(page).selected()) == 1
+
+
 def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:
     (bed.swing / "images" / f"{DAMAGED:06d}.png").write_bytes(b"no image")
     bed.solve()

@@ -19,7 +19,8 @@ from lightpen.swing.state import (
     SwingState,
     start_swing,
 )
-from lightpen_app.steps.swing.moment import Moment, SwingWords, in_true_steps
+from lightpen_app.steps.swing.moment import Moment, SwingWords
+from lightpen_app.steps.swing.to_go import ToGo, in_true_steps
 from lightpen_app.widgets.sign_label import Remark
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
@@ -141,3 +142,34 @@ def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
     nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
     assert words.stand(replace(at_verdict(), setup=nobody)) is None
+
+
+def told(*estimates: tuple[int, int]) -> list[int]:
+    """What is told to be to go after estimates of images to go, and kept."""
+    to_go = ToGo.first(*estimates[0])
+    found = [to_go.n_images]
+    for n_more, n_kept in estimates[1:]:
+        to_go = to_go.after(n_more, n_kept)
+        found.append(to_go.n_images)
+    return found
+
+
+def test_what_is_to_go_does_not_creep_up() -> None:
+    assert told((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
+        *(25, 25, 25, 15, 4, 4)
+    ]
+
+
+def test_more_is_to_go_after_images_were_dropped() -> None:
+    assert told((4, 50), (10, 44)) == [4, 10]
+
+
+def test_a_rise_that_is_no_chance_is_told_with_its_reason(words: SwingWords) -> None:
+    to_go = ToGo.first(4, 50).after(4, 51).after(40, 52)
+    assert (to_go.n_images, to_go.has_risen) == (40, True)
+    capturing = replace(start_swing(SETUP), phase=Phase.CAPTURING)
+
+    note = words.note(moment(capturing, to_go=to_go))
+    assert note == "at most 300 images  ·  more are needed, as U (k = 2) has risen"
+    calm = words.note(moment(capturing, to_go=to_go.after(20, 53)))
+    assert "more are needed" not in calm
