@@ -40,7 +40,11 @@ ACCEPTED = datetime(2031, 4, 30, 12, tzinfo=UTC)
 
 
 def accept_tip(
-    data: Path, preparation: Preparation, seed: int = 3, led_error: float = 0.0
+    data: Path,
+    preparation: Preparation,
+    seed: int = 3,
+    led_error: float = 0.0,
+    grade: str = "pass",
 ) -> Path:
     """Put a tip in force by a simulated swing; return the file of its result.
 
@@ -74,7 +78,7 @@ def accept_tip(
         Result(
             names=names,
             accepted=ACCEPTED,
-            grade="pass",
+            grade=grade,
             record=data / "records" / "swing",
             images=(),
             calibration=calibration_record(found, inputs, "joint", preparation.limits),

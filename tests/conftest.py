@@ -282,13 +282,14 @@ MakeOnce = Callable[[str, Callable[[Path], object]], Path]
 
 
 @pytest.fixture(scope="session")
-def once(worker_id: str, tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
+def once(tmp_path_factory: pytest.TempPathFactory) -> MakeOnce:
     """Return a function that has a folder made once, by whoever needs it first.
 
     It belongs to all processes of a parallel run: copy it before you change it.
     """
     own = tmp_path_factory.getbasetemp()
-    shelf = (own if worker_id == "master" else own.parent) / "made-once"
+    is_parallel = "PYTEST_XDIST_WORKER" in os.environ
+    shelf = (own.parent if is_parallel else own) / "made-once"
     shelf.mkdir(exist_ok=True)
 
     def made(what: str, make: Callable[[Path], object]) -> Path:

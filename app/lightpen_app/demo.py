@@ -112,7 +112,8 @@ class Demo(QObject):
             ),
             "review": self.tr("Demo: the tip, what it is worth, and why."),
         }
-        self.told.emit(words[key])
+        if key in words:  # else somebody looks round
+            self.told.emit(words[key])
         operator = self._workbench.live.operator
         if operator is not None:
             operator.seat()

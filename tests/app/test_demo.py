@@ -84,3 +84,18 @@ def test_a_demo_whose_swing_is_not_good_enough_ends_all_the_same(
 
     assert walker.workbench.run.status.result is None
     assert "The demo ends here: there is no tip to accept." in walker.window.words()
+
+
+def test_a_demo_goes_on_after_somebody_looked_at_another_step(
+    open_wizard: "OpenWizard",
+) -> None:
+    walker = open_wizard()
+    demo = Demo(walker.window, walker.workbench, is_watched=False)
+    told: list[str] = []
+    demo.told.connect(told.append)
+    walker.click_step("History")
+    demo.start()
+
+    walker.until(lambda: bool(told))
+    assert told[0].startswith("Demo: station, pen, tip and cone are named.")
+    demo.deleteLater()

@@ -92,7 +92,7 @@ def compared(actual: QImage, expected: QImage) -> Difference:
     grey = QImage.Format.Format_Grayscale8
     picture = QImage(shown.tobytes(), width, height, width, grey).copy()
     square = (SQUARE, SQUARE)
-    shares = cv2.blur(apart.astype(float), square, borderType=cv2.BORDER_CONSTANT)
+    shares = cv2.blur(apart.astype(np.float32), square, borderType=cv2.BORDER_CONSTANT)
     return Difference(float(shares.max()), picture)
 
 

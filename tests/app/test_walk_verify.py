@@ -85,6 +85,18 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.steps()["Verify"] == "now"
 
 
+def test_a_tip_that_was_accepted_with_doubts_is_verified_under_that_word(
+    known: "Walker",
+) -> None:
+    walker = known
+    accept_tip(walker.workbench.folder, walker.workbench.preparation, grade="check")
+    walker.click_step("Verify")
+
+    walker.until_tells("Tip T-10 of pen LP-04, in force since")
+    (lead,) = (text for text in walker.texts() if "in force since" in text)
+    assert lead.endswith("CHECK")
+
+
 def test_without_a_tip_in_force_the_step_says_so(
     settings: Settings, open_wizard: "OpenWizard"
 ) -> None:

@@ -419,7 +419,7 @@ class MainWindow(Rearranged, QMainWindow):
             for each in self._pages
         ]
         self._sidebar.set_steps(list_steps(statuses, self._now))
-        self._area.set_heading(page.title(), page.lead())
+        self._area.set_heading(page.title(), page.lead(), page.lead_tone())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
         if self._status_holds is not None and not self._status_holds():
             self._set_status("")

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 from typing_extensions import override
 
-from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
+from lightpen_app.look.theme import GRID, TextSize, Tone, set_tone, text_label
 from lightpen_app.shell.notice_bar import NoticeBar
 from lightpen_app.widgets.rearranged import Room
 
@@ -84,10 +84,11 @@ class PageArea(QFrame):
             each.setSizePolicy(wish, wish)
         self._stack.setCurrentWidget(page)
 
-    def set_heading(self, title: str, lead: str) -> None:
+    def set_heading(self, title: str, lead: str, tone: Tone = Tone.QUIET) -> None:
         """Say which page it is, and what to do on it."""
         self._title.setText(title)
         self._lead.setText(lead)
+        set_tone(self._lead, tone)
         self._lead.setVisible(bool(lead))
 
     def set_room(self, room: Room) -> None:

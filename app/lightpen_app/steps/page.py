@@ -6,6 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 from typing_extensions import override
 
+from lightpen_app.look.theme import Tone
 from lightpen_app.widgets.translated import Translated
 
 
@@ -81,6 +82,10 @@ class Page(Translated, QWidget):
     def lead(self) -> str:
         """Return what the step is for, one sentence shown below the title."""
         return ""
+
+    def lead_tone(self) -> Tone:
+        """Return the colour of that sentence."""
+        return Tone.QUIET
 
     def is_complete(self) -> bool:
         """Return whether all that the step asks for is there."""

@@ -38,6 +38,7 @@ from lightpen_app.look.theme import (
 )
 
 PNG_SCALE = 2
+MARK_HEIGHT = 3 * GRID  # px, below a saved plot
 LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
 LEAST_TITLE = 9  # px
@@ -156,22 +157,38 @@ class Plot(QWidget):
         self._restyle()
         self.titled.emit()
 
-    def save_png(self, path: Path) -> None:
-        """Write the plot as a picture, at twice the size on the screen.
+    def save_png(self, path: Path, mark: str = "") -> None:
+        """Write the plot as a picture, see `png`.
 
         Raises
         ------
         FileError
             The file cannot be written.
         """
-        write_whole(path, self.png())
+        write_whole(path, self.png(mark))
 
-    def png(self) -> bytes:
-        """Return the plot as a picture, at twice the size on the screen."""
-        image = QImage(self.size() * PNG_SCALE, QImage.Format.Format_RGB32)
+    def png(self, mark: str = "") -> bytes:
+        """Return the plot as a picture, at twice the size on the screen.
+
+        Parameters
+        ----------
+        mark : str
+            Stands below it, as what its images are of.
+        """
+        self.grab()  # what was never shown gets its size, and room for its numbers
+        below = MARK_HEIGHT if mark else 0
+        colors = colors_of(self.palette())
+        size = self.size() + QSize(0, below)
+        image = QImage(size * PNG_SCALE, QImage.Format.Format_RGB32)
         image.setDevicePixelRatio(PNG_SCALE)
+        image.fill(QColor(colors.panel))
         painter = QPainter(image)
         self.render(painter, QPoint())
+        painter.setFont(font(TextSize.SMALL, bold=True))
+        painter.setPen(QColor(colors.warn))
+        place = QRectF(GRID, self.height(), self.width() - 2 * GRID, below)
+        side = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(place, side, mark)
         painter.end()
         data = QByteArray()
         buffer = QBuffer(data)

@@ -1,16 +1,24 @@
 """One state, by a word, a sign and a colour, to be read from a distance."""
 
 from dataclasses import dataclass
+from math import ceil
 
 from PySide6.QtCore import QRectF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QShowEvent
+from PySide6.QtGui import (
+    QColor,
+    QFontMetricsF,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import QSizePolicy, QWidget
 from typing_extensions import override
 
 from lightpen_app.look.announcements import announce
 from lightpen_app.look.signs import Sign, draw_sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, colors_of, font
-from lightpen_app.widgets.fitted_text import fitted_size
+from lightpen_app.widgets.fitted_text import WRAPPED, fitted_size
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,8 @@ class StateBanner(QWidget):
     Parameters
     ----------
     word_size : float
-        Size of the word, px; the sentence is half of it, at least `TextSize.BODY`.
+        Size of the word, px; the sentence is half of it, at least `TextSize.BODY`, and
+        no smaller than `TextSize.SMALL` however long it is: the banner grows.
     speaks : bool
         Whether a screen reader is told; not where another banner says the same.
 
@@ -66,6 +75,8 @@ class StateBanner(QWidget):
     ) -> None:
         super().__init__(parent)
         self._value = State()
+        self._long_height = 0  # px; 0 while the sentence is short
+        self._detail_px = 0.0
         self._speaks = speaks
         self._speaking = QTimer(self)
         self._speaking.setSingleShot(True)
@@ -87,6 +98,7 @@ class StateBanner(QWidget):
         self._value = value
         self.setAccessibleName(value.word)
         self.setAccessibleDescription(value.detail)
+        self._ask_room()
         self.update()
         if is_new:
             self._speaking.start()
@@ -108,21 +120,49 @@ class StateBanner(QWidget):
         """Change the size of the word, px."""
         if word_size != self._word_size:
             self._word_size = word_size
+            self._ask_room()
             self.updateGeometry()
             self.update()
 
     @override
     def sizeHint(self) -> QSize:
-        height = 1.4 * self._word_size + 1.5 * self._detail_size + 3 * GRID
-        return QSize(round(7 * self._word_size), round(height / GRID + 0.5) * GRID)
+        usual = round((self._usual_height + 2 * GRID) / GRID + 0.5) * GRID
+        return QSize(round(7 * self._word_size), max(usual, self._long_height))
 
     @override
     def minimumSizeHint(self) -> QSize:
-        return QSize(200, 8 * GRID)
+        return QSize(200, max(8 * GRID, self._long_height))
+
+    @override
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._ask_room()
+
+    def _ask_room(self) -> None:
+        """Ask for so much height that a long sentence is not too small to read."""
+        beside = 1.1 * self._word_size + max(0.33 * self._word_size, 2 * GRID)
+        width = self.width() - 4 * GRID - ceil(beside)
+        metrics = QFontMetricsF(font(TextSize.SMALL))
+        box = QRectF(0, 0, max(width, 1), 1e6)
+        needed = metrics.boundingRect(box, WRAPPED, self._value.detail).height()
+        is_long = self._value.detail and needed > 0.38 * self._usual_height
+        height = ceil(self._word_height + needed) + 2 * GRID if is_long else 0
+        if height != self._long_height:
+            self._long_height = height
+            self.updateGeometry()
+
+    @property
+    def _usual_height(self) -> float:
+        """Height of the words, where the sentence is short, px."""
+        return 1.4 * self._word_size + 1.5 * self._detail_size + GRID
 
     @property
     def _detail_size(self) -> float:
         return max(0.45 * self._word_size, TextSize.BODY)
+
+    @property
+    def _word_height(self) -> float:
+        return QFontMetricsF(font(self._word_size, bold=True)).height()
 
     @override
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -159,11 +199,17 @@ class StateBanner(QWidget):
         painter.setPen(pen)
         painter.drawArc(place, 90 * 16, round(-360 * 16 * fraction))
 
+    def detail_px(self) -> float:
+        """Return the size of the letters of the sentence as it is drawn now, px."""
+        return self._detail_px
+
     def _draw_words(self, painter: QPainter, box: QRectF, ink: QColor) -> None:
         state = self._value
         painter.setPen(ink)
-        share = 0.62 if state.detail else 1.0
-        word_box = QRectF(box.left(), box.top(), box.width(), box.height() * share)
+        height = box.height() * (0.62 if state.detail else 1.0)
+        if self._long_height:
+            height = min(height, self._word_height)
+        word_box = QRectF(box.left(), box.top(), box.width(), height)
         single = int(Qt.TextFlag.TextSingleLine | Qt.AlignmentFlag.AlignVCenter)
         size = fitted_size(
             state.word, word_box, self._word_size, bold=True, flags=single
@@ -176,5 +222,6 @@ class StateBanner(QWidget):
             size = fitted_size(
                 state.detail, detail_box, self._detail_size, bold=False, flags=wrapped
             )
+            self._detail_px = size
             painter.setFont(font(size))
             painter.drawText(detail_box, wrapped, state.detail)

@@ -181,10 +181,12 @@ class TrendPanel(Rearranged, Translated, QWidget):
             return self.tr("Choose an entry with a tip: its trend is shown here.")
         days = (trend.entries[0].entry.event.at, trend.entries[-1].entry.event.at)
         first, last = (moment_text(day, "yyyy-MM-dd") for day in days)
+        names = shortened(trend.pen), shortened(trend.tip)
+        if len(trend.entries) == 1:
+            return self.tr(
+                "Pen {0}, tip {1}: one calibration, {2}. Dashed: the limit of U."
+            ).format(*names, first)
         return self.tr(
             "Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: three standard "
             "deviations from their mean, and the limit of U."
-        ).format(
-            *(shortened(trend.pen), shortened(trend.tip)),
-            *(len(trend.entries), first, last),
-        )
+        ).format(*names, len(trend.entries), first, last)

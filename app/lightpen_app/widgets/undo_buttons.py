@@ -74,20 +74,24 @@ class UndoButtons(Translated, QWidget):
     # A stack that is being deleted still tells these: it is not to be asked then.
 
     def _on_can_undo_changed(self, can_undo: bool) -> None:
-        self._can_undo = can_undo
-        self._refresh()
+        self._can_undo = can_undo  # a stack always tells the other next
 
     def _on_can_redo_changed(self, can_redo: bool) -> None:
         self._can_redo = can_redo
         self._refresh()
 
     def _refresh(self) -> None:
-        nothing = "" if self._can_undo else self.tr("Nothing to undo.")
-        told = _written(QKeySequence.StandardKey.Undo)
-        self._undo.set_why_not(self._why_locked or nothing, told)
-        nothing = "" if self._can_redo else self.tr("Nothing to redo.")
-        told = _written(QKeySequence.StandardKey.Redo)
-        self._redo.set_why_not(self._why_locked or nothing, told)
+        no_undo = "" if self._can_undo else self.tr("Nothing to undo.")
+        no_redo = "" if self._can_redo else self.tr("Nothing to redo.")
+        shown = [
+            (self._undo, no_undo, QKeySequence.StandardKey.Undo),
+            (self._redo, no_redo, QKeySequence.StandardKey.Redo),
+        ]
+        shown.sort(key=lambda each: bool(each[1]))  # what is enabled takes the focus
+        for button, nothing, keys in shown:
+            if nothing and button.hasFocus() and shown[0][0].isEnabled():
+                shown[0][0].setFocus()
+            button.set_why_not(self._why_locked or nothing, _written(keys))
 
     @override
     def _retranslate(self) -> None:

@@ -4,7 +4,9 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QStandardPaths
 
+from lightpen.model.origin import Origin
 from lightpen.record.exports import export_stem
+from lightpen_app.look.phrases import origin_text
 from lightpen_app.work.workbench import Workbench
 
 
@@ -26,6 +28,11 @@ class SavePlace(QObject):
     def remember(self, folder: Path) -> None:
         """Offer this folder from now on."""
         self._workbench.set_export_folder(str(folder))
+
+    def mark(self) -> str:
+        """Return what stands on a picture; nothing where a live camera took it."""
+        origin = self._workbench.run.status.origin
+        return "" if origin in (None, Origin.LIVE) else origin_text(origin)
 
     def stem(self) -> str:
         """Return what the name of a file begins with."""

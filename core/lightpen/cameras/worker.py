@@ -49,6 +49,7 @@ LONGEST_STOP = 10.0  # s; a dead camera may take 8 to close
 # are skipped when something else holds it up once.
 LEAST_SKIPPED = 20
 SKIPPED_SHARE = 0.05
+KEEPING_UP = 3.0  # s without a skipped image after which it is over
 
 
 class Connection(Enum):
@@ -168,6 +169,7 @@ class CameraWorker:
         self._n_skipped = 0
         self._n_offered = self._n_missed = 0  # since measuring began
         self._told_of_skipping = False
+        self._skipped_ns = 0
         self._heard_ns = 0
         self._link = LinkWatch()
 
@@ -363,6 +365,7 @@ class CameraWorker:
             return
         self._n_skipped += 1
         self._n_missed += 1
+        self._skipped_ns = self._clock.now_ns()
         is_slow = is_too_slow(self._n_missed, self._n_offered)
         if is_slow and not self._told_of_skipping:  # once is enough until it is over
             self._told_of_skipping = True
@@ -370,9 +373,13 @@ class CameraWorker:
 
     def _tell_of_keeping_up(self) -> None:
         """Tell that it is over with skipping, as when no more images are measured."""
+        if not self._told_of_skipping:
+            return
         is_slow = is_too_slow(self._n_missed, self._n_offered)
-        if self._told_of_skipping and not is_slow:
+        since_ns = self._clock.now_ns() - self._skipped_ns
+        if not is_slow or since_ns >= KEEPING_UP * 1e9:
             self._told_of_skipping = False
+            self._n_offered = self._n_missed = 0
             self._on_event(KeepsUp())
 
     def _quiet_time(self) -> float:

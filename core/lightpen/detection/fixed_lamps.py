@@ -1,10 +1,13 @@
 """Fixed lamps in view, beside the pen: they tell whether the camera stands still.
 
 A lamp is the light in a circle that was masked as stray, or a spot that nearly every
-image shows in the same place and that is no LED of the pen.
+image shows in the same place and that is no LED of the pen. A camera that is bumped has
+all lamps jump at once: where one place is left by a light and another one taken by it
+at the same time, they are places of one lamp.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +16,11 @@ from lightpen.detection.sighting import Sighting
 from lightpen.detection.spots import Flaw, Spots, detect_spots
 
 NEARLY_ALL = 0.8  # of the images show a lamp
-STAYS = 5.0  # px about its usual place; a camera that moved by more is another matter
+STAYS = 5.0  # px about its place
+FARTHEST = 200.0  # px that a lamp jumps; what goes farther is another light
+MAX_PLACES = 3  # of a lamp; what rests more often goes with the pen
+BRIEFEST = 3  # images of a lamp in one place
+BETWEEN = 0.1  # of the images, that may show neither of two places
 N_LOOKED_AT = 5  # images in which lamps are looked for first
 MARGIN = 8  # px about a masked circle
 
@@ -86,20 +93,90 @@ def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
         for path in np.swapaxes(masked, 0, 1)
         if np.isfinite(path[:, 0]).any()
     ]
-    padded = np.full((len(lights), max(map(len, lights), default=0), 2), np.nan)
-    for row, each in zip(padded, lights, strict=True):
+    in_circles = [each[np.isfinite(each[:, 0])] for each in masked]
+    every = [np.concatenate(both) for both in zip(lights, in_circles, strict=True)]
+    padded = np.full((len(every), max(map(len, every), default=0), 2), np.nan)
+    for row, each in zip(padded, every, strict=True):
         row[: len(each)] = each
-    shown = [each for each in lights if len(each)]
-    if len(shown) >= NEARLY_ALL * len(lights):
+    shown = [each for each in every if len(each)]
+    if len(shown) >= NEARLY_ALL * len(every):
         looked_at = np.linspace(0, len(shown) - 1, N_LOOKED_AT).astype(int)
         places = np.concatenate([shown[index] for index in looked_at])
         paths += [_path(padded, place) for place in places]
     found: list[FloatArray] = []
-    for path in paths:
+    for path in _with_jumps(paths):
         is_fixed = np.isfinite(path[:, 0]).sum() >= NEARLY_ALL * len(path)
         if is_fixed and not any(_are_same(path, other) for other in found):
             found.append(path)
     return np.stack(found, axis=1) if found else np.zeros((len(lights), 0, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Stay:
+    """A light in one place, from an image to another, (N, 2)."""
+
+    path: FloatArray
+    place: FloatArray
+    first: int
+    last: int
+
+
+def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return paths, each gone on with by where its lamp jumps to."""
+    stays = list(map(_stay, paths))
+    steps = {
+        (a, b): other.place - one.place
+        for a, one in enumerate(stays)
+        for b, other in enumerate(stays)
+        if _may_jump(one, other)
+    }
+
+    def agreeing(step: FloatArray) -> int:
+        """Return how many lights go that step."""
+        return len({a for (a, _), to in steps.items() if _is_near(to, step)})
+
+    gone_on = []
+    for a in range(len(stays)):
+        path, at, n_places = stays[a].path, a, 1
+        while nexts := [b for one, b in steps if one == at]:
+            here = at
+            at = min(
+                nexts,
+                key=lambda b: (
+                    -agreeing(steps[here, b]),
+                    float(np.linalg.norm(steps[here, b])),
+                ),
+            )
+            path = np.where(np.isfinite(path), path, stays[at].path)
+            n_places += 1
+        gone_on.append(path if n_places <= MAX_PLACES else stays[a].path)
+    return gone_on
+
+
+def _stay(path: FloatArray) -> _Stay:
+    (shown,) = np.isfinite(path[:, 0]).nonzero()
+    place = np.median(path[shown], axis=0)
+    return _Stay(path, place, int(shown[0]), int(shown[-1]))
+
+
+def _may_jump(one: _Stay, other: _Stay) -> bool:
+    """Tell whether a light may have gone from one place to the other."""
+    between = other.first - one.last - 1
+    if not 0 <= between <= BETWEEN * len(one.path):
+        return False
+    is_near = np.linalg.norm(other.place - one.place) <= FARTHEST
+    return bool(is_near and _is_lasting(one) and _is_lasting(other))
+
+
+def _is_lasting(stay: _Stay) -> bool:
+    """Tell whether nearly all images of a time show the light."""
+    n_images = stay.last - stay.first + 1
+    n_shown = int(np.isfinite(stay.path[:, 0]).sum())
+    return n_images >= BRIEFEST and n_shown >= NEARLY_ALL * n_images
+
+
+def _is_near(one: FloatArray, other: FloatArray) -> bool:
+    return bool(np.linalg.norm(one - other) <= STAYS)
 
 
 def other_lights(sighting: Sighting) -> FloatArray:
@@ -115,7 +192,7 @@ def other_lights(sighting: Sighting) -> FloatArray:
 def _are_same(path: FloatArray, other: FloatArray) -> bool:
     """Return whether two lamps, each in nearly all images, are one."""
     apart = np.linalg.norm(path - other, axis=1)
-    return bool(np.nanmedian(apart) <= STAYS)
+    return bool(np.isfinite(apart).any() and np.nanmedian(apart) <= STAYS)
 
 
 def _are_clean(spots: Spots) -> BoolArray:

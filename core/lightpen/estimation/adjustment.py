@@ -24,7 +24,7 @@ from lightpen.estimation.contradictions import (
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.noise_correlation import Correlation, measure_correlation
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.unknowns import Forms, drift_forms, inverse, lean_forms
+from lightpen.estimation.unknowns import forms_of, inverse
 from lightpen.estimation.variance_components import COUNTED, find_component
 
 RELATED = 1.1  # times the variance of independent noise; less is not worth a new fit
@@ -88,7 +88,7 @@ def adjust(
         The iteration does not settle.
     """
     rig = state.rig
-    forms = Forms(lean_forms(state.rotations), drift_forms(len(pixels), shifts))
+    forms = forms_of(state.rotations, shifts)
     fit = partial(fit_bundle, pixels, state, forms=forms, places=places)
 
     def measured(priors: Priors, factor: float) -> tuple[Bundle, Correlation]:

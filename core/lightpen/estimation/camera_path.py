@@ -34,6 +34,7 @@ MIN_IMAGES = 10
 LEAST = 1e-6  # px, of noise and ways; keeps exact lamps from dividing by zero
 RATIOS = np.geomspace(1e-8, 1e4, 200)  # of the variance of a step to that of a lamp
 HALF = 0.5  # of the way of the lamps, which the pen goes at least if the camera does
+WITH_LAMPS = 1.5  # times the way of the lamps, which a pen beside them may go
 FAR = 3.0  # times the usual distance; what lies farther has slipped
 
 
@@ -185,7 +186,8 @@ def _share_of_pen(camera: Camera, path: CameraPath, posed: PosedImages) -> float
     by_lamps = path.shifts[posed.fitted] * pivot.pivot_cam[2] / camera.fx
     by_pen = pivot.residuals[:, :2]
     lengths = np.linalg.norm(by_pen - np.median(by_pen, axis=0), axis=1)
-    near = lengths < FAR * np.median(lengths) + np.ptp(by_lamps, axis=0).max()
+    farthest = WITH_LAMPS * np.linalg.norm(np.ptp(by_lamps, axis=0))
+    near = lengths < FAR * np.median(lengths) + farthest
     by_lamps, by_pen = (
         each[near] - each[near].mean(axis=0) for each in (by_lamps, by_pen)
     )

@@ -32,7 +32,7 @@ from lightpen.estimation.uncertainty import (
     counted_drift,
     counted_seat,
 )
-from lightpen.estimation.unknowns import FORMS, NONE
+from lightpen.estimation.unknowns import NONE
 from lightpen.estimation.workers import Map
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.camera import Camera
@@ -64,8 +64,8 @@ class Trials:
         Of all LED coordinates of a file, mm^2.
     forms : (N, m) array
         In which the seat may follow the lean, and the cone drift.
-    form_covariances : (m, 3, 3) array
-        Of the move of the cone in each, mm^2.
+    move_covariance : (3 m, 3 m) array
+        Of the moves of the cone in them, mm^2.
     jitter : (3, 3) array
         Covariance of the seat from image to image, mm^2.
     edge_widths : (N,) array
@@ -82,7 +82,7 @@ class Trials:
     sigma: float
     led_covariance: FloatArray
     forms: FloatArray
-    form_covariances: FloatArray
+    move_covariance: FloatArray
     jitter: FloatArray
     edge_widths: FloatArray
     priors: Priors
@@ -140,13 +140,10 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
     led_covariance = max(leds.sigma, pen.led_sigma or 0.0) ** 2 * basis @ basis.T
     if pen.led_covariance is not None and leds is NONE:
         led_covariance = pen.led_covariance
-    moves = [
-        np.broadcast_to(seat.variance * seat.axes, (n_forms, N_CONE, N_CONE))
-        for n_forms, seat in zip(FORMS, counted_seat(bundle), strict=True)
-    ]
-    n_drifts = (bundle.columns.drift.stop - bundle.columns.drift.start) // N_CONE
-    moves.append(np.tile(counted_drift(bundle) * np.eye(N_CONE), (n_drifts, 1, 1)))
-    form_covariances = np.concatenate(moves)
+    seat = counted_seat(bundle)
+    n_seat, n_drift = len(seat), bundle.columns.drift.stop - bundle.columns.drift.start
+    move_covariance = counted_drift(bundle) * np.eye(n_seat + n_drift)
+    move_covariance[:n_seat, :n_seat] = seat
     return Trials(
         camera=instrument.camera,
         pen=pen,
@@ -156,8 +153,8 @@ def trials_of(calibration: Calibration, seed: int = 0) -> Trials:
         seen=joint.used,
         sigma=joint.sigma * float(np.sqrt(calibration.budget.correlation_factor)),
         led_covariance=led_covariance,
-        forms=bundle.unknowns.forms[:n_images, : len(form_covariances)],
-        form_covariances=form_covariances,
+        forms=bundle.unknowns.forms[:n_images, : len(move_covariance) // N_CONE],
+        move_covariance=move_covariance,
         jitter=(
             jitter.expected**2 * np.eye(N_CONE)
             if jitter.covariance is None
@@ -251,7 +248,7 @@ def _edge_widths(calibration: Calibration, n_images: int) -> FloatArray:
 
 def _drawn_moves(trials: Trials, rng: np.random.Generator) -> FloatArray:
     """Return where the tip sits in the cone in each image, (N, 3), mm."""
-    by_form = np.array([_drawn(each, rng) for each in trials.form_covariances])
+    by_form = _drawn(trials.move_covariance, rng).reshape(-1, N_CONE)
     values, vectors = np.linalg.eigh(trials.jitter)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     shaken = rng.standard_normal((len(trials.forms), N_CONE)) @ root.T
@@ -303,6 +300,8 @@ def _drawn_pen(trials: Trials, rng: np.random.Generator) -> Pen:
     middle = pen.leds.mean(axis=0)
     scale = 1 + float(_drawn(priors.size_covariance, rng)[0])
     leds = middle + scale * (pen.leds - middle) + moves.reshape(-1, 3)
+    if priors.reading is not None:
+        leds += priors.reading.shift * rng.standard_normal() * pen.normals
     diameter = pen.diameter + float(_drawn(priors.diameter.covariance, rng)[0])
     return replace(pen, leds=leds, diameter=diameter)
 

@@ -38,11 +38,9 @@ from lightpen.estimation.uncertainty import (
 )
 from lightpen.estimation.unknowns import (
     NO_COMPONENTS,
-    Forms,
     Unknowns,
-    drift_forms,
+    forms_of,
     inverse,
-    lean_forms,
 )
 from lightpen.model.assumptions import Assumptions
 from lightpen.model.pen import Pen
@@ -105,8 +103,7 @@ class Reach:
         """
         state = self.state
         priors = priors_of(state.rig, state.pen, assumed)
-        forms = Forms(lean_forms(state.rotations), drift_forms(len(state.rotations)))
-        unknowns = Unknowns.of(state, priors, forms)
+        unknowns = Unknowns.of(state, priors, forms_of(state.rotations))
         equations = _weighed(self.equations, sigma)
         bundle = _linear_bundle(unknowns, equations, joint, sigma)
         held_back = _kept_back(bundle, priors, equations)

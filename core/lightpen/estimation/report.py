@@ -279,14 +279,15 @@ def _seat_warnings(calibration: Calibration) -> list[Sentence]:
                 distance=distance,
             )
         )
-    if any(form.is_significant for form in found.seat):
+    forms = (*found.seat, found.oval)
+    if any(form.is_significant for form in forms):
         warnings.append(
             sentence(
                 "warning.seat-form",
                 "The tip moved in its seat as the pen leant, by some {distance:.4f} "
                 "mm. Tip or cone may be out of round, worn or dirty. It is in the "
                 "uncertainty.",
-                distance=max(form.sigma for form in found.seat),
+                distance=max(form.sigma for form in forms),
             )
         )
     if found.drift.is_significant:

@@ -13,6 +13,7 @@ References
 .. [2] JCGM 100:2008, "Guide to the expression of uncertainty in measurement", 5.1, 6.2.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -24,15 +25,16 @@ from lightpen.estimation.bundle import Z_99, Bundle
 from lightpen.estimation.joint import JointFit
 from lightpen.estimation.linearised import N_CONE
 from lightpen.estimation.priors import Priors
+from lightpen.estimation.unknowns import FORMS, axes_of_cone, whole_moves
 
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty
 MAX_BLOCKS = 10
 MIN_BLOCK_SIZE = 3
 POSTURES = 30  # that differ enough for centres to be off in another way
 # Of a seat that goes once round with the pen, hardly seen beside the tip: times what
-# the other forms have, across the cone and along it. A ball or cone that is not round
-# moves the tip sideways, and little up and down. `./run bench files` holds both.
-SIDEWAYS, ALONG = 1.8, 0.4
+# the other forms have, along the cone. A ball or cone that is not round moves the tip
+# sideways, and little up and down. `./run bench files` holds both.
+ALONG = 0.4
 NEGLIGIBLE = 1e-5  # mm, of a standard uncertainty
 
 
@@ -218,6 +220,9 @@ def shares_of(
     # Centres that are off in each posture its own way.
     biased = max(n_images / POSTURES, 1.0) * bundle.independent_noise
     biased *= (priors.center_bias / bundle.sigma) ** 2
+    if priors.reading is not None:
+        along_normals = priors.reading.shift * _by_shift_along_normals(bundle)
+        biased += np.outer(along_normals, along_normals)
     size = bundle.part(at.scale)
     warm = float(priors.temperature.covariance[0, 0] / priors.size_covariance[0, 0])
     shares = [
@@ -246,39 +251,17 @@ def shares_of(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class CountedSeat:
-    """How much a seat is counted to follow the lean in the forms of one kind.
-
-    Attributes
-    ----------
-    variance : float
-        Along each axis in each form, mm^2.
-    axes : (3, 3) array
-        Times that, by direction in the rig.
-    """
-
-    variance: float
-    axes: FloatArray
-
-
-def counted_seat(bundle: Bundle) -> tuple[CountedSeat, ...]:
-    """Return what U holds of the seat by each kind of form."""
-    seat = bundle.counted.seat
+def counted_seat(bundle: Bundle) -> FloatArray:
+    """Return the covariance of the seat's moves in its forms that U holds, (21, 21)."""
+    seat, oval = bundle.counted.seat, bundle.counted.oval
     likely = [form.expected for form in seat]
-    alike = np.eye(N_CONE)
-    # Where images are many enough to see it, they tell themselves how large it is.
-    axes = alike if seat[0].sigma > 0 else once_round(bundle.state.rotations)
-    kinds = zip(
-        bundle.columns.seat,
-        [max(likely), *likely[1:]],
-        [axes, *[alike] * (len(seat) - 1)],
-        strict=True,
-    )
-    return tuple(
-        CountedSeat(max(_counted(bundle, at), expected**2), directions)
-        for at, expected, directions in kinds
-    )
+    form_error = bundle.unknowns.priors.form_error
+    variances = [
+        max(form.sigma, form_error, expected) ** 2
+        for form, expected in zip(seat, [max(likely), *likely[1:]], strict=True)
+    ]
+    by_oval = max(oval.sigma, oval.expected) * bundle.unknowns.oval
+    return _by_forms(bundle, variances) + by_oval @ by_oval.T
 
 
 def counted_drift(bundle: Bundle) -> float:
@@ -288,16 +271,37 @@ def counted_drift(bundle: Bundle) -> float:
 
 def _of_seat(bundle: Bundle, form_error: float) -> tuple[FloatArray, FloatArray]:
     """Return what the lean of the pen does, beyond the form error and by it."""
-    moved, by_form = np.zeros((6, 6)), np.zeros((6, 6))
-    for at, seat in zip(bundle.columns.seat, counted_seat(bundle), strict=True):
-        n_forms = (at.stop - at.start) // N_CONE
-        gain = bundle.covariance[:6, at] * bundle.prior_information[at.start, at.start]
-        moves = gain.reshape(6, n_forms, N_CONE) @ seat.axes
-        part = seat.variance * moves.reshape(6, -1) @ gain.T
-        share = min(form_error**2 / seat.variance, 1.0)
-        by_form += share * part
-        moved += (1 - share) * part
-    return moved, by_form
+    at = bundle.columns.whole_seat
+    gain = bundle.covariance[:6, at] @ bundle.prior_information[at, at]
+    known = _by_forms(bundle, [form_error**2] * len(FORMS))
+    moved = gain @ (counted_seat(bundle) - known) @ gain.T
+    return moved, gain @ known @ gain.T
+
+
+def _by_forms(bundle: Bundle, variances: Sequence[float]) -> FloatArray:
+    """Return the covariance of the seat's moves by the variance of each kind."""
+    alike = np.eye(N_CONE)
+    # Where images are many enough to see it, they tell themselves how large it is.
+    is_seen = bundle.counted.seat[0].sigma > 0
+    axes = alike if is_seen else once_round(bundle.state.rotations)
+    by_form = np.repeat(variances, FORMS)
+    goes_once = np.arange(len(by_form)) < FORMS[0]
+    once, others = (np.where(some, by_form, 0.0) for some in (goes_once, ~goes_once))
+    return np.asarray(np.kron(np.diag(once), axes) + np.kron(np.diag(others), alike))
+
+
+def _by_shift_along_normals(bundle: Bundle) -> FloatArray:
+    """Return what tip and cone are off by where all LEDs stand 1 mm along, (6,)."""
+    pen, tip = bundle.unknowns.start.pen, bundle.state.tip_pen
+    moves = pen.normals.ravel()
+    shift, turn = np.linalg.lstsq(whole_moves(pen.leds), moves, rcond=None)[0].reshape(
+        2, 3
+    )
+    at, shape = bundle.columns.leds, bundle.unknowns.basis.T @ moves
+    off = -bundle.covariance[:6, at] @ bundle.prior_information[at, at] @ shape
+    # A move of the pen as a whole is no error of its LEDs: the tip is off by it.
+    off[:3] += np.cross(turn, pen.leds.mean(axis=0) - tip) - shift
+    return np.asarray(off)
 
 
 def once_round(rotations: FloatArray) -> FloatArray:
@@ -306,9 +310,8 @@ def once_round(rotations: FloatArray) -> FloatArray:
     Times the variance that the other forms have, by direction in the rig; rotations
     (N, 3, 3) are of rig_from_pen.
     """
-    along = rotations[:, :, 1].mean(axis=0)
-    along /= np.linalg.norm(along)
-    return SIDEWAYS**2 * np.eye(3) + (ALONG**2 - SIDEWAYS**2) * np.outer(along, along)
+    along = axes_of_cone(rotations)[2]
+    return np.eye(3) - (1 - ALONG**2) * np.outer(along, along)
 
 
 def _counted(bundle: Bundle, at: slice) -> float:

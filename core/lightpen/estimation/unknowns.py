@@ -7,7 +7,7 @@ each image by a weight of its own.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from lightpen.estimation.variance_components import (
     FITTED,
     Component,
     Jitter,
+    find_beside,
     find_component,
 )
 from lightpen.model.rigid import rotation_from_vector, skew
@@ -26,12 +27,14 @@ from lightpen.model.rigid import rotation_from_vector, skew
 ROUNDS = 3  # of finding each component beside the others
 FULL_LEAN = 0.15  # sine of the tilt from which on a seat shows most of its form
 FORMS = (2, 2, 2, 1)  # of one, two, three waves round the cone, and of the tilt
+UPRIGHT = 0.966  # cosine of 15 degrees, to which 15 images tell where a cone opens
+SMALLEST = 1e-9  # size of a form; less is rounding
 EXACT = 1e-6  # standard deviation of what is taken as exact, in its own unit
 NONE = Component(0.0, 0.0)
 
 
 class Columns(NamedTuple):
-    """Where each kind of unknown stands."""
+    """Where each kind of unknown stands; the seat by the kinds of its forms."""
 
     tip: slice
     cone: slice
@@ -44,6 +47,11 @@ class Columns(NamedTuple):
     drift: slice
     between: slice
 
+    @property
+    def whole_seat(self) -> slice:
+        """Where all forms of the seat stand."""
+        return slice(self.seat[0].start, self.seat[-1].stop)
+
 
 class Components(NamedTuple):
     """Standard deviations that the images tell.
@@ -55,6 +63,8 @@ class Components(NamedTuple):
         not deny it.
     seat : tuple of Component
         Of the seat by each kind of form in which it may follow the lean, mm.
+    oval : Component
+        Of the two numbers of an oval seat, see `oval_seat`, mm.
     drift : Component
         Of the cone over the whole of each of its ways, mm.
     jitter : Jitter
@@ -63,11 +73,12 @@ class Components(NamedTuple):
 
     leds: Component
     seat: tuple[Component, ...]
+    oval: Component
     drift: Component
     jitter: Jitter
 
 
-NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, Jitter(None, 0.0))
+NO_COMPONENTS = Components(NONE, (NONE,) * len(FORMS), NONE, NONE, Jitter(None, 0.0))
 
 
 class Forms(NamedTuple):
@@ -77,12 +88,27 @@ class Forms(NamedTuple):
     ----------
     lean : (N, 7) array
         As the pen leans, see `lean_forms`.
+    oval : (21, 2) array
+        Moves in each of these forms that an oval seat makes, see `oval_seat`.
     drift : (N, D) array
         In the course of the swing, see `drift_forms`.
     """
 
     lean: FloatArray
+    oval: FloatArray
     drift: FloatArray
+
+
+def forms_of(rotations: FloatArray, shifts: FloatArray | None = None) -> Forms:
+    """Return the forms of images with these rotations (N, 3, 3) of rig_from_pen.
+
+    Parameters
+    ----------
+    shifts : (N, k) array, optional
+        Ways of fixed lamps, see `drift_forms`.
+    """
+    lean, oval = lean_forms(rotations), oval_seat(rotations)
+    return Forms(lean, oval, drift_forms(len(rotations), shifts))
 
 
 def drift_forms(n_images: int, shifts: FloatArray | None = None) -> FloatArray:
@@ -113,15 +139,65 @@ def lean_forms(rotations: FloatArray) -> FloatArray:
     rotations : (N, 3, 3) array
         Of rig_from_pen.
     """
-    x, z = rotations[:, 0, 1], rotations[:, 2, 1]
-    radius = np.hypot(x, z)
+    forms, sizes = _lean(rotations)
+    return np.asarray(forms / np.where(sizes > 0, sizes, 1.0))
+
+
+def oval_seat(rotations: FloatArray) -> FloatArray:
+    """Return the moves in the forms of the lean that an oval seat makes, (21, 2).
+
+    A ball or cone with two lobes, 1 mm off the circle, moves the tip by
+    ``cos(2 (angle - phase))`` mm away from the axis as the pen leans to an angle: by
+    one wave and three waves round the cone, of which three waves are well seen. The
+    two columns are the cosine and sine of twice the phase.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of rig_from_pen.
+    """
+    _, sizes = _lean(rotations)
+    cos1, sin1, _, _, cos3, sin3, _ = np.eye(len(sizes)) * sizes
+    right, away, _ = axes_of_cone(rotations)
+    cosine = np.outer(cos1 + cos3, right) + np.outer(sin3 - sin1, away)
+    sine = np.outer(sin1 + sin3, right) + np.outer(cos1 - cos3, away)
+    return np.stack([0.5 * cosine.ravel(), 0.5 * sine.ravel()], axis=1)
+
+
+def axes_of_cone(rotations: FloatArray) -> FloatArray:
+    """Return the axes of the cone in the rig, one a row: two across, one along, (3, 3).
+
+    Before a camera that looks at it from its side they are right, away, and up. Where
+    the pen points elsewhere on average by more than images are drawn unevenly, it is
+    the camera that looks down or lies on its side: the cone opens to where it points.
+
+    Parameters
+    ----------
+    rotations : (N, 3, 3) array
+        Of rig_from_pen.
+    """
+    along = rotations[:, :, 1].mean(axis=0)
+    along /= np.linalg.norm(along)
+    if abs(along[1]) > UPRIGHT:
+        along = np.array([0.0, np.copysign(1.0, along[1]), 0.0])
+    most_across = np.eye(N_CONE)[np.argmin(np.abs(along).round(1))]
+    right = most_across - (most_across @ along) * along
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(along, right), along])
+
+
+def _lean(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the forms of the lean less their means, (N, 7), and their sizes, (7,)."""
+    right, away, _ = axes_of_cone(rotations) @ rotations[:, :, 1].T
+    radius = np.hypot(right, away)
     weight = radius / (radius + FULL_LEAN)
-    angle = np.arctan2(z, x)
+    angle = np.arctan2(away, right)
     waves = [f(n * angle) * weight for n in (1, 2, 3) for f in (np.cos, np.sin)]
     forms = np.stack([*waves, weight**2], axis=1)
     forms -= forms.mean(axis=0)
     sizes = np.sqrt(np.mean(forms**2, axis=0))
-    return np.asarray(forms / np.where(sizes > 0, sizes, 1.0))
+    is_there = sizes > SMALLEST
+    return np.where(is_there, forms, 0.0), np.where(is_there, sizes, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +213,8 @@ class Unknowns:
     forms : (N, m) array
         Weights by which each image shifts its cone: the lean, then the drift, then
         whether it is at the second cone.
+    oval : (21, 2) array
+        Moves in the forms of the lean by an oval seat.
     basis : (3 L, 3 L - 6) array
         Moves of LEDs but those of the pen as a whole.
     scaling : (3 L,) array
@@ -147,6 +225,7 @@ class Unknowns:
     start: BundleState
     mixing: FloatArray
     forms: FloatArray
+    oval: FloatArray
     basis: FloatArray
     scaling: FloatArray
     priors: Priors
@@ -199,7 +278,7 @@ class Unknowns:
         mixing[at_leds, columns.leds] = basis
         second = () if start.at_second is None else (start.at_second.astype(float),)
         forms = np.column_stack([given.lean, given.drift, *second])
-        return cls(columns, start, mixing, forms, basis, scaling, priors)
+        return cls(columns, start, mixing, forms, given.oval, basis, scaling, priors)
 
     @property
     def number(self) -> int:
@@ -245,9 +324,16 @@ class Unknowns:
         """Return what is known of them before the images, (p, p)."""
         at, priors = self.columns, self.priors
         prior = self._of_files.copy()
-        for place, sigma in self._sigmas(components):
+        for place, sigma in (
+            (at.leds, max(components.leds.sigma, priors.led_sigma or 0.0)),
+            (at.drift, components.drift.sigma),
+        ):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
+        prior[at.whole_seat, at.whole_seat] = inverse(
+            np.diag(self._seat_variances(components))
+            + components.oval.sigma**2 * self.oval @ self.oval.T
+        )
         of_leds = priors.led_covariance
         if of_leds is not None and components.leds is NONE:  # the images do not deny it
             known = self.basis.T @ of_leds @ self.basis
@@ -299,18 +385,14 @@ class Unknowns:
             right[at.between] = weight * along * (change + along @ values[at.between])
         return information, right
 
-    def _sigmas(self, components: Components) -> list[tuple[slice, float]]:
-        at, stated = self.columns, self.priors.led_sigma
+    def _seat_variances(self, components: Components) -> FloatArray:
+        """Return the variances of the moves in each form, but for an oval, (21,)."""
         one_wave, *others = (each.sigma for each in components.seat)
         # A seat that goes once round with the pen is hardly seen beside the tip:
         # nothing says that it does so less than in any other form.
-        seat = [max(one_wave, *others), *others]
-        form_error = self.priors.form_error
-        return [
-            (at.leds, max(components.leds.sigma, stated or 0.0)),
-            *((at, max(s, form_error)) for at, s in zip(at.seat, seat, strict=True)),
-            (at.drift, components.drift.sigma),
-        ]
+        sigmas = np.array([max(one_wave, *others), *others])
+        by_kind = np.maximum(sigmas, max(self.priors.form_error, EXACT)) ** 2
+        return np.repeat(by_kind, N_CONE * np.array(FORMS))
 
     def found(
         self,
@@ -322,7 +404,7 @@ class Unknowns:
         now = before
         for _ in range(ROUNDS):
             known, now = now, self._found_once(information, right, now)
-            if self._sigmas(now) == self._sigmas(known):  # as they would be once more
+            if _sigmas(now) == _sigmas(known):  # as they would be once more
                 break
         return now
 
@@ -336,21 +418,74 @@ class Unknowns:
         covariance = inverse(information + prior)
         values = covariance @ right
 
-        def find(place: slice, sigma: float = 0.0) -> Component:
+        def own(place: slice) -> tuple[FloatArray, FloatArray]:
             known = inverse(covariance[place, place])
-            own = known - prior[place, place]
-            return find_component(own, known @ values[place], sigma)
+            return known - prior[place, place], known @ values[place]
 
-        def likely(place: slice, stated: float = 0.0) -> Component:
-            component = find(place, stated)
-            is_more = component.sigma > stated and component.gain > FITTED
-            return component if is_more else NONE._replace(expected=component.expected)
+        def find(place: slice, stated: float = 0.0) -> Component:
+            return find_component(*own(place), stated)
 
+        oval, seat = self._found_seat(*own(at.whole_seat), before)
         return before._replace(
             leds=self._found_leds(find),
-            seat=tuple(likely(place, self.priors.form_error) for place in at.seat),
-            drift=likely(at.drift),
+            seat=seat,
+            oval=oval,
+            drift=_likely(find(at.drift)),
         )
+
+    def _found_seat(
+        self, information: FloatArray, right: FloatArray, before: Components
+    ) -> tuple[Component, tuple[Component, ...]]:
+        """Return the component of an oval seat, and those of its forms.
+
+        An oval is made of waves, and either may stand for the other. The likelier is
+        fitted; the other counts by how likely it is beside that.
+
+        Parameters
+        ----------
+        information : (21, 21) array
+            Of all forms, without any prior.
+        right : (21,) array
+            Right side that belongs to it.
+        """
+        find = partial(find_beside, information, right)
+        truest = self._seat_variances(NO_COMPONENTS)
+        alone = find(self.oval, np.diag(truest))
+        waves_alone = found = self._found_waves(find, truest, NONE)
+        ahead = 0.5 * (alone.gain - max(wave.gain for wave in waves_alone))
+        oval = _likely(alone) if ahead >= 0 else NONE
+        variances = self._seat_variances(before)
+        if oval.sigma > 0 or (variances > truest).any():
+            found = self._found_waves(find, variances, oval)
+        waves = tuple(_likely(wave, self.priors.form_error) for wave in found)
+        if oval.sigma > 0:
+            doubt = float(np.exp(-0.5 * np.logaddexp(0.0, ahead)))
+            waves = tuple(
+                wave._replace(expected=max(wave.expected, doubt * other.sigma))
+                for wave, other in zip(waves, waves_alone, strict=True)
+            )
+        elif any(wave.sigma > 0 for wave in waves):
+            doubt = float(np.exp(-0.5 * np.logaddexp(0.0, -ahead)))
+            oval = NONE._replace(expected=doubt * alone.sigma)
+        else:
+            oval = NONE._replace(expected=alone.expected)
+        return oval, waves
+
+    def _found_waves(
+        self, find: Callable[..., Component], variances: FloatArray, oval: Component
+    ) -> list[Component]:
+        """Return the component of each kind, beside the variances of the others."""
+        by_oval = oval.sigma**2 * self.oval @ self.oval.T
+        first = self.columns.whole_seat.start
+        waves = []
+        for place in self.columns.seat:
+            some = slice(place.start - first, place.stop - first)
+            others = variances.copy()
+            others[some] = 0.0
+            moves = np.eye(len(variances))[:, some]
+            beside_it = by_oval + np.diag(others)
+            waves.append(find(moves, beside_it, self.priors.form_error))
+        return waves
 
     def _found_leds(self, find: Callable[[slice, float], Component]) -> Component:
         stated, of_leds = self.priors.led_sigma, self.priors.led_covariance
@@ -395,12 +530,32 @@ class Unknowns:
         )
 
 
+def _sigmas(components: Components) -> list[float]:
+    """Return the standard deviations by which the unknowns are fitted, mm."""
+    found = (components.leds, *components.seat, components.oval, components.drift)
+    return [each.sigma for each in found]
+
+
+def _likely(found: Component, stated: float = 0.0) -> Component:
+    """Return a component where it is likely enough to be fitted, else none."""
+    if found.sigma > stated and found.gain > FITTED:
+        return found
+    return NONE._replace(expected=found.expected)
+
+
 def led_basis(leds: FloatArray) -> FloatArray:
     """Return all moves of LEDs but those of the pen as a whole, (3 L, 3 L - 6)."""
+    return np.asarray(np.linalg.qr(whole_moves(leds), mode="complete")[0][:, 6:])
+
+
+def whole_moves(leds: FloatArray) -> FloatArray:
+    """Return the moves of LEDs by those of the pen as a whole, (3 L, 6).
+
+    Its shifts, mm, and its turns about the middle of the LEDs, rad.
+    """
     shifts = np.tile(np.eye(3), (len(leds), 1))
     turns = -skew(leds - leds.mean(axis=0)).reshape(-1, 3)
-    whole = np.concatenate([shifts, turns], axis=1)
-    return np.asarray(np.linalg.qr(whole, mode="complete")[0][:, 6:])
+    return np.concatenate([shifts, turns], axis=1)
 
 
 def known_by(covariance: FloatArray) -> FloatArray:

@@ -84,6 +84,34 @@ def find_component(S: FloatArray, right: FloatArray, stated: float = 0.0) -> Com
     return Component(float(sigmas[best]), gain, _expected(sigmas, costs))
 
 
+def find_beside(
+    information: FloatArray,
+    right: FloatArray,
+    moves: FloatArray,
+    others: FloatArray,
+    stated: float = 0.0,
+) -> Component:
+    """Find the likeliest standard deviation of k moves of n unknowns.
+
+    Parameters
+    ----------
+    information : (n, n) array
+        Of the unknowns, all others eliminated, 1/mm^2.
+    right : (n,) array
+        Right side that belongs to it, 1/mm.
+    moves : (n, k) array
+        What each move makes of the unknowns.
+    others : (n, n) array
+        Covariance of what else moves them, mm^2.
+    stated : float
+        Standard deviation beside which it is judged, mm.
+    """
+    own = np.column_stack([information @ moves, right])
+    left = moves.T @ np.linalg.solve(np.eye(len(others)) + information @ others, own)
+    S = left[:, :-1]
+    return find_component(0.5 * (S + S.T), left[:, -1], stated)
+
+
 def _expected(sigmas: FloatArray, costs: FloatArray) -> float:
     """Return the root mean square of standard deviations, the first being none, mm."""
     weights = np.exp(-0.5 * (costs - costs.min()))

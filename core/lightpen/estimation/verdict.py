@@ -244,6 +244,13 @@ class Change:
         )
 
 
+def repeats(doubt: Sentence, reason: Sentence) -> bool:
+    """Return whether a doubt only says again what is the reason of the verdict."""
+    if (doubt.code, reason.code) == ("warning.led-displaced", Code.LED_DISPLACED):
+        return doubt.values["led"] == reason.values["led"]
+    return doubt.code == reason.code
+
+
 def change_since(
     tip_pen: FloatArray,
     uncertainty: FloatArray,
@@ -363,7 +370,7 @@ def judge(calibration: Calibration, limits: SwingLimits) -> Verdict:
     if n_images < limits.min_images:
         return Verdict(Grade.CHECK, too_few_images(n_images, limits.min_images))
     bare = np.flatnonzero(dial_counts(calibration.joint.rotations)[1:].sum(axis=0) == 0)
-    if len(bare):
+    if len(bare) and limits.min_per_field:
         n_images = limits.min_per_field * len(bare)
         return Verdict(Grade.CHECK, too_little_tilt(n_images, map(int, bare)))
     return Verdict(Grade.PASS, tip_is_good(uncertainty))

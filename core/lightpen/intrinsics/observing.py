@@ -140,6 +140,8 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence 
                 board=board.name,
                 other=other.name,
             )
+    if board.kind is BoardKind.CHESSBOARD:  # which lies as it likes
+        return _other_count(images(), board)
     across = replace(board, columns=board.rows, rows=board.columns)
     if across != board and _is_found(images(), across):
         return sentence(
@@ -149,21 +151,39 @@ def why_unseen(images: Callable[[], Iterable[Image]], board: Board) -> Sentence 
             board=board.name,
             other=across.name,
         )
-    if board.kind is BoardKind.CHESSBOARD:
-        for image in images():
-            count = count_corners(image)
-            if count is not None:
-                return sentence(
-                    "intrinsics.other-count",
-                    "No image shows a chessboard of {columns} x {rows} inner corners, "
-                    "but one of {seen_columns} x {seen_rows}. Count its inner corners "
-                    "again.",
-                    columns=board.columns,
-                    rows=board.rows,
-                    seen_columns=count[0],
-                    seen_rows=count[1],
-                )
     return None
+
+
+def _other_count(images: Iterable[Image], board: Board) -> Sentence | None:
+    """Return what to say of a chessboard of other corners than were said."""
+    counts = [count for count in map(count_corners, images) if count is not None]
+    if not counts:
+        return None
+    seen = max(counts, key=lambda count: (count.columns * count.rows, count.is_whole))
+    rows, columns = sorted((board.rows, board.columns))
+    has_more = seen.columns > columns or seen.rows > rows
+    if seen.is_whole and (seen.columns, seen.rows) != (columns, rows):
+        return sentence(
+            "intrinsics.other-count",
+            "No image shows a chessboard of {columns} x {rows} inner corners, but one "
+            "of {seen_columns} x {seen_rows}. Count its inner corners again.",
+            columns=board.columns,
+            rows=board.rows,
+            seen_columns=seen.columns,
+            seen_rows=seen.rows,
+        )
+    if not has_more:
+        return None
+    return sentence(
+        "intrinsics.larger-count",
+        "No image shows a chessboard of {columns} x {rows} inner corners, but a part "
+        "of a larger one, of which {seen_columns} x {seen_rows} are seen. Count the "
+        "inner corners of the whole board again.",
+        columns=board.columns,
+        rows=board.rows,
+        seen_columns=seen.columns,
+        seen_rows=seen.rows,
+    )
 
 
 def _look(load: Callable[[], Image], board: Board) -> _Look:

@@ -25,9 +25,11 @@ import numpy.typing as npt
 from lightpen.arrays import FloatArray, Image
 from lightpen.detection.rim import fit_rim
 from lightpen.intrinsics.boards import CORNERS, Board, BoardKind, marker_dictionary
+from lightpen.intrinsics.squares import CornerCount, count_from, goes_on, is_chequered
 
-PARTS = (5, 4), (3, 3)  # of a chessboard, that grow; small ones may stop too soon
+PARTS = (5, 4), (3, 3)  # of a chessboard, that grow
 SEARCHED = 1280  # px, of the longer side of the image that is searched first
+SEARCHED_SMALL = 640  # px; there noise is gone, in which some searches get lost
 SEARCHED_WHOLE = 2_600_000  # px; in larger images a board is found smaller, or not
 MARKED_WHOLE = 12_000_000  # px; in larger images markers are searched smaller
 ENLARGED = 1_300_000  # px; in smaller images markers may be too small to be read
@@ -75,6 +77,8 @@ def find_points(
     else:
         points = _chessboard(grey, (board.columns, board.rows), quick=quick)
         points = None if points is None else _from_front(points, board)
+        if points is not None and goes_on(grey, _grid_of(points, board)):
+            return None  # it is a part of a larger board
     if points is None or not _is_spread(points, board):
         return None
     refined = _refined(image, points, board)
@@ -106,16 +110,24 @@ def _from_front(points: FloatArray, board: Board) -> FloatArray:
     return points[(rows[::-1] if is_set_off else rows[:, ::-1]).ravel()]
 
 
-def count_corners(image: Image) -> tuple[int, int] | None:
-    """Return how many inner corners a chessboard has, the more first; None without."""
-    small, _ = _smaller(_to_8_bit(image))
+def count_corners(image: Image) -> CornerCount | None:
+    """Return how many inner corners of a chessboard are seen; None without one."""
+    grey = _to_8_bit(image)
     flags = THOROUGH | cv2.CALIB_CB_LARGER
-    for corners in PARTS:
-        found, _, meta = cv2.findChessboardCornersSBWithMeta(small, corners, flags)
+    sides = sorted({min(side, max(grey.shape)) for side in (SEARCHED_SMALL, SEARCHED)})
+    for side, corners in product(sides, PARTS):
+        small, _ = _smaller(grey, side)
+        found, points, meta = cv2.findChessboardCornersSBWithMeta(small, corners, flags)
         if found:
-            rows, columns = sorted(meta.shape[:2])
-            return int(columns), int(rows)
+            rows, columns = meta.shape[:2]
+            grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
+            if is_chequered(small, grid):
+                return count_from(small, grid)
     return None
+
+
+def _grid_of(points: FloatArray, board: Board) -> FloatArray:
+    return points.reshape(board.rows, board.columns, 2)
 
 
 def for_search(image: Image) -> Image:
@@ -131,9 +143,11 @@ def _to_8_bit(image: Image) -> npt.NDArray[np.uint8]:
     return np.asarray(image * (255 / brightest), dtype=np.uint8)
 
 
-def _smaller(grey: npt.NDArray[np.uint8]) -> tuple[Any, float]:
+def _smaller(
+    grey: npt.NDArray[np.uint8], longer_side: int = SEARCHED
+) -> tuple[Any, float]:
     """Return an image to be searched, and its scale."""
-    scale = min(1.0, SEARCHED / max(grey.shape))
+    scale = min(1.0, longer_side / max(grey.shape))
     return _shrunk(grey, scale), scale
 
 
@@ -154,29 +168,38 @@ def _chessboard(
 ) -> FloatArray | None:
     small, scale = _smaller(grey)
     found, points = cv2.findChessboardCorners(small, corners, flags=QUICK)
-    if found and _is_even(points, corners):
+    if found and _is_board(small, points, corners):
         return _whole(points, scale)
     if quick:
         return None
     for flags in WAYS:
         with _THOROUGHLY:
             found, points = cv2.findChessboardCornersSB(small, corners, flags=flags)
-        if found:
+        if found and _is_board(small, points, corners):
             return _whole(points, scale)
     if scale == 1.0 or grey.size > SEARCHED_WHOLE:
+        smallest, scale = _smaller(grey, SEARCHED_SMALL)
         flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE
-        found, points = cv2.findChessboardCorners(small, corners, flags=flags)
-        is_found = found and _is_even(points, corners)
+        found, points = cv2.findChessboardCorners(smallest, corners, flags=flags)
+        is_found = found and _is_board(smallest, points, corners)
         return _whole(points, scale) if is_found else None
     with _THOROUGHLY:
         found, points = cv2.findChessboardCornersSB(grey, corners, flags=THOROUGH)
-    return _whole(points, 1.0) if found else None
+    is_found = found and _is_board(grey, points, corners)
+    return _whole(points, 1.0) if is_found else None
 
 
-def _is_even(points: Any, corners: tuple[int, int]) -> bool:
-    """Tell whether rows and columns go on evenly; some corners may be another's."""
+def _is_board(
+    grey: npt.NDArray[np.uint8], points: Any, corners: tuple[int, int]
+) -> bool:
+    """Tell whether corners are those of one board; some may be another's."""
     columns, rows = corners
     grid = np.asarray(points, dtype=np.float64).reshape(rows, columns, 2)
+    return _is_even(grid) and is_chequered(grey, grid)
+
+
+def _is_even(grid: FloatArray) -> bool:
+    """Tell whether rows and columns go on evenly."""
     for along in (grid, np.swapaxes(grid, 0, 1)):
         steps = np.diff(along, axis=1)
         bends = np.linalg.norm(np.diff(steps, axis=1), axis=-1)

@@ -294,7 +294,7 @@ class Live:
             self._scene = image.spots
 
     def _is_passed(self) -> bool:
-        """Return whether a recording that nothing is captured of was seen to its end."""
+        """Return whether a recording was seen to its end, and nothing is captured."""
         caps = self._workers[0].caps
         if self._measures or caps is None or caps.n_images is None:
             return False

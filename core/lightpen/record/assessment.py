@@ -18,6 +18,7 @@ from lightpen.estimation.verdict import (
     judge,
     judge_change,
     judge_unknown,
+    repeats,
 )
 from lightpen.local_time import local_time
 from lightpen.messages import last_unknown, too_little_tilt
@@ -97,7 +98,7 @@ def assess(archive: Archive, record: Record, solution: Solution) -> Assessment:
         _bare_sides(solution, limits) if is_of_recording(record) else [],
         warnings_of(solution.calibration),
     )
-    doubts = tuple(each for each in all_doubts if each.code != verdict.reason.code)
+    doubts = tuple(each for each in all_doubts if not repeats(each, verdict.reason))
     return Assessment(verdict, last, change, doubts, limit)
 
 
@@ -153,6 +154,6 @@ def _bare_sides(solution: Solution, limits: SwingLimits) -> list[Sentence]:
     """Name the postures that recorded images lack: nobody was asked to lean there."""
     counts = dial_counts(solution.calibration.joint.rotations)[1:].sum(axis=0)
     bare = np.flatnonzero(counts == 0)
-    if not len(bare):
+    if not (len(bare) and limits.min_per_field):
         return []
     return [too_little_tilt(limits.min_per_field * len(bare), map(int, bare))]

@@ -5,7 +5,7 @@ Both hold the same record of the calibration, and tell when they were changed si
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -147,6 +147,8 @@ class CalibrationFile:
     ----------
     pen, tip : str
         Names of a result; empty of a record that nobody accepted.
+    grade : str
+        Likewise of the verdict with which it was accepted.
     when : datetime
         When it was accepted, or made.
     method : str
@@ -193,6 +195,7 @@ class CalibrationFile:
     path: Path
     pen: str
     tip: str
+    grade: str
     when: datetime
     method: str
     tip_pen: FloatArray
@@ -234,12 +237,16 @@ def read_calibration(path: Path) -> CalibrationFile:
     data = read_bytes(path, WHAT, LIMIT)
     if has_head(data):
         result = parse_result(data, path, Path)
-        names, when = result.names, result.accepted
-        return _calibration(
-            path, result.calibration, names.pen, names.tip, when, is_checked=True
+        read = _calibration(path, result.calibration, is_checked=True)
+        return replace(
+            read,
+            pen=result.names.pen,
+            tip=result.names.tip,
+            grade=result.grade,
+            when=result.accepted,
         )
     tree, is_checked = record_tree(data, path)
-    return _calibration(path, tree, "", "", None, is_checked=is_checked)
+    return _calibration(path, tree, is_checked=is_checked)
 
 
 def read_record(path: Path) -> Mapping[str, Any]:
@@ -281,15 +288,7 @@ def record_tree(data: bytes, path: Path) -> tuple[dict[str, Any], bool]:
         raise _changed(path) if is_checked else _other(path) from error
 
 
-def _calibration(
-    path: Path,
-    tree: Any,
-    pen: str,
-    tip: str,
-    when: datetime | None,
-    *,
-    is_checked: bool,
-) -> CalibrationFile:
+def _calibration(path: Path, tree: Any, *, is_checked: bool) -> CalibrationFile:
     try:
         record = in_shape(tree, _Record)
         instrument = _instrument(record)
@@ -299,9 +298,10 @@ def _calibration(
         raise _other(path) from error
     return CalibrationFile(
         path=path,
-        pen=pen,
-        tip=tip,
-        when=when or record.created,
+        pen="",
+        tip="",
+        grade="",
+        when=record.created,
         method=record.method,
         tip_pen=np.array(record.tip_pen_mm),
         cone_cam=np.array(record.cone_cam_mm),

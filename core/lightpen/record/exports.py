@@ -27,9 +27,8 @@ def export_stem(names: Names, moment: datetime, origin: Origin | None) -> str:
 
     What its images are of stands behind, unless they are of a live camera.
     """
-    mark = "" if origin in (None, Origin.LIVE) else origin.upper()
     pen, tip = names.pen[:LONGEST_WORD], names.tip[:LONGEST_WORD]
-    words = (pen, tip, f"{moment:%Y-%m-%d}", mark)
+    words = (pen, tip, f"{moment:%Y-%m-%d}", _mark(origin))
     return UNFIT.sub("-", "_".join(filter(None, words)))
 
 
@@ -96,9 +95,17 @@ def images_csv(solution: Solution) -> bytes:
     return _table([head, *([*first, *tip] for *first, tip in rows)])
 
 
-def tip_text(solution: Solution) -> str:
-    """Return the tip as a line to be pasted: x, y, z in mm, parted by tabs."""
-    return "\t".join(map(repr, solution.calibration.joint.tip_pen.tolist()))
+def tip_text(solution: Solution, origin: Origin | None) -> str:
+    """Return the tip as a line to be pasted: x, y, z in mm, parted by tabs.
+
+    What its images are of stands behind, unless they are of a live camera.
+    """
+    coordinates = map(repr, solution.calibration.joint.tip_pen.tolist())
+    return "\t".join(filter(None, (*coordinates, _mark(origin))))
+
+
+def _mark(origin: Origin | None) -> str:
+    return "" if origin in (None, Origin.LIVE) else origin.upper()
 
 
 def export_tables(solution: Solution, names: Names, folder: Path, stem: str) -> None:

@@ -38,6 +38,7 @@ from lightpen.swing.rules import (
     advance,
     conclude,
     finish,
+    has_enough,
     pause,
     resume,
     stillness,
@@ -118,7 +119,8 @@ class SwingCourse:
 
     def _publish(self, status: SwingStatus, *events: SwingEvent) -> None:
         """Become this status, and tell of it."""
-        has_others = status.is_capturing and self._attendance.has_other_choices
+        is_open = status.is_capturing or _is_judged(status)
+        has_others = is_open and self._attendance.has_other_choices
         self._status = replace(
             status,
             refusal=self._attendance.refusal,
@@ -214,6 +216,8 @@ class SwingCourse:
             )
         )
         self._hold_back()
+        if not swing.setup.is_recording and has_enough(swing.setup, swing.state):
+            self.finish()  # it was interrupted after its last image
 
     def take(
         self,
@@ -533,6 +537,13 @@ class SwingCourse:
         self.abandon()
         self._entries.stop()
         self._troubles.trying(self._entries.close)
+
+
+def _is_judged(status: SwingStatus) -> bool:
+    """Whether a swing has its verdict, but is not accepted."""
+    state = status.state
+    is_accepted = status.result is not None
+    return state is not None and state.phase is Phase.VERDICT and not is_accepted
 
 
 @dataclass(frozen=True, eq=False)

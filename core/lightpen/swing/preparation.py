@@ -382,7 +382,8 @@ class Preparation:
     def swings_like(self, other: "Preparation") -> bool:
         """Return whether a swing begun with the other would be the same."""
         return (
-            self.camera_file is other.camera_file
+            self.sources == other.sources
+            and self.camera_file is other.camera_file
             and self.pen_file is other.pen_file
             and self.names == other.names
             and self.limits == other.limits

@@ -59,7 +59,8 @@ def read_image(
     elif not is_known:
         number = state.next_number
         kept = keep(setup.rig, setup.pen, state.kept, sighting, number, time)
-        state = replace(state, kept=kept, next_number=number + 1)
+        trace = state.trace.with_estimate(kept)
+        state = replace(state, kept=kept, next_number=number + 1, trace=trace)
         events = (SwingEvent(Happening.KEPT, (number,)),)
     return _ended_by_last(Transition(state, events))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lightpen.cameras.sources import source_named
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
 from lightpen.record.header import damaged_file
@@ -42,6 +43,15 @@ class Resumable:
     record: Record
     setup: SwingSetup
     state: SwingState
+
+    @property
+    def source_choice(self) -> SourceChoice | None:
+        """Where its images came from; None where this version does not know that."""
+        settings = self.record.header.settings
+        kind, place = settings.get("source"), settings.get("source_place")
+        if not isinstance(kind, str) or source_named(kind) is None:
+            return None
+        return SourceChoice(kind, place if isinstance(place, str) else "")
 
     def is_of(self, sources: Sequence[SourceChoice]) -> bool:
         """Return whether images of these sources can go on with it."""

@@ -152,6 +152,13 @@ def has_just_slipped(state: SwingState) -> bool:
     return state.slipped_at is not None and state.time - state.slipped_at < SLIP_TOLD
 
 
+def has_enough(setup: SwingSetup, state: SwingState) -> bool:
+    """Return whether a swing has all that it needs, or as many images as it may."""
+    if state.n_kept >= setup.limits.max_images:
+        return True
+    return state.n_kept > 0 and measure_shortfall(setup, state).is_none
+
+
 def stillness(state: SwingState) -> float:
     """Return how much of the time to say yes the pen is upright and still, 0 to 1."""
     if state.still_since is None:
@@ -313,9 +320,7 @@ def _kept(setup: SwingSetup, state: SwingState, sighting: Sighting) -> Transitio
         SwingEvent(Happening.FIELD_FULL, (int(row), int(column)))
         for row, column in np.argwhere(full)
     ]
-    if state.n_kept >= setup.limits.max_images or (
-        measure_shortfall(setup, state).is_none
-    ):
+    if has_enough(setup, state):
         ended = finish(state)
         return Transition(ended.state, (*events, *ended.events))
     return Transition(state, tuple(events))

@@ -37,6 +37,7 @@ LEARNING_TILT = np.radians(12.0)  # tells to which side the operator leans
 REACHED = np.radians(5.0)  # of a target
 N_MORE = 40  # images at least, where more are asked for than a swing needs
 PATIENCE = 4.0  # s until a target that is not reached is chosen anew
+ENOUGH_FILLED = 0.5  # of the fields, before it is said what no image can lower
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +114,17 @@ def limits_for_more(limits: SwingLimits, n_kept: int) -> SwingLimits:
     )
 
 
-def out_of_reach(limits: SwingLimits, state: SwingState) -> Sentence | None:
-    """Return why no number of images brings U to its limit, if none does."""
+def out_of_reach(
+    limits: SwingLimits, state: SwingState, short: Shortfall
+) -> Sentence | None:
+    """Return why no number of images brings U to its limit, if none does.
+
+    More images of the same kind do not lower the floor, but other postures do. So
+    nothing is said before half of those that are wanted are there.
+    """
     reached = state.kept.reached
-    if reached.floor < limits.max_uncertainty:
+    is_early = short.fields.sum() > (1 - ENOUGH_FILLED) * short.wanted.sum()
+    if is_early or reached.floor < limits.max_uncertainty:
         return None
     return cannot_get_below(reached.floor, limits.max_uncertainty)
 
@@ -155,7 +163,7 @@ def missing(setup: SwingSetup, state: SwingState) -> tuple[Sentence, ...]:
         limit = setup.limits.max_uncertainty
         known = np.isfinite(uncertainty)
         found.append(uncertain(uncertainty, limit) if known else UNKNOWN)
-    never = out_of_reach(setup.limits, state)
+    never = out_of_reach(setup.limits, state, short)
     if never is not None:
         found.append(never)
     if state.n_kept < setup.limits.min_images:

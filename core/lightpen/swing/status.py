@@ -53,7 +53,8 @@ class SwingStatus:
     is_troubled : bool
         Whether it is paused because an image could not be recorded.
     has_other_choices : bool
-        Whether something else was chosen since it began.
+        Whether something else was chosen since it began, and it is neither being
+        solved nor accepted.
     """
 
     setup: SwingSetup | None = None

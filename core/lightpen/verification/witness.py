@@ -200,7 +200,8 @@ def witnessed_by(
     spread = float(np.sqrt(np.nanmean(noise**2) * length / (length - 1)))
     uncertainty = COVERAGE_FACTOR * scale * spread * float(np.sqrt(2 / length))
     moves = scale * (means - means[0])
-    return LampWitness(places, moves, uncertainty, _judged(moves, uncertainty, limits))
+    judged = _judged(moves, scale, uncertainty, limits)
+    return LampWitness(places, moves, uncertainty, judged)
 
 
 def judged_with(found: Conformity, witness: LampWitness | None) -> Conformity:
@@ -225,16 +226,18 @@ def witness_entries(witness: LampWitness | None) -> dict[str, Any] | None:
 
 
 def _judged(
-    moves: FloatArray, uncertainty: float, limits: VerificationLimits
+    moves: FloatArray, scale: float, uncertainty: float, limits: VerificationLimits
 ) -> Conformity:
     moved = float(np.linalg.norm(moves, axis=1).max())
     if moved > limits.drift:
         return refused(
             sentence(
                 "witness.moved",
-                "The camera moved: fixed lamps in view shift by {moved:.4f} mm where "
-                "the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was "
-                "touched is off by as much, which its U counts.",
+                "The camera moved by {shift:.1f} px: fixed lamps in view shift by "
+                "{moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit "
+                "{limit:.4f} mm). What was touched is off by as much, which its U "
+                "counts.",
+                shift=moved / scale,
                 moved=moved,
                 uncertainty=uncertainty,
                 limit=limits.drift,

@@ -1099,6 +1099,25 @@
     </message>
 </context>
 <context>
+    <name>HandRow</name>
+    <message>
+        <source>Lean the pen</source>
+        <translation>倾斜光笔</translation>
+    </message>
+    <message>
+        <source>The simulated pen is leaned to all sides until you end it.</source>
+        <translation>模拟光笔向各个方向倾斜，直到您结束为止。</translation>
+    </message>
+    <message>
+        <source>Cover LEDs</source>
+        <translation>遮挡 LED</translation>
+    </message>
+    <message>
+        <source>Hold a hand before three LEDs of the simulated pen.</source>
+        <translation>用手遮住模拟光笔的三个 LED。</translation>
+    </message>
+</context>
+<context>
     <name>HelpWindow</name>
     <message>
         <source>Help</source>
@@ -1387,12 +1406,12 @@
         <translation>正在读取摆动。</translation>
     </message>
     <message>
-        <source>No camera is open. Choose the source of the images at the step Camera, then resume the swing here.</source>
-        <translation>相机未打开。请在“相机”步骤选择图像来源，再回到这里继续摆动。</translation>
+        <source>No camera is open. Choose the source of the images of this swing at the step Camera: {0}. Then resume the swing here.</source>
+        <translation>没有打开相机。请在“相机”步骤选择该摆动的图像来源：{0}，再回到这里继续摆动。</translation>
     </message>
     <message>
-        <source>The swing was captured with another source of images. Choose that source at the step Camera, then resume the swing here.</source>
-        <translation>该摆动是用另一图像来源采集的。请在“相机”步骤选择该来源，再在此继续。</translation>
+        <source>The swing was captured with another source of images: {0}. Choose that source at the step Camera, then resume the swing here.</source>
+        <translation>该摆动由另一图像来源采集：{0}。请在“相机”步骤选择该来源，再回到这里继续摆动。</translation>
     </message>
     <message>
         <source>The camera sends {0} x {1}, the swing was captured with {2} x {3}. Choose its camera at the step Camera, then resume the swing here.</source>
@@ -4274,6 +4293,10 @@
         <translation>摆动继续进行。</translation>
     </message>
     <message>
+        <source>There is no tip to review: choose other images.</source>
+        <translation>没有可复核的测头：请选择其他图像。</translation>
+    </message>
+    <message>
         <source>There is no tip to review: capture more, or start over.</source>
         <translation>没有可复核的测头：请继续采集，或重新开始。</translation>
     </message>
@@ -4379,6 +4402,14 @@
         <translation>{0}；已丢弃 {1} 幅</translation>
     </message>
     <message>
+        <source>more are needed, as U (k = 2) has risen</source>
+        <translation>U (k = 2) 变大，需要更多图像</translation>
+    </message>
+    <message>
+        <source>more are needed to fill the postures</source>
+        <translation>需要更多图像才能填满各姿态</translation>
+    </message>
+    <message>
         <source>The camera sends none; nothing is lost. Press Space to go on when they come.</source>
         <translation>相机没有发送图像；没有任何丢失。图像恢复后按空格键继续。</translation>
     </message>
@@ -4431,14 +4462,6 @@
         <translation>继续采集</translation>
     </message>
     <message>
-        <source>The review is open at the screen.</source>
-        <translation>复核页已在屏幕上打开。</translation>
-    </message>
-    <message>
-        <source>Put the pen down. The review is open at the screen.</source>
-        <translation>请放下光笔。复核页已在屏幕上打开。</translation>
-    </message>
-    <message>
         <source>Go on to the review.</source>
         <translation>请转到复核。</translation>
     </message>
@@ -4477,6 +4500,14 @@
     <message>
         <source>{0} kept, {1} to go</source>
         <translation>已保留 {0}，还需 {1}</translation>
+    </message>
+    <message>
+        <source>Go on at the screen.</source>
+        <translation>请在屏幕上继续。</translation>
+    </message>
+    <message>
+        <source>Put the pen down. Go on at the screen.</source>
+        <translation>请放下光笔，在屏幕上继续。</translation>
     </message>
     <message>
         <source>about {0} min left</source>
@@ -4612,6 +4643,10 @@
     <message>
         <source>Choose an entry with a tip: its trend is shown here.</source>
         <translation>选择一个带测头数据的条目，此处显示其趋势。</translation>
+    </message>
+    <message>
+        <source>Pen {0}, tip {1}: one calibration, {2}. Dashed: the limit of U.</source>
+        <translation>光笔 {0}，测头 {1}：一次标定，{2}。虚线：U 的限值。</translation>
     </message>
     <message>
         <source>Pen {0}, tip {1}: {2} calibrations, {3} to {4}. Dashed: three standard deviations from their mean, and the limit of U.</source>
@@ -5593,6 +5628,10 @@
         <translation>{place} 的图像已无法读取。请连接磁盘或放回图像，或选择其他图像。</translation>
     </message>
     <message>
+        <source>No image shows a chessboard of {columns} x {rows} inner corners, but a part of a larger one, of which {seen_columns} x {seen_rows} are seen. Count the inner corners of the whole board again.</source>
+        <translation>没有图像显示有 {columns} x {rows} 个内角点的棋盘格，而是显示了一个更大棋盘格的一部分，其中可见 {seen_columns} x {seen_rows} 个内角点。请重新数整个标定板的内角点。</translation>
+    </message>
+    <message>
         <source>No image shows a chessboard of {columns} x {rows} inner corners, but one of {seen_columns} x {seen_rows}. Count its inner corners again.</source>
         <translation>图像中没有 {columns} x {rows} 内角点的棋盘格，看到的是 {seen_columns} x {seen_rows}。请重新数内角点。</translation>
     </message>
@@ -5811,6 +5850,10 @@
     <message>
         <source>The camera matrix of {name} is not of the form fx 0 cx, 0 fy cy, 0 0 1; it may be transposed or incomplete. Export the file again.</source>
         <translation>{name} 的相机矩阵不是 fx 0 cx, 0 fy cy, 0 0 1 的形式；可能被转置或不完整。请重新导出文件。</translation>
+    </message>
+    <message>
+        <source>The camera moved by {shift:.1f} px: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much, which its U counts.</source>
+        <translation>相机移动了 {shift:.1f} px：视野中固定的灯在光笔处偏移了 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。所测各点偏差与此相当，已计入其 U。</translation>
     </message>
     <message>
         <source>The camera moved during the swing: fixed lamps in view shift by {shift:.2f} px, and the pen with them. It is taken out. Clamp the camera, and let it warm up.</source>
@@ -6679,10 +6722,6 @@
     <message>
         <source>The calibration of a camera in {file} is not as it was written: it was changed or damaged since. Restore the file from a copy.</source>
         <translation>{file} 中的相机标定与写入时不同：之后被更改或损坏。请从副本恢复该文件。</translation>
-    </message>
-    <message>
-        <source>The camera moved: fixed lamps in view shift by {moved:.4f} mm where the pen is (U {uncertainty:.4f} mm, limit {limit:.4f} mm). What was touched is off by as much, which its U counts.</source>
-        <translation>相机移动过：视野中固定的灯在光笔处偏移了 {moved:.4f} mm（U {uncertainty:.4f} mm，限值 {limit:.4f} mm）。所测各点偏差与此相当，已计入其 U。</translation>
     </message>
     <message>
         <source>The diameter of the ball is not known, which a ring or a length touched at its faces needs. Enter it where the tip is named.</source>
@@ -7940,8 +7979,8 @@
         <translation>录入后被更改</translation>
     </message>
     <message>
-        <source>practice</source>
-        <translation>练习</translation>
+        <source>kept</source>
+        <translation>已保留</translation>
     </message>
 </context>
 <context>

@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtCore import QLocale, QPoint, QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
 
 from lightpen.detection.inspection import Exposure
@@ -346,3 +346,27 @@ def test_words_stay_large_enough_to_be_read(qtbot: QtBot) -> None:
     assert text.minimumHeight() > 60
     text.resize(300, text.minimumHeight())
     assert text.size_px() >= 15
+
+
+LONG = "More images hardly help, as the LED centres are off alike. " * 5
+
+
+def test_a_banner_grows_for_a_long_sentence_so_that_it_can_be_read(
+    qtbot: QtBot,
+) -> None:
+    banner, holder = StateBanner(TextSize.TITLE), QWidget()
+    qtbot.addWidget(holder)
+    layout = QVBoxLayout(holder)
+    layout.addWidget(banner)
+    layout.addStretch(1)
+    holder.resize(600, 500)
+    holder.show()
+    banner.set_value(State("REPEAT", "The cone moved.", Sign.CROSS, Tone.BAD))
+    qtbot.waitUntil(lambda: banner.height() == banner.sizeHint().height())
+    short = banner.height()
+
+    banner.set_value(State("REPEAT", LONG, Sign.CROSS, Tone.BAD))
+    qtbot.waitUntil(lambda: banner.height() > short)
+    assert banner.detail_px() >= TextSize.SMALL
+    banner.set_value(State("REPEAT", "The cone moved.", Sign.CROSS, Tone.BAD))
+    qtbot.waitUntil(lambda: banner.height() == short)

@@ -433,6 +433,22 @@ def test_it_is_told_when_no_image_is_skipped_any_more(benches: Benches) -> None:
     assert workbench.events.all.count(KeepsUp()) == 1
 
 
+def test_it_is_over_when_no_image_was_skipped_for_a_while(
+    benches: Benches, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lightpen.cameras.worker.KEEPING_UP", 0.1)
+    workbench = benches.live(n_queued=16)
+    workbench.worker.measure(True)
+    workbench.worker.start()
+    workbench.wait_for_trouble(FramesSkipped)
+
+    for _ in range(100):  # far fewer than make the skipped ones a small share
+        workbench.worker.next_frame(TIMEOUT)
+        if KeepsUp() in workbench.events.all:
+            break
+    assert workbench.events.all.count(KeepsUp()) == 1
+
+
 def test_a_camera_rests_while_nobody_wants_images_but_is_looked_after(
     benches: Benches, monkeypatch: pytest.MonkeyPatch
 ) -> None:

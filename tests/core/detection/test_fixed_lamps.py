@@ -3,7 +3,7 @@
 import numpy as np
 
 from lightpen.arrays import FloatArray, Image
-from lightpen.detection.fixed_lamps import fixed_lamps, masked_lights
+from lightpen.detection.fixed_lamps import fixed_lamps, lamps_among, masked_lights
 from lightpen.detection.labelling.labels import Labels, label_images
 from lightpen.detection.sighting import Sighting, sightings_of
 from lightpen.detection.spots import detect_spots
@@ -55,6 +55,29 @@ def test_a_spot_that_stays_is_a_lamp_and_one_that_moves_is_none() -> None:
 def test_a_lamp_that_few_images_show_is_none() -> None:
     sightings = [seen(disc_at(*[(80.0, 60.0)] * (i < 4))) for i in range(8)]
     assert fixed_lamps(nothing_masked(8), sightings).shape == (8, 0, 2)
+
+
+def test_lamps_that_all_jump_at_once_are_the_lamps_they_were() -> None:
+    """One comes to lie nearer to where another was than to where it was itself."""
+    places = np.array([[80.0, 60.0], [80.0, 100.0], [250.0, 200.0]])
+    lights = [places + (0.0 if i < 14 else (4.0, 30.0)) for i in range(20)]
+    lamps = lamps_among(nothing_masked(20), lights)
+    order = np.lexsort(lamps[0].T)
+    np.testing.assert_allclose(lamps[:, order], np.stack(lights))
+
+
+def test_a_lamp_that_jumps_out_of_its_masked_circle_is_found_beside_it() -> None:
+    masked = np.full((20, 1, 2), np.nan)
+    masked[:17] = 82.0, 58.0
+    lights = [np.zeros((0, 2))] * 17 + [np.array([[150.0, 58.0]])] * 3
+    lamps = lamps_among(masked, lights)
+    np.testing.assert_allclose(lamps[:17, 0], [[82.0, 58.0]] * 17)
+    np.testing.assert_allclose(lamps[17:, 0], [[150.0, 58.0]] * 3)
+
+
+def test_a_reflection_that_goes_from_place_to_place_with_the_pen_is_no_lamp() -> None:
+    lights = [np.array([[50.0 + 30 * (i // 5), 80.0]]) for i in range(25)]
+    assert lamps_among(nothing_masked(25), lights).shape == (25, 0, 2)
 
 
 def test_an_led_that_passes_through_a_masked_circle_is_passed_over() -> None:

@@ -19,7 +19,7 @@ from lightpen.estimation.linearised import (
     views_at,
 )
 from lightpen.estimation.priors import priors_of
-from lightpen.estimation.unknowns import Forms, drift_forms, lean_forms
+from lightpen.estimation.unknowns import forms_of
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
@@ -55,8 +55,7 @@ def pair(camera: Camera = CAMERA) -> Rig:
 def adjusted(rig: Rig, pen: Pen, swing: Swing, pixels: FloatArray) -> Bundle:
     start = BundleState(rig, pen, swing.tip_pen, swing.cone_cam, swing.rotations)
     priors = priors_of(rig, pen, USUAL)
-    forms = Forms(lean_forms(swing.rotations), drift_forms(len(pixels)))
-    return fit_bundle(pixels, start, priors, forms)
+    return fit_bundle(pixels, start, priors, forms_of(swing.rotations))
 
 
 def in_frame_of(measured: Pen, swing: Swing) -> FloatArray:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
+from lightpen.detection.fixed_lamps import lamps_among
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.errors import CalibrationError
 from lightpen.estimation.calibrate import Calibration, calibrate
@@ -16,6 +17,7 @@ from lightpen.estimation.verdict import Grade, NextStep, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import Code
 from lightpen.model.limits import SwingLimits
+from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import (
     paper_camera,
     paper_pen,
@@ -110,6 +112,31 @@ def test_the_way_of_a_camera_is_taken_out_and_told(way: FloatArray) -> None:
     assert verdict.grade is Grade.CHECK
     assert verdict.reason.code == Code.CAMERA_MOVED
     assert verdict.next_step is NextStep.CLAMP
+
+
+@pytest.mark.parametrize("bump", [12.0, 60.0])
+def test_a_hard_bump_of_the_camera_is_told_in_pixels(bump: float) -> None:
+    turn = rotation_from_vector(np.array([0.0, bump / CAMERA.fx, 0.0]))
+    is_after = (TIME > 0.6)[:, None]
+    poses = (
+        np.where(is_after[..., None], turn @ SWING.rotations, SWING.rotations),
+        np.where(is_after, SWING.translations @ turn.T, SWING.translations),
+    )
+    rng = np.random.default_rng(7)
+    pixels = simulate_centers(CAMERA, PEN, *poses, SIGMA, rng)
+    rays = np.column_stack([CAMERA.unproject(LAMPS), np.ones(2)])
+    shown = np.where(is_after[..., None], CAMERA.project(rays @ turn.T), LAMPS)
+    noisy = shown + 0.02 * rng.standard_normal(shown.shape)
+    centers = Centers(np.arange(N_IMAGES), pixels, Path("simulated"))
+    seen = observe_centers(centers, CAMERA, PEN)
+    lamps = lamps_among(np.zeros((N_IMAGES, 0, 2)), list(noisy))
+    calibration = calibrate(CAMERA, PEN, replace(seen, lamps=lamps))
+    told = [str(each) for each in warnings_of(calibration)]
+
+    assert f"fixed lamps in view shift by {bump:.0f}." in " ".join(told)
+    assert judge(calibration, SwingLimits()).reason.code == Code.CAMERA_MOVED
+    assert calibration.used.all()
+    assert errors_in_u(calibration).max() < 1.2
 
 
 def test_a_way_without_a_lamp_is_refused_and_with_one_it_is_not() -> None:

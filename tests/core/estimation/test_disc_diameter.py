@@ -9,14 +9,21 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import Observations, observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.disc_diameter import MIN_READINGS, read_diameter
+from lightpen.estimation.disc_diameter import (
+    MIN_READINGS,
+    SHARP_RIM,
+    read_diameter,
+)
 from lightpen.estimation.linearised import BundleState
 from lightpen.estimation.report import warnings_of
+from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers
 from lightpen.model.ellipse import disc_images
 from lightpen.model.limits import SwingLimits
+from lightpen.model.pen import Pen
 from lightpen.model.rig import rig_of
+from lightpen.simulator.sample_pens import fanned_pen
 from lightpen.simulator.swings import (
     leds_in_camera,
     paper_camera,
@@ -31,9 +38,9 @@ RIM = 2.2  # px, of a sharp image
 SWING = swing_poses(40, np.random.default_rng(3))
 
 
-def true_areas() -> FloatArray:
-    leds, normals = leds_in_camera(PEN, SWING.rotations, SWING.translations)
-    shapes = disc_images(CAMERA, leds, normals, PEN.diameter / 2).shapes
+def true_areas(pen: Pen = PEN) -> FloatArray:
+    leds, normals = leds_in_camera(pen, SWING.rotations, SWING.translations)
+    shapes = disc_images(CAMERA, leds, normals, pen.diameter / 2).shapes
     areas: FloatArray = 4 * np.pi * np.sqrt(np.linalg.det(shapes))
     return areas
 
@@ -45,14 +52,14 @@ def state_with(diameter: float) -> BundleState:
     )
 
 
-def observed(areas: FloatArray) -> Observations:
+def observed(areas: FloatArray, pen: Pen = PEN, rim: float = RIM) -> Observations:
     rng = np.random.default_rng(4)
     pixels = simulate_centers(
-        CAMERA, PEN, SWING.rotations, SWING.translations, 0.03, rng
+        CAMERA, pen, SWING.rotations, SWING.translations, 0.03, rng
     )
     centers = Centers(np.arange(len(SWING)), pixels, Path("simulated"))
-    seen = observe_centers(centers, CAMERA, PEN)
-    return replace(seen, areas=areas, edge_widths=np.full(len(SWING), RIM))
+    seen = observe_centers(centers, CAMERA, pen)
+    return replace(seen, areas=areas, edge_widths=np.full(len(SWING), rim))
 
 
 def calibrated(said: float, areas: FloatArray) -> Calibration:
@@ -116,6 +123,55 @@ def test_a_wrong_diameter_is_put_right_and_named(said: float) -> None:
 def test_a_right_diameter_is_not_contradicted_by_discs_that_look_larger() -> None:
     result = calibrated(10.0, 1.01 * true_areas())
     assert not result.contradictions
+
+
+BLURRED = 6.6  # px
+
+
+def by_led_centres(result: Calibration) -> FloatArray:
+    """Return what LED centres add to the variance of the tip, (3,), mm^2."""
+    (share,) = (s for s in result.budget.shares if s.name is ShareName.CENTERS)
+    assert share.assumed
+    return share.standard_uncertainty**2
+
+
+@pytest.mark.parametrize("pen", [PEN, fanned_pen()], ids=["flat", "fanned"])
+def test_leds_that_seem_to_stand_behind_their_discs_move_the_tip_as_counted(
+    pen: Pen,
+) -> None:
+    areas = true_areas(pen)
+    even = observed(areas, pen, BLURRED)
+    counted, sharp = (
+        calibrate(CAMERA, pen, replace(even, edge_widths=widths))
+        for widths in (even.edge_widths, np.full(len(SWING), SHARP_RIM))
+    )
+    reading = counted.priors.reading
+    assert reading is not None
+    behind = replace(pen, leds=pen.leds - reading.shift * pen.normals)
+    moved = calibrate(CAMERA, pen, replace(observed(areas, behind), areas=areas))
+
+    np.testing.assert_allclose(
+        np.sqrt(np.maximum(by_led_centres(counted) - by_led_centres(sharp), 0.0)),
+        np.abs(moved.joint.tip_pen - sharp.joint.tip_pen),
+        atol=1e-4,
+    )
+
+
+@pytest.mark.parametrize(
+    ("disc", "rim", "behind"), [(43, 6.6, 5.0), (43, 2.4, 1.1), (21, 2.4, 2.2)]
+)
+def test_a_dome_as_rendered_is_within_what_is_counted(
+    disc: float, rim: float, behind: float
+) -> None:
+    areas = np.full((len(SWING), 1, PEN.n_leds), np.pi * (disc / 2) ** 2)
+    widths = np.full((len(SWING), 1), rim)
+    said = 10.0 * disc / 43
+    reading = read_diameter(state_with(said), areas, widths)
+
+    assert reading is not None
+    assert reading.value == pytest.approx(10.0 * disc / 43, rel=0.05)
+    # Even faces and domes are the ends of what is taken for as likely.
+    assert 1e3 * np.sqrt(3.0) * reading.shift == pytest.approx(behind, rel=0.15)
 
 
 def test_centres_alone_say_nothing_against_a_diameter() -> None:

@@ -73,7 +73,7 @@ def test_exact_files_and_images_give_no_error(calibration: Calibration) -> None:
         pen=pen,
         sigma=1e-6,
         led_covariance=0.0 * trials.led_covariance,
-        form_covariances=0.0 * trials.form_covariances,
+        move_covariance=0.0 * trials.move_covariance,
         jitter=np.zeros((3, 3)),
         priors=replace(
             trials.priors,

@@ -1,6 +1,7 @@
 """Noise that lasts from image to image: measured, and carried to the tip."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,7 @@ def calibrated(swing: Swing, errors: FloatArray, pen: Pen = PEN) -> Calibration:
     return calibrate(CAMERA, pen, observe_centers(centers, CAMERA, pen))
 
 
+@cache
 def of_noise(n_images: int, coefficient: float, seed: int) -> tuple[Swing, Calibration]:
     swing = swing_poses(n_images, np.random.default_rng(seed))
     return swing, calibrated(swing, 0.03 * lasting(n_images, coefficient, seed))

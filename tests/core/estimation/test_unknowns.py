@@ -11,10 +11,11 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.uncertainty import ShareName
-from lightpen.estimation.unknowns import lean_forms, led_basis
+from lightpen.estimation.unknowns import FULL_LEAN, lean_forms, led_basis, oval_seat
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
-from lightpen.model.rigid import fit_rigid
+from lightpen.model.posture import rotations_of
+from lightpen.model.rigid import fit_rigid, rotation_from_vector
 from lightpen.simulator.swings import (
     Swing,
     paper_camera,
@@ -296,10 +297,90 @@ def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
     np.testing.assert_allclose(np.mean(forms**2, axis=0), 1)
 
 
+ANGLES = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+ROUND = rotations_of(PEN, np.full(60, 0.4), ANGLES, np.zeros(60))
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3, 1.2])
+def test_an_oval_seat_moves_the_tip_to_the_axis_and_away_from_it(phase: float) -> None:
+    weight = np.sin(0.4) / (np.sin(0.4) + FULL_LEAN)
+    radius = 0.01 * weight * np.cos(2 * ANGLES - phase)
+    away = np.stack([np.cos(ANGLES), 0 * ANGLES, np.sin(ANGLES)], axis=1)
+
+    numbers = 0.01 * np.array([np.cos(phase), np.sin(phase)])
+    moves = (oval_seat(ROUND) @ numbers).reshape(-1, 3)
+
+    found = lean_forms(ROUND) @ moves
+    np.testing.assert_allclose(found, radius[:, None] * away, atol=1e-12)
+
+
+def test_a_camera_that_looks_down_sees_the_same_seat() -> None:
+    looking = rotation_from_vector(np.array([0.6, 0.0, 0.0]))
+
+    np.testing.assert_allclose(
+        lean_forms(looking @ ROUND), lean_forms(ROUND), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        oval_seat(looking @ ROUND).reshape(-1, 3, 2),
+        looking @ oval_seat(ROUND).reshape(-1, 3, 2),
+        atol=1e-12,
+    )
+
+
+def test_a_seat_has_forms_before_a_camera_that_lies_on_its_side() -> None:
+    on_its_side = rotation_from_vector(np.array([0.0, 0.0, np.pi / 2]))
+    forms = lean_forms(on_its_side @ ROUND)
+
+    # Waves round the cone are independent of each other where the lean goes round.
+    np.testing.assert_allclose(forms[:, :6].T @ forms[:, :6] / 60, np.eye(6), atol=1e-9)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.6, 2.4])
+def test_an_oval_seat_is_found_as_such_and_leaves_the_tip(phase: float) -> None:
+    pen = replace(PEN, led_sigma=0.002)
+    result = calibrated(pen, 0.03, 3, seat=forms_of_seat(2, phase))
+    still = calibrated(pen, 0.03, 3)
+
+    # Two numbers tell it: cosine and sine of the phase, times 10 um.
+    components = result.bundle.components
+    assert 0.003 < components.oval.sigma < 0.02
+    assert not any(form.sigma for form in components.seat)
+    moved = np.abs(result.joint.tip_pen - still.joint.tip_pen)
+    assert (moved < 0.005).all()
+    assert (moved < result.budget.expanded_uncertainty[:3]).all()
+
+
+@pytest.mark.parametrize("n_lobes", [3, 4])
+@pytest.mark.parametrize("phase", [0.0, 0.8, 1.6, 2.4])
+def test_a_seat_of_more_lobes_is_covered_whatever_it_is_taken_for(
+    n_lobes: int, phase: float
+) -> None:
+    pen = replace(PEN, led_sigma=0.002)
+    result = calibrated(pen, 0.03, 3, seat=forms_of_seat(n_lobes, phase))
+
+    uncertainty = result.budget.expanded_uncertainty[:3]
+    assert (np.abs(error_of(result, pen)) < uncertainty).all()
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_seat_that_goes_along_one_axis_alone_is_no_oval(axis: int) -> None:
+    pen = replace(PEN, led_sigma=0.002)
+    sine_of_three_waves = lean_forms(SWING.rotations)[:, 5]
+    seat = 0.01 * np.outer(sine_of_three_waves, np.eye(3)[axis])
+    result = calibrated(pen, 0.03, 3, seat=seat)
+
+    components = result.bundle.components
+    assert components.seat[2].is_significant
+    assert components.oval.sigma == 0
+    uncertainty = result.budget.expanded_uncertainty[:3]
+    assert (np.abs(error_of(result, pen)) < uncertainty).all()
+
+
 def test_a_pen_that_keeps_its_lean_has_no_forms() -> None:
     upright = np.tile(np.eye(3), (5, 1, 1))
 
     assert not lean_forms(upright).any()
+    assert not oval_seat(upright).any()
 
 
 def test_a_stated_covariance_tells_which_leds_may_be_off() -> None:

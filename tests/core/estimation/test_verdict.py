@@ -9,6 +9,7 @@ import pytest
 from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
+from lightpen.estimation.report import warnings_of
 from lightpen.estimation.uncertainty import Halves, Share, ShareName
 from lightpen.estimation.variance_components import Component
 from lightpen.estimation.verdict import (
@@ -22,6 +23,7 @@ from lightpen.estimation.verdict import (
     judge,
     judge_change,
     judge_unknown,
+    repeats,
 )
 from lightpen.formats.observation_files import Centers
 from lightpen.messages import (
@@ -223,6 +225,10 @@ def test_a_tip_by_assumptions_alone_passes_only_within_the_limit_with_them() -> 
     assert judge(result, within).grade is Grade.PASS
 
 
+def led_misplaced_too(warning: Sentence) -> Sentence:
+    return replace(warning, values={**warning.values, "led": 2})
+
+
 def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
     leds = PEN.leds.copy()
     leds[8, 1] += 3.0
@@ -240,6 +246,10 @@ def test_an_led_off_its_place_is_checked_though_the_tip_is_certain() -> None:
     assert verdict.reason.code == Code.LED_DISPLACED
     assert verdict.reason.values["led"] == 9
     assert verdict.reason.values["distance"] == pytest.approx(3.0, abs=0.05)
+    doubts = [each for each in warnings_of(calibration) if "LED 9 sits" in each.text()]
+    assert len(doubts) == 1
+    assert repeats(doubts[0], verdict.reason)  # it is not told twice
+    assert not repeats(led_misplaced_too(doubts[0]), verdict.reason)
 
 
 def test_a_tip_far_from_its_nominal_place_is_noticed() -> None:
@@ -274,9 +284,9 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         np.radians(rng.uniform(-20, 155, 150)),
         np.radians(rng.uniform(-30, 30, 150)),
     )
-    verdict = judge(
-        calibrated(swing_from_postures(postures)), SwingLimits(max_uncertainty=0.05)
-    )
+    calibration = calibrated(swing_from_postures(postures))
+    limits = SwingLimits(max_uncertainty=0.05)
+    verdict = judge(calibration, limits)
     assert verdict.grade is Grade.CHECK
     assert verdict.reason == too_little_tilt(8, (4, 5, 6, 7))
     assert str(verdict.reason) == (
@@ -284,6 +294,8 @@ def test_sides_that_the_pen_never_leant_to_are_named() -> None:
         "camera, towards the camera to the right. Lean the pen further that way. "
         "Images still needed: about 8."
     )
+    unasked = judge(calibration, replace(limits, min_per_field=0))
+    assert unasked.grade is Grade.PASS
 
 
 @pytest.mark.parametrize(

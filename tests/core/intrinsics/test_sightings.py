@@ -10,6 +10,7 @@ from lightpen.formats.images import ImageSource
 from lightpen.intrinsics.boards import Board, parse_board
 from lightpen.intrinsics.observing import observe_board
 from lightpen.intrinsics.sightings import MARKED_WHOLE, count_corners, find_points
+from lightpen.intrinsics.squares import CornerCount, count_from, goes_on
 from lightpen.model.camera import Camera
 from lightpen.model.ellipse import ellipse_centers
 from lightpen.model.rigid import rotation_from_vector
@@ -173,7 +174,55 @@ def test_another_board_than_was_said_is_named(
 
 
 def test_the_corners_of_a_chessboard_are_counted_whole() -> None:
-    assert count_corners(image_of(parse_board("chessboard:9x6:20"))) == (9, 6)
+    counted = count_corners(image_of(parse_board("chessboard:9x6:20")))
+    assert counted == CornerCount(9, 6, is_whole=True)
+
+
+@pytest.mark.parametrize("start", [(0, 0, 2, 2), (3, 2, 3, 2), (6, 3, 3, 3)])
+def test_corners_are_counted_from_any_part_of_a_board_that_was_found(
+    start: tuple[int, int, int, int],
+) -> None:
+    board = parse_board("chessboard:9x6:20")
+    grid = truth(board).reshape(6, 9, 2)
+    x, y, columns, rows = start
+    part = grid[y : y + rows, x : x + columns]
+    image = np.asarray(image_of(board), dtype=np.uint8)
+
+    assert count_from(image, part) == CornerCount(9, 6, is_whole=True)
+    assert goes_on(image, part)
+    assert not goes_on(image, grid)
+
+
+@pytest.mark.parametrize("said", ["5x4", "6x5", "8x6"])
+def test_a_part_of_a_far_larger_board_is_not_taken_for_the_board(said: str) -> None:
+    """OpenCV finds one, of every second corner or of corners that are none."""
+    image = image_of(parse_board("chessboard:11x8:20"))
+    board = parse_board(f"chessboard:{said}:20")
+    with pytest.raises(CalibrationError, match=r"but one of 11 x 8\."):
+        observe_board(source_of(image), board, lambda fraction: None)
+
+
+def test_of_a_board_that_leaves_the_image_it_is_said_how_many_corners_are_seen() -> (
+    None
+):
+    image = image_of(parse_board("chessboard:11x8:20"), filled=0.75)[:, :250].copy()
+    counted = count_corners(image)
+    assert counted is not None
+    assert not counted.is_whole
+
+    board = parse_board("chessboard:4x3:20")
+    with pytest.raises(CalibrationError) as caught:
+        observe_board(source_of(image), board, lambda fraction: None)
+    assert caught.value.sentence.code == "intrinsics.larger-count"
+    assert f"{counted.columns} x {counted.rows} are seen" in str(caught.value)
+
+
+def test_a_board_of_which_a_part_is_seen_is_not_said_to_be_another() -> None:
+    whole = parse_board("chessboard:11x8:20")
+    image = image_of(whole, filled=0.75)[:, :250].copy()
+    with pytest.raises(CalibrationError) as caught:
+        observe_board(source_of(image), whole, lambda fraction: None)
+    assert caught.value.sentence.code == "intrinsics.unseen"
 
 
 def test_a_mirrored_board_is_said_to_be_so() -> None:

@@ -60,7 +60,9 @@ def test_tip_and_images_are_tables(solution: Solution, tmp_path: Path) -> None:
     with (tmp_path / "x_images.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["image"]) for row in rows] == solution.numbers.tolist()
-    assert tip_text(solution).split("\t") == list(map(repr, tip))
+    copied = list(map(repr, tip))
+    assert tip_text(solution, Origin.LIVE).split("\t") == copied
+    assert tip_text(solution, Origin.RECORDED).split("\t") == [*copied, "RECORDED"]
 
 
 def test_the_record_is_that_of_the_command_line(

@@ -39,6 +39,7 @@ def made(pen: str = "LP-04", tip: str = "T-10") -> CalibrationFile:
         path=Path("result.json"),
         pen=pen,
         tip=tip,
+        grade="pass",
         when=datetime(2026, 8, 14, 9, 30, tzinfo=UTC),
         method="joint",
         tip_pen=np.array(TIP),

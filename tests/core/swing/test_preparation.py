@@ -131,7 +131,9 @@ def test_a_swing_goes_by_names_files_limits_mask_and_nominal_tip(
     assert replace(whole, nominal_tip=tip).swings_like(
         replace(whole, nominal_tip=tip.copy())
     )
+    elsewhere = SourceChoice(SourceKind.RECORDED, "another folder")
     others = (
+        replace(whole, source=elsewhere),
         replace(whole, names=replace(NAMES, tip="T-11")),
         replace(whole, camera_file=CameraFile.read(whole.camera_file.path)),
         replace(whole, pen_file=PenFile.read(whole.pen_file.path)),

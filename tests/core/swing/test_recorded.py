@@ -71,6 +71,7 @@ def test_all_images_are_read_once_and_in_order_and_then_the_tip_is_computed(
     assert station.state.progress == Progress(12, N_IMAGES)
     assert station.state.message.code == Code.IMAGES_READ
     assert station.state.target is None
+    assert station.state.trace.n_images.tolist() == list(range(1, 13))
     recording.show(8)
     station.wait_for_phase(Phase.VERDICT)
 

@@ -1,5 +1,6 @@
 """A swing begins, waits and goes on as its user comes and goes."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -227,7 +228,7 @@ def test_other_choices_are_not_settled_by_capturing_more(
     solved.go_on(interrupted)
     solved.runner.choose(other_operator(solved.preparation))
     solved.solve()
-    assert not solved.status.has_other_choices  # nothing more is captured with it
+    assert solved.status.has_other_choices  # or a mended file would not be looked at
     solved.runner.capture_more()
     solved.wait_until(lambda: solved.status.is_capturing)
 
@@ -328,3 +329,30 @@ def test_another_source_leaves_a_swing_that_is_solved_to_be_accepted(
     solved.see()
 
     assert solved.status.solution is not None
+
+
+def test_after_the_verdict_other_choices_are_asked_about_until_the_tip_is_accepted(
+    solved: "Station",
+) -> None:
+    solved.runner.choose(solved.preparation)
+    solved.runner.keep_choices()
+    solved.see()
+    assert not solved.status.has_other_choices
+    solved.runner.choose(other_operator(solved.preparation))
+    solved.see()
+    assert solved.status.has_other_choices
+
+    solved.accept()
+    assert not solved.status.has_other_choices
+
+
+def test_a_swing_that_lacks_nothing_is_computed_when_it_is_gone_on_with(
+    present: "Station", interrupted: Path, rewrite_header: Callable[..., None]
+) -> None:
+    enough = {"min_images": N_IMAGES, "min_per_field": 0, "max_uncertainty_mm": 1.0}
+    rewrite_header(interrupted, enough)
+    present.go_on(interrupted)
+
+    present.wait_for_phase(Phase.VERDICT)
+    assert present.status.solution is not None
+    assert present.n_recorded == N_IMAGES

@@ -103,12 +103,24 @@ def test_what_no_image_can_mend_is_told_with_its_file() -> None:
     state = state_of(setup, swing)
     floor = 1000 * state.kept.reached.floor
 
-    told = out_of_reach(setup.limits, state)
+    short = measure_shortfall(setup, state)
+
+    told = out_of_reach(setup.limits, state, short)
 
     words = f"cannot get below {floor:.1f} \N{MICRO SIGN}m with this LED file"
     assert words in str(told)
     assert told in missing(setup, state)
-    assert out_of_reach(SwingLimits(max_uncertainty=1.0), state) is None
+    assert out_of_reach(SwingLimits(max_uncertainty=1.0), state, short) is None
+
+
+def test_what_other_postures_still_lower_is_not_said_to_be_out_of_reach() -> None:
+    """The floor of few postures is above that of all: it would be said too high."""
+    setup = SwingSetup(CAMERA, PEN, SwingLimits(max_uncertainty=0.004))
+    early = state_of(setup, to_the_right(15))
+    whole = state_of(setup, swing_poses(60, np.random.default_rng(0)))
+    assert early.kept.reached.floor > 0.004 > whole.kept.reached.floor
+
+    assert out_of_reach(setup.limits, early, measure_shortfall(setup, early)) is None
 
 
 def test_fields_that_the_camera_cannot_see_are_not_asked_for() -> None:

@@ -265,7 +265,7 @@ def bumped(recorded: Path, tmp_path: Path) -> Path:
         for file in recorded.glob("[012].png"):
             image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
             assert image is not None
-            moved = np.roll(image, visit, axis=1)
+            moved = np.roll(image, visit, axis=1).astype(np.uint8)
             (folder / file.name).write_bytes(encode_png(moved))
     return tmp_path / "visits"
 

@@ -42,6 +42,16 @@ def test_a_camera_that_moved_is_told_by_how_much() -> None:
     assert found.assessment.reason.code == "witness.moved"
 
 
+def test_a_hard_bump_of_the_camera_is_told_in_pixels() -> None:
+    images = LampImages(tuple(lamps(shift=60.0)), (1000.0,) * 48)
+    found = witnessed(images, 5000.0, LIMITS)
+
+    assert found is not None
+    assert found.assessment.grade is Grade.REPEAT
+    assert "The camera moved by 60.0 px" in str(found.assessment.reason)
+    assert found.share[0] == pytest.approx(60 * 0.2 / np.sqrt(3), rel=0.01)
+
+
 def test_an_image_that_does_not_show_a_lamp_takes_no_part() -> None:
     seen = lamps()
     seen[3, 0] = seen[7] = np.nan

@@ -14,6 +14,7 @@ from lightpen.cameras.worker import Connection
 from lightpen.detection.reasons import Reason
 from lightpen.detection.spots import Spots
 from lightpen.live.looking import LiveImage
+from lightpen.model.origin import Origin
 from lightpen_app.look.phrases import reason_text
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import GRID, TextSize, Tone, text_label
@@ -21,6 +22,7 @@ from lightpen_app.look.words import PARTED
 from lightpen_app.widgets.camera_switch import CameraSwitch
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.live_markers import led_numbers, live_markers
+from lightpen_app.widgets.origin_mark import origin_remark
 from lightpen_app.widgets.sign_label import Remark, SignLabel
 from lightpen_app.widgets.translated import Translated
 from lightpen_app.work.live_view import Shown
@@ -45,6 +47,7 @@ class LivePanel(Translated, QWidget):
         super().__init__(parent)
         self._connection = Connection.CLOSED
         self._sentence = ""
+        self._recorded: Origin | None = None
         self._shown = 0  # of the cameras
         self._arrivals: deque[tuple[int, int]] = deque(maxlen=N_TIMED)  # ns, number
         self._seen: LiveImage | None = None
@@ -132,6 +135,12 @@ class LivePanel(Translated, QWidget):
         self._connection, self._sentence = connection, sentence
         self._refresh()
 
+    def set_recorded(self, origin: Origin | None) -> None:
+        """Say what recorded images are of, which are shown again; None for others."""
+        if origin is not self._recorded:
+            self._recorded = origin
+            self._refresh()
+
     def _forget(self) -> None:
         """Show no image until the next comes."""
         self._view.set_image(None)
@@ -171,6 +180,8 @@ class LivePanel(Translated, QWidget):
         match self._connection:
             case Connection.OPENING:
                 return Remark(self.tr("Connecting"), Sign.WAIT, Tone.ACTIVE)
+            case Connection.STREAMING if self._recorded is not None:
+                return origin_remark(self._recorded)
             case Connection.STREAMING:
                 return Remark(self.tr("Live"), Sign.PLAY, Tone.GOOD)
             case Connection.SILENT:

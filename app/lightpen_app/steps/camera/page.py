@@ -243,7 +243,9 @@ class CameraPage(Rearranged, Page):
         self._intrinsics.setVisible(now.second is None)
         self._show_camera(self._live.chosen)
         self._show_connection()  # what is missing to open one may be another
-        self._focus.set_recorded(now.source.kind == SourceKind.RECORDED)
+        is_recorded = now.source.kind == SourceKind.RECORDED
+        self._images.set_recorded(now.origin if is_recorded else None)
+        self._focus.set_recorded(is_recorded)
         self._stray.set_n_masked(len(self._mask))
         self._mark()
         self.changed.emit()

@@ -27,7 +27,8 @@ from lightpen_app.look.words import moment_text
 from lightpen_app.steps.history.reader import BLOCK
 from lightpen_app.steps.history.texts import (
     line_tone,
-    longest_words,
+    rare_words,
+    usual_words,
     verdict_text,
     what_text,
 )
@@ -287,9 +288,10 @@ class HistoryTable(Translated, RowTable):
 
     def _widths(self, letters: QFontMetrics, longer: int) -> dict[int, int]:
         """Return the width of each column but the last, by short or longer words."""
+        told = (*usual_words(), *rare_words()) if longer else usual_words()
         samples = {
             WHEN: MOMENT,
-            WHAT: longest_words()[longer],
+            WHAT: max(told, key=letters.horizontalAdvance),
             VERDICT: max(map(grade_text, Grade), key=letters.horizontalAdvance),
             **dict.fromkeys((X, Y, Z), COORDINATE),
             U: UNCERTAINTY,

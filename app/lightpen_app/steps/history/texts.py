@@ -7,13 +7,15 @@ from PySide6.QtCore import QCoreApplication
 from lightpen.archive.entries import Event, Kind
 from lightpen.archive.history import Line, TipState
 from lightpen.estimation.verdict import Grade
+from lightpen.model.origin import Origin
 from lightpen.record.outcome import TrialOutcome
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import grade_text
+from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED, listed
 
 CONTEXT = "history"
+MARKED = (Origin.SIMULATED, Origin.RECORDED)
 
 
 if TYPE_CHECKING:
@@ -59,7 +61,7 @@ _SAID: dict[str, str] = {  # of an item of the tip library, by its settings
 }
 _RETIRED = QT_TRANSLATE_NOOP("history", "retired")
 _CHANGED = QT_TRANSLATE_NOOP("history", "Changed since it was entered")
-_SIMULATED = QT_TRANSLATE_NOOP("history", "practice")
+_KEPT = QT_TRANSLATE_NOOP("history", "kept")  # and in force for no pen
 
 
 def kind_text(kind: Kind) -> str:
@@ -72,20 +74,31 @@ def what_text(line: Line) -> str:
     if line.entry is None:
         return _translated(_CHANGED)
     event = line.entry.entry.event
-    words = [kind_text(event.kind)]
-    if line.state is not TipState.NONE:
+    words = []
+    if event.origin in MARKED:
+        words.append(origin_text(event.origin))
+    if not words or event.kind is not Kind.ACCEPTED:
+        words.append(kind_text(event.kind))
+    if line.state is TipState.IN_FORCE and event.is_simulated:
+        words.append(_translated(_KEPT))
+    elif line.state is not TipState.NONE:
         words.append(_translated(_STATES[line.state]))
     if event.outcome is not None:
         words.append(_translated(_OUTCOMES[event.outcome]))
-    if event.is_simulated:
-        words.append(_translated(_SIMULATED))
     return listed(words)
 
 
-def longest_words() -> tuple[str, str]:
-    """Return what is usually told of a calibration, and what at the most."""
-    usual = [kind_text(Kind.ACCEPTED), _translated(_STATES[TipState.REPLACED])]
-    return listed(usual), listed([*usual, _translated(_SIMULATED)])
+def usual_words() -> tuple[str, ...]:
+    """Return what is usually told of a calibration, by what its images are of."""
+    of_tips = (kind_text(Kind.ACCEPTED), *map(origin_text, MARKED))
+    states = tuple(map(_translated, _STATES.values()))
+    return tuple(listed([word, state]) for word in of_tips for state in states)
+
+
+def rare_words() -> tuple[str, ...]:
+    """Return what is told of a swing that came to nothing, which may be long."""
+    kinds = kind_text(Kind.REFUSED), kind_text(Kind.ABANDONED)
+    return tuple(listed([origin_text(o), kind]) for o in MARKED for kind in kinds)
 
 
 def item_text(event: Event) -> str:

@@ -36,6 +36,11 @@ TALLEST = 0.9  # height of the image over its width; sensors are flatter
 class MatchPanel(Translated, QGroupBox):
     """Shows images with numbered LEDs, how many fit, and which do not.
 
+    Parameters
+    ----------
+    foot : QWidget
+        Stands below all of it.
+
     Signals
     -------
     mend_requested(Finding)
@@ -44,7 +49,7 @@ class MatchPanel(Translated, QGroupBox):
 
     mend_requested = Signal(object)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
+    def __init__(self, foot: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._match: PenMatch | None = None
         self._sighting: Sighting | None = None
@@ -69,6 +74,7 @@ class MatchPanel(Translated, QGroupBox):
         for remark in self._remarks:
             layout.addWidget(remark)
         layout.addStretch(0)
+        layout.addWidget(foot)
 
         # Connections
         for remark in self._remarks:

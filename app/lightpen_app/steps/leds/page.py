@@ -26,6 +26,7 @@ from lightpen_app.look.theme import GRID
 from lightpen_app.steps.leds.draft_edit import DraftEdit
 from lightpen_app.steps.leds.file_panel import LedFilePanel
 from lightpen_app.steps.leds.frame_panel import FramePanel
+from lightpen_app.steps.leds.hand_row import HandRow
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.match_watch import PenWatch
 from lightpen_app.steps.leds.pen_view import PenPicture
@@ -71,7 +72,8 @@ class LedsPage(Rearranged, Page):
         self._file = LedFilePanel()
         self._table = LedTablePanel(UndoButtons(self._edits, self))
         self._space = FramePanel()
-        self._match = MatchPanel()
+        self._hand = HandRow(workbench.live)
+        self._match = MatchPanel(self._hand)
         self._watch = PenWatch(self)
 
         # Layout
@@ -151,6 +153,7 @@ class LedsPage(Rearranged, Page):
     def left(self) -> None:
         self._is_shown = False
         self._watch.stop()
+        self._hand.rest()
         if self._is_pending and not self._workbench.run.status.is_capturing:
             self._workbench.live.set_aim(self._workbench.preparation.aim)
 

@@ -148,6 +148,8 @@ class ImagesPanel(Translated, QWidget):
         if not self._is_of_rig():
             self._switch.set_value(0)
         self._switch.setVisible(self._is_of_rig() and not self._view.isHidden())
+        if _is_of_another(before, solution):
+            self._table.set_value(())  # so that its worst is chosen
         rows = () if solution is None else worst_first(solution)
         self._table.set_value(rows)
         self._refresh_misfits()
@@ -388,3 +390,8 @@ def _ring(x: float, y: float, led: int, fits: bool, takes_part: bool) -> Marker:
     """Return the marker of an LED; one that the fit left out is crossed."""
     tone = (Tone.GOOD if fits else Tone.WARN) if takes_part else Tone.ACTIVE
     return Marker(x, y, RING, str(led), tone, crossed=not fits)
+
+
+def _is_of_another(before: Solution | None, now: Solution | None) -> bool:
+    """Whether the images are of another swing."""
+    return before is None or now is None or before.source.folder != now.source.folder

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 from typing_extensions import override
 
 from lightpen.estimation.verdict import Grade, NextStep
+from lightpen.model.origin import Origin
 from lightpen.record.acceptance import takes_supervisor
 from lightpen.record.assessment import Assessment
 from lightpen.record.next_tips import NextTip, next_tips
@@ -167,7 +168,8 @@ class ReviewPage(Rearranged, Page):
             text = self.tr("Next: record more images, and read them all again.")
         assessment = self._run.status.assessment
         has_last = assessment is not None and assessment.last is not None
-        if next_step is NextStep.ACCEPT and has_last:
+        is_practice = self._run.status.origin is Origin.SIMULATED
+        if next_step is NextStep.ACCEPT and has_last and not is_practice:
             text = self.tr("{0} The old one stays in force until then.").format(text)
         return text
 

@@ -100,7 +100,8 @@ class PlotCard(Translated, QFrame):
         FileError
             It cannot be written.
         """
-        save_new(folder, f"{stem}_{self._file_stem}.png", self._plot.png())
+        picture = self._plot.png(self._mark())
+        save_new(folder, f"{stem}_{self._file_stem}.png", picture)
 
     def actions_offered(self) -> Sequence[QAction]:
         """Return what the menu offers: enlarge, save as PNG, save as CSV."""
@@ -112,7 +113,7 @@ class PlotCard(Translated, QFrame):
             if path.suffix.lower() == ".csv":
                 self._plot.save_csv(path)
             else:
-                self._plot.save_png(path)
+                self._plot.save_png(path, self._mark())
         except FileError as error:
             self.failed.emit(worded(error.sentence))
             return
@@ -121,6 +122,9 @@ class PlotCard(Translated, QFrame):
     @override
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self._enlarge.toggle()
+
+    def _mark(self) -> str:
+        return "" if self._place is None else self._place.mark()
 
     def _ask_place(self, suffix: str) -> None:
         dialog = QFileDialog(self, self.tr("Save plot"))

@@ -134,10 +134,10 @@ class MisfitPlot(Plot):
         return canvas
 
     @override
-    def png(self) -> bytes:
+    def png(self, mark: str = "") -> bytes:
         was_visible = self._limit.isVisible()
         self._limit.hide()  # it is there to be drawn, not to be looked at
-        picture = super().png()
+        picture = super().png(mark)
         self._limit.setVisible(was_visible)
         return picture
 
@@ -157,6 +157,7 @@ class MisfitPlot(Plot):
         self._limit.setPen(pg.mkPen(colors.warn, width=2))
         self._limit.setHoverPen(pg.mkPen(colors.text, width=2))
         self._limit.label.setColor(colors.warn)
+        self._limit.label.fill = pg.mkBrush(colors.panel)  # over the dots
 
     def _pixel(self, x: float, y: float) -> QPoint:
         scene = self._item.vb.mapViewToScene(QPointF(x, y))

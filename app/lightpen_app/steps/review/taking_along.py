@@ -79,9 +79,10 @@ class TakingAlong(QObject):
             self.told.emit(open_folder(folder))
 
     def _copy_tip(self) -> None:
-        solution = self._run.status.solution
-        if solution is not None:
-            QApplication.clipboard().setText(tip_text(solution))
+        status = self._run.status
+        if status.solution is not None:
+            line = tip_text(status.solution, status.origin)
+            QApplication.clipboard().setText(line)
             self.told.emit(self.tr("The tip is copied: x, y, z in mm."))
 
     def _ask_folder(self, export: Export) -> None:

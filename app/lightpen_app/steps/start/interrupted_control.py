@@ -7,9 +7,10 @@ from typing import TypeVar
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from lightpen.formats.files import printable
 from lightpen.record.acceptance import conclude_accepted
 from lightpen.record.opening import swing_folder
-from lightpen.record.reading import recorded_names
+from lightpen.record.reading import recorded_names, recorded_origin
 from lightpen.record.unfinished import (
     Unfinished,
     discard_damaged,
@@ -23,7 +24,9 @@ from lightpen.verification.under_way import (
     UnderWay,
     find_interrupted,
 )
-from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.phrases import lack_text, origin_text
+from lightpen_app.look.sentences import worded
+from lightpen_app.look.words import listed
 from lightpen_app.steps.start.interrupted_panel import InterruptedPanel
 from lightpen_app.work.job import Job, Report
 from lightpen_app.work.workbench import Workbench
@@ -185,16 +188,16 @@ class InterruptedControl(QObject):
         if not live.is_open:
             self.notice_raised.emit(
                 self.tr(
-                    "No camera is open. Choose the source of the images at the step "
-                    "Camera, then resume the swing here."
-                )
+                    "No camera is open. Choose the source of the images of this swing "
+                    "at the step Camera: {0}. Then resume the swing here."
+                ).format(_source_text(swing))
             )
         elif not swing.is_of(self._workbench.preparation.sources):
             self.notice_raised.emit(
                 self.tr(
-                    "The swing was captured with another source of images. Choose that "
-                    "source at the step Camera, then resume the swing here."
-                )
+                    "The swing was captured with another source of images: {0}. Choose "
+                    "that source at the step Camera, then resume the swing here."
+                ).format(_source_text(swing))
             )
         elif size is not None and not swing.fits(size):
             camera = swing.setup.camera
@@ -307,3 +310,12 @@ class Interrupted:
 
     swings: Unfinished
     verifications: tuple[InterruptedVerification, ...]
+
+
+def _source_text(swing: Resumable) -> str:
+    """Return what the images of a swing came from, and where they are."""
+    choice = swing.source_choice
+    if choice is None:
+        return origin_text(recorded_origin(swing.record))
+    name = worded(choice.source.name)
+    return listed(filter(None, (name, printable(choice.place))))

@@ -32,8 +32,8 @@ from lightpen_app.widgets.translated import Translated
 if TYPE_CHECKING:
     from lightpen_app.steps.swing.plots_panel import SwingPlots
 
-DIAL_SHARE, SIDE_SHARE = 9, 11  # of the width
-SIDE_SHARES = (9, 5, 4)  # of it: numbers, pen in space, live image
+DIAL_SHARE, SIDE_SHARE = 2, 3  # of the width
+SIDE_SHARES = (9, 4, 6)  # of it: numbers, pen in space, live image
 ROW_SHARES = (1, 2)  # of the height: these, plots
 LARGE_SIDE_SHARES, LARGE_ROW_SHARES = (9, 5, 7), (2, 3)  # where there is plenty
 VAST_SIDE_SHARES, VAST_ROW_SHARES = (5, 0, 6), (1, 1)  # and where there is more

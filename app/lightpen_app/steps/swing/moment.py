@@ -30,6 +30,7 @@ from lightpen_app.look.sentences import worded
 from lightpen_app.look.signs import Sign
 from lightpen_app.look.theme import Tone
 from lightpen_app.look.words import PARTED
+from lightpen_app.steps.swing.to_go import ToGo
 from lightpen_app.widgets.operator_view import OperatorValue
 from lightpen_app.widgets.pen_in_space import PenStand
 from lightpen_app.widgets.posture_dial import DialValue
@@ -39,8 +40,6 @@ from lightpen_app.widgets.state_banner import State
 ENDED = (Phase.SOLVING, Phase.VERDICT)
 FLAWS = (Code.FEW_LEDS, Code.TOO_FAST, Code.BAD_FIT)  # images that are not kept
 UPRIGHT = Posture(tilt=0.0, direction=0.0, turn=0.0)
-# Of the images to go: from so many on, rounded up to this.
-STEPS = ((30, 10), (10, 5), (-1, 1))
 PACE_S, N_PACING = 15.0, 6  # the last seconds and images by which time left is told
 LONG_S = 90.0  # told in minutes
 
@@ -80,6 +79,8 @@ class Moment:
         Whether the pen is led by the mouse, so that it leans as the camera sees it.
     is_away : bool
         Whether another step is shown.
+    to_go : ToGo or None
+        How many images are to go, by this moment and those before it.
     """
 
     setup: SwingSetup
@@ -95,6 +96,7 @@ class Moment:
     origin: Origin | None = None
     is_simulated: bool = False
     is_away: bool = False
+    to_go: ToGo | None = None
 
     @property
     def asks_upright(self) -> bool:
@@ -171,16 +173,29 @@ class SwingWords(QObject):
         limit = moment.setup.limits.max_images
         text = self.tr("at most {0} images").format(limit)
         if moment.setup.is_recording:
-            text = self.tr("recorded images")
+            text = self._read(moment) if moment.state.phase in ENDED else ""
+            text = text or self.tr("recorded images")
         n_dropped = sum(moment.state.n_dropped.values())
         if n_dropped:
             text = self.tr("{0}; {1} dropped").format(text, n_dropped)
-        return PARTED.join(filter(None, (self._time_left(moment), text)))
+        why_more = self._why_more(moment)
+        return PARTED.join(filter(None, (self._time_left(moment), text, why_more)))
+
+    def _why_more(self, moment: Moment) -> str:
+        """Return why more images are to go than before."""
+        is_counted = moment.state.phase is Phase.CAPTURING
+        if not is_counted or moment.to_go is None or not moment.to_go.has_risen:
+            return ""
+        short = moment.short
+        if short.n_for_uncertainty >= short.n_more:
+            return self.tr("more are needed, as U (k = 2) has risen")
+        return self.tr("more are needed to fill the postures")
 
     def warning(self, moment: Moment) -> Remark:
         """Return what no swing can mend, told as soon as it is known."""
-        why = out_of_reach(moment.setup.limits, moment.state)
-        if why is None or moment.state.phase is Phase.VERDICT:
+        why = out_of_reach(moment.setup.limits, moment.state, moment.short)
+        is_asked = not moment.setup.is_recording
+        if why is None or not is_asked or moment.state.phase is Phase.VERDICT:
             return Remark()
         return Remark(worded(why), Sign.WARNING, Tone.WARN)
 
@@ -246,9 +261,9 @@ class SwingWords(QObject):
         if not verdict.can_be_accepted and can_go_on:
             step = self.tr("Capture more")
         if moment.is_away and is_recording:
-            hint = self.tr("The review is open at the screen.")
+            hint = self.tr("Go on at the screen.")
         elif moment.is_away:
-            hint = self.tr("Put the pen down. The review is open at the screen.")
+            hint = self.tr("Put the pen down. Go on at the screen.")
         elif is_recording:
             hint = self.tr("Go on to the review.")
         else:
@@ -313,16 +328,19 @@ class SwingWords(QObject):
         if state.phase in ENDED:
             return n_images_text(n_kept)
         if moment.setup.is_recording:
-            progress = state.progress
-            if not progress.n_images:
-                return ""
-            words = self.tr("{0} of {1} read")
-            return words.format(progress.n_read, progress.n_images)
+            return self._read(moment)
         if not isfinite(state.kept.uncertainty):
             least = moment.setup.limits.min_images
             return self.tr("{0} of at least {1}").format(n_kept, least)
-        to_go = in_true_steps(moment.short.n_more)
-        return self.tr("{0} kept, {1} to go").format(n_kept, to_go)
+        return self.tr("{0} kept, {1} to go").format(n_kept, _to_go(moment).n_images)
+
+    def _read(self, moment: Moment) -> str:
+        """Return how many images of a recording are read; nothing before the first."""
+        progress = moment.state.progress
+        if not progress.n_images:
+            return ""
+        words = self.tr("{0} of {1} read")
+        return words.format(progress.n_read, progress.n_images)
 
     def _time_left(self, moment: Moment) -> str:
         """Return how long the swing goes on at the pace of the last images."""
@@ -334,7 +352,7 @@ class SwingWords(QObject):
         period = images_period(times[times > state.time - PACE_S])
         if period is None or moment.lacks_images:
             return ""
-        seconds = moment.short.n_more * period
+        seconds = _n_more(moment) * period
         if seconds > LONG_S:
             return self.tr("about {0} min left").format(ceil(seconds / 60))
         return self.tr("about {0} s left").format(max(10 * ceil(seconds / 10), 10))
@@ -350,12 +368,6 @@ class SwingWords(QObject):
         if moment.state.pause is Pause.BY_USER:
             return self.tr("Space: go on")
         return self.tr("Space: pause")
-
-
-def in_true_steps(n_more: int) -> int:
-    """Return how many images are to go, rounded up to what an estimate is worth."""
-    step = next(step for least, step in STEPS if n_more > least)
-    return ceil(n_more / step) * step
 
 
 def images_period(times: FloatArray) -> float | None:
@@ -380,7 +392,17 @@ def _fraction(moment: Moment) -> float | None:
             return moment.solving or 0.0
     if moment.setup.is_recording:
         return progress.n_read / max(progress.n_images, 1)
-    return n_kept / max(n_kept + moment.short.n_more, 1)
+    return n_kept / max(n_kept + _n_more(moment), 1)
+
+
+def _to_go(moment: Moment) -> ToGo:
+    first = ToGo.first(moment.short.n_more, moment.state.n_kept)
+    return first if moment.to_go is None else moment.to_go
+
+
+def _n_more(moment: Moment) -> int:
+    """Return how many images are to go, no more than is told."""
+    return min(moment.short.n_more, _to_go(moment).n_images)
 
 
 def _posture(moment: Moment) -> Posture | None:

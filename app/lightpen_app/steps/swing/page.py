@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import isfinite
+from pathlib import Path
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from typing_extensions import override
 
 from lightpen.cameras.worker import Connection
+from lightpen.model.limits import SwingLimits
 from lightpen.swing.kept_images import KeptImages
 from lightpen.swing.preparation import SourceKind
 from lightpen.swing.rules import stillness
@@ -21,6 +24,7 @@ from lightpen_app.steps.swing.face import SwingFace
 from lightpen_app.steps.swing.hand_panel import HandPanel
 from lightpen_app.steps.swing.live_sight import SwingSight
 from lightpen_app.steps.swing.moment import Moment, SwingWords
+from lightpen_app.steps.swing.to_go import ToGo
 from lightpen_app.widgets.live_markers import live_markers
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -60,6 +64,8 @@ class SwingPage(Page):
         self._words = SwingWords(self)
         self._solved = 0.0  # how far the tip is computed
         self._measured: tuple[KeptImages, Shortfall] | None = None
+        self._to_go: ToGo | None = None
+        self._to_go_of: tuple[Path | None, SwingLimits] | None = None
         self._said: tuple[MainAction, bool] | None = None
         self._is_entered = False
         self._was_capturing = False
@@ -207,6 +213,9 @@ class SwingPage(Page):
             return self.tr("The swing goes on.")
         if self._run.status.solution is not None:
             return ""
+        setup = self._run.status.setup
+        if state.phase is Phase.VERDICT and setup is not None and setup.is_recording:
+            return self.tr("There is no tip to review: choose other images.")
         if state.phase is Phase.VERDICT:
             return self.tr("There is no tip to review: capture more, or start over.")
         return self.tr("The tip is not computed yet.")
@@ -226,6 +235,7 @@ class SwingPage(Page):
             return None
         if self._measured is None or self._measured[0] is not state.kept:
             self._measured = state.kept, measure_shortfall(setup, state)
+            self._count_to_go(self._measured[1].n_more)
         return Moment(
             setup=setup,
             state=state,
@@ -240,7 +250,23 @@ class SwingPage(Page):
             origin=status.origin,
             is_simulated=self._live.operator is not None,
             is_away=not self._is_entered,
+            to_go=self._to_go,
         )
+
+    def _count_to_go(self, n_more: int) -> None:
+        """Take the next estimate of how many images are to go."""
+        status = self._run.status
+        state, setup = status.state, status.setup
+        assert state is not None
+        assert setup is not None
+        swing = status.record_folder, setup.limits
+        if not isfinite(state.kept.uncertainty):  # nothing is told yet
+            self._to_go = None
+        elif self._to_go is None or swing != self._to_go_of:
+            self._to_go = ToGo.first(n_more, state.n_kept)
+        else:
+            self._to_go = self._to_go.after(n_more, state.n_kept)
+        self._to_go_of = swing
 
     def _ask(self, text: str, yes: str, no: str, on_yes: Callable[[], object]) -> None:
         self._on_yes = on_yes

@@ -18,10 +18,10 @@ from lightpen.record.standing import TipStanding
 from lightpen.verification.choices import TaskKind
 from lightpen.verification.status import Reading, SessionHappening
 from lightpen_app.look.grades import GRADE_MARKS
-from lightpen_app.look.phrases import lack_text
+from lightpen_app.look.phrases import grade_text, lack_text
 from lightpen_app.look.sentences import worded
 from lightpen_app.look.sounds import Sound, Sounds
-from lightpen_app.look.theme import GRID, TextSize
+from lightpen_app.look.theme import GRID, TextSize, Tone
 from lightpen_app.look.words import PARTED, moment_text, shortened
 from lightpen_app.steps.page import MainAction, Page
 from lightpen_app.steps.verify.findings import (
@@ -175,7 +175,19 @@ class VerifyPage(Rearranged, Page):
         by = self._run.status.accepted_by
         accepted = self.tr("accepted by {0}").format(shortened(by)) if by else ""
         kept = self.tr("kept as {0}").format(files) if files else ""
-        return PARTED.join(filter(None, (words, self._standing(), kept, accepted)))
+        return PARTED.join(
+            filter(None, (words, self._doubt(), self._standing(), kept, accepted))
+        )
+
+    @override
+    def lead_tone(self) -> Tone:
+        return Tone.WARN if self._doubt() else Tone.QUIET
+
+    def _doubt(self) -> str:
+        """Return the grade of the tip, a word, where it was accepted with doubts."""
+        tip = self._run.status.tip
+        is_doubted = tip is not None and tip.calibration.grade == Grade.CHECK
+        return grade_text(Grade.CHECK) if is_doubted else ""
 
     def _standing(self) -> str:
         """Return what is the matter with the tip, a word; nothing of a valid one."""

@@ -90,7 +90,13 @@ class Desk:
         self.page.status_changed.connect(self.statuses.append)
         qtbot.addWidget(self.page)
 
-    def enter(self, n_entries: int, tip: str = "T-10", first: int = 0) -> None:
+    def enter(
+        self,
+        n_entries: int,
+        tip: str = "T-10",
+        first: int = 0,
+        origin: Origin | None = None,
+    ) -> None:
         """Enter tips of which the x is their number, in mm."""
         logbook = self.workbench.run.logbook.opened()
         for n in range(first, first + n_entries):
@@ -103,6 +109,7 @@ class Desk:
                 tip_pen_mm=(float(n), 0.0, -1.5),
                 expanded_uncertainty_mm=(0.0031, 0.0041, 0.0061),
                 settings={"max_uncertainty_mm": 0.012},
+                origin=origin,
             )
             append(logbook.database, logbook.chain, event)
 
@@ -206,6 +213,20 @@ def test_the_newest_entries_come_first_and_can_be_chosen_by_tip_and_day(
     assert desk.statuses[-1] == "2 entries"
 
 
+def test_what_is_not_of_a_live_camera_is_marked_and_no_practice_is_in_force(
+    desk: Desk,
+) -> None:
+    desk.enter(1)
+    desk.enter(2, "T-11", 1, Origin.SIMULATED)
+    desk.enter(1, "T-12", 3, Origin.RECORDED)
+    desk.open()
+
+    assert desk.column(WHAT) == [
+        *("RECORDED, in force", "SIMULATED, kept", "SIMULATED, replaced"),
+        "Calibration, in force",
+    ]
+
+
 def test_limits_and_verifications_are_listed_and_can_be_chosen_by_what_they_are(
     desk: Desk,
 ) -> None:
@@ -250,10 +271,12 @@ def test_at_the_usual_width_every_column_is_seen_and_told_whole(
     desk: Desk, qapp: QApplication, language: Language
 ) -> None:
     LanguageSwitch(qapp).set_language(language)
-    desk.enter(3)
+    desk.enter(1)
+    for n, origin in enumerate((Origin.SIMULATED, Origin.RECORDED), 1):
+        desk.enter(2, f"T-{n}", 3 * n, origin)
     desk.open()
     desk.page.resize(976, 700)  # that of a window of 1280 px
-    desk.until(lambda: desk.table.n_lines() == 3)
+    desk.until(lambda: desk.table.n_lines() == 5)
 
     assert not desk.table.horizontalScrollBar().isVisible()
     across = desk.table.horizontalHeader()
@@ -326,6 +349,9 @@ def test_the_trend_is_of_the_tip_that_is_chosen(desk: Desk) -> None:
     assert left < 1 < 4 < right
     assert low < 0.0061 < 0.012 < high  # the limit is in sight
     assert panel.words().startswith("Pen LP-04, tip T-10: 4 calibrations, 2026-01-02")
+    desk.select(0)
+    desk.until(lambda: len(panel.value().tips) == 1)
+    assert panel.words().startswith("Pen LP-04, tip T-11: one calibration, 2026-01")
 
 
 def test_two_that_are_selected_are_compared(desk: Desk) -> None:

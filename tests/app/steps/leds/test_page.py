@@ -1,5 +1,6 @@
 """The step LEDs as an operator sees it: file, table, pen in space and live match."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from lightpen.model.rigid import rotation_from_vector
 from lightpen.pen_check.match import Finding, PenMatch, What
 from lightpen.record.names import Names
 from lightpen.simulator.camera import SimulatedCamera
+from lightpen.simulator.hand import Doing
 from lightpen.simulator.sample_pens import fanned_pen, six_led_pen
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_pen
@@ -35,6 +37,7 @@ from lightpen.swing.preparation import Lack, SourceChoice, SourceKind
 from lightpen_app.look.theme import Tone
 from lightpen_app.shell.main_window import MainWindow
 from lightpen_app.steps.leds.file_panel import LedFilePanel
+from lightpen_app.steps.leds.hand_row import HandRow
 from lightpen_app.steps.leds.led_table import MISFIT, LedTable
 from lightpen_app.steps.leds.match_panel import MatchPanel
 from lightpen_app.steps.leds.page import LedsPage
@@ -739,6 +742,19 @@ def test_changes_of_the_table_are_undone_and_redone_by_keys(seen: "Seen") -> Non
     assert (cell(seen, 7, Y), cell(seen, 8, Y)) == ("161", "162")
 
 
+def test_the_focus_goes_from_undo_to_redo_and_back_when_nothing_is_left_to_do(
+    seen: "Seen",
+) -> None:
+    type_cell(seen, 7, Y, "161")
+    undo, redo = seen.named("Undo"), seen.named("Redo")
+    undo.setFocus()
+
+    QTest.keyClick(undo, Qt.Key.Key_Space)
+    assert undo.window().focusWidget() is redo
+    QTest.keyClick(redo, Qt.Key.Key_Space)
+    assert undo.window().focusWidget() is undo
+
+
 def test_a_number_typed_letter_by_letter_is_undone_at_once(seen: "Seen") -> None:
     tip = seen.named("Nominal centre of the tip, x, mm")
     QTest.keyClicks(tip, "12.5")
@@ -811,6 +827,31 @@ def test_a_covered_led_is_told(
 
     seen.wait("LED 6 is not seen where the table has it.")
     assert "9 of 10 LEDs" in seen.words
+
+
+def test_the_simulated_pen_is_leaned_and_covered_at_a_click(
+    seen: "Seen",
+    workbench: Workbench,
+    small_scene: Scene,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("lightpen_app.steps.leds.hand_row.COVER_S", math.inf)
+    row = seen.child(HandRow)
+    assert not row.isVisibleTo(seen.page)
+    camera = SimulatedCamera(small_scene, workbench.around.clock)
+    workbench.live.open([camera], CameraSettings(), workbench.around.clock)
+    seen.page.entered()
+    seen.wait("10 of 10 LEDs")
+    assert row.isVisibleTo(seen.page)
+
+    seen.click("Lean the pen")
+    seen.wait("Every LED is within 0.1 mm of its place in the table")
+    seen.until(lambda: camera.operator.doing is Doing.SWINGING)
+    seen.click("Cover LEDs")
+    seen.wait("7 of 10 LEDs")
+
+    seen.page.left()  # the swing finds the pen at rest
+    seen.until(lambda: camera.operator.doing is Doing.SEATED)
 
 
 def test_another_pens_file_is_told(live: "Seen", tmp_path: Path) -> None:

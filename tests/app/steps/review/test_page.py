@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QUrl
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -52,7 +52,7 @@ from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
 from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
 from lightpen.swing.shortfall import N_MORE
-from lightpen_app.look.theme import Tone
+from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.page import MainAction
 from lightpen_app.steps.review.image_table import ImageTable
@@ -70,6 +70,7 @@ from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.tip_readout import TipReadout
 from lightpen_app.widgets.number_field import NumberField
 from lightpen_app.widgets.number_table import NumberTable
+from lightpen_app.widgets.plots import MARK_HEIGHT, PNG_SCALE
 from lightpen_app.widgets.posture_dial import PostureDial
 from lightpen_app.widgets.push_button import PushButton
 from lightpen_app.widgets.question_bar import QuestionBar
@@ -693,6 +694,17 @@ def test_the_folder_of_the_swing_is_opened(
     assert told[-1] == f"No program here shows folders. This one is {bed.swing}"
 
 
+def save(bed: Bed, page: ReviewPage, what: str, folder: Path) -> None:
+    """Choose what to save from the menu, and the folder."""
+    (menu,) = button(page, "Save...").findChildren(QMenu)
+    (action,) = [each for each in menu.actions() if each.text() == what]
+    action.trigger()
+    (dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
+    with bed.qtbot.waitSignal(page.status_changed):
+        dialog.fileSelected.emit(str(folder))
+    dialog.close()
+
+
 def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     bed: Bed, tmp_path: Path
 ) -> None:
@@ -701,12 +713,7 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     folder = tmp_path / "saved"
     folder.mkdir()
     for _ in range(2):
-        (menu,) = button(page, "Save...").findChildren(QMenu)
-        menu.actions()[0].trigger()
-        (dialog,) = [d for d in page.findChildren(QFileDialog) if d.isVisible()]
-        with bed.qtbot.waitSignal(page.status_changed):
-            dialog.fileSelected.emit(str(folder))
-        dialog.close()
+        save(bed, page, "All at once...", folder)
 
     stem = f"LP-04_T-10_{workbench.around.now():%Y-%m-%d}"
     names = {path.name for path in folder.iterdir()}
@@ -720,6 +727,33 @@ def test_all_is_saved_at_once_under_pen_tip_and_date_and_nothing_overwritten(
     assert "live camera" in (folder / f"{stem}_tip.csv").read_text()
     assert len([name for name in names if name.endswith(".png")]) == 2 * N_PLOTS
     assert workbench.export_folder() == str(folder)
+
+
+def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
+    bed: Bed, tmp_path: Path
+) -> None:
+    recorded = replace(bed, origin=Origin.RECORDED)
+    recorded.solve()
+    page = recorded.show()
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    save(recorded, page, "All plots (PNG)...", folder)
+    look_at_all_tabs(page)
+    save(recorded, page, "All plots (PNG)...", folder)
+
+    pictures = {path.stem: QImage(str(path)) for path in folder.iterdir()}
+    assert len(pictures) == 2 * N_PLOTS
+    for name, picture in pictures.items():
+        if not name.endswith("-2"):
+            later = pictures[f"{name}-2"]
+            assert picture.width() == pytest.approx(later.width(), rel=0.1), name
+            assert picture.height() == pytest.approx(later.height(), rel=0.1), name
+    colors = colors_of(page.palette())
+    for name, picture in pictures.items():
+        foot = range(picture.height() - PNG_SCALE * MARK_HEIGHT, picture.height())
+        right = range(picture.width() // 2, picture.width())
+        seen = {picture.pixelColor(x, y).name() for x in right for y in foot}
+        assert seen >= {colors.panel, colors.warn}, name
 
 
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
@@ -853,6 +887,22 @@ def test_the_image_of_another_record_takes_the_place_of_one_of_the_same_number(
     qtbot.waitUntil(lambda: not view.image_size().isEmpty())
     assert panel.number() == number
     assert view.markers()
+
+
+def test_of_another_swing_the_worst_image_is_shown_first(
+    page: ReviewPage, workbench: Workbench
+) -> None:
+    panel, solution = the(page, ImagesPanel), workbench.run.status.solution
+    assert solution is not None
+    worst = table(page).value()[0].number
+    table(page).choose(table(page).value()[4].number)
+    panel.set_value(solution)
+    assert table(page).number() != worst  # it stays chosen
+
+    source = replace(solution.source, folder=solution.source.folder / "other")
+    panel.set_value(replace(solution, source=source))
+    assert table(page).number() == worst
+    assert len(table(page).selected()) == 1
 
 
 def test_an_image_that_cannot_be_read_says_why(bed: Bed) -> None:

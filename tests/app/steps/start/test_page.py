@@ -986,8 +986,31 @@ def test_without_a_camera_it_is_told_where_to_choose_one(
     qtbot.wait_until(lambda: bool(start.notices))
 
     assert start.notices[-1].startswith("No camera is open. Choose the source")
+    assert "at the step Camera: Simulated pen. Then" in start.notices[-1]
     assert start.steps == []
     assert workbench.run.status.state is None
+
+
+def test_a_swing_of_another_source_names_the_source_that_it_wants(
+    show: Callable[[Workbench], Opened],
+    workbench: Workbench,
+    qtbot: QtBot,
+    tmp_path: Path,
+) -> None:
+    simulated = workbench.preparation
+    recorded = SourceChoice(SourceKind.RECORDED, str(tmp_path / "monday"))
+    workbench.set_preparation(replace(simulated, source=recorded))
+    interrupted(workbench, "a")
+    workbench.set_preparation(simulated)
+    workbench.open_camera()
+    start = show(workbench)
+
+    start.press("Resume")
+    qtbot.wait_until(lambda: bool(start.notices))
+
+    wanted = f"another source of images: Recorded images, {tmp_path / 'monday'}."
+    assert wanted in start.notices[-1]
+    assert start.steps == []
 
 
 def test_a_swing_does_not_go_on_with_images_of_another_size(

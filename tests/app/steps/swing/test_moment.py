@@ -11,8 +11,16 @@ from lightpen.messages import PEN_LOST, tip_is_good
 from lightpen.model.limits import SwingLimits
 from lightpen.simulator.swings import paper_camera, paper_pen
 from lightpen.swing.shortfall import measure_shortfall
-from lightpen.swing.state import Pause, Phase, SwingSetup, SwingState, start_swing
-from lightpen_app.steps.swing.moment import Moment, SwingWords, in_true_steps
+from lightpen.swing.state import (
+    Pause,
+    Phase,
+    Progress,
+    SwingSetup,
+    SwingState,
+    start_swing,
+)
+from lightpen_app.steps.swing.moment import Moment, SwingWords
+from lightpen_app.steps.swing.to_go import ToGo, in_true_steps
 from lightpen_app.widgets.sign_label import Remark
 
 SETUP = SwingSetup(paper_camera(binning=2), paper_pen())
@@ -64,6 +72,23 @@ def test_nobody_is_asked_to_hold_the_pen_upright_who_need_not(
     assert value.dial.target is None
 
 
+def test_at_the_end_of_a_recording_it_is_told_how_much_of_it_was_read(
+    words: SwingWords,
+) -> None:
+    done = at_verdict(setup=RECORDING)
+    state = replace(done.state, progress=Progress(60, 60))
+
+    assert words.note(replace(done, state=state)) == "60 of 60 read"
+
+
+def test_away_from_the_swing_nobody_is_told_that_the_review_is_open(
+    words: SwingWords,
+) -> None:
+    hint = words.operator_value(at_verdict(is_away=True)).hint
+
+    assert hint == "Put the pen down. Go on at the screen."
+
+
 def test_without_a_swing_nothing_is_wrong_on_the_other_steps(words: SwingWords) -> None:
     value = words.resting_value()
 
@@ -96,10 +121,17 @@ def test_what_the_files_leave_open_is_told_during_the_swing(words: SwingWords) -
     state = replace(state, kept=replace(state.kept, reached=vague))
     setup = replace(SETUP, limits=SwingLimits(max_uncertainty=0.002))
 
-    told = words.warning(replace(moment(state), setup=setup))
+    early = replace(moment(state), setup=setup)
+    short = replace(early.short, fields=np.zeros_like(early.short.fields))
+    late = replace(early, short=short)
+
+    told = words.warning(late)
 
     assert "cannot get below 4.2 \N{MICRO SIGN}m with this LED file" in told.text
-    assert words.warning(moment(state)) == Remark()
+    assert words.warning(early) == Remark()
+    assert words.warning(replace(late, setup=SETUP)) == Remark()
+    is_read = replace(setup, is_recording=True)
+    assert words.warning(replace(late, setup=is_read)) == Remark()
 
 
 def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
@@ -110,3 +142,34 @@ def test_the_pen_in_space_stands_as_the_dial_has_it(words: SwingWords) -> None:
     np.testing.assert_array_equal(value.tip_pen, paper_pen().nominal_tip)
     nobody = replace(SETUP, pen=replace(SETUP.pen, nominal_tip=None))
     assert words.stand(replace(at_verdict(), setup=nobody)) is None
+
+
+def told(*estimates: tuple[int, int]) -> list[int]:
+    """What is told to be to go after estimates of images to go, and kept."""
+    to_go = ToGo.first(*estimates[0])
+    found = [to_go.n_images]
+    for n_more, n_kept in estimates[1:]:
+        to_go = to_go.after(n_more, n_kept)
+        found.append(to_go.n_images)
+    return found
+
+
+def test_what_is_to_go_does_not_creep_up() -> None:
+    assert told((24, 30), (26, 31), (29, 32), (14, 40), (4, 50), (6, 51)) == [
+        *(25, 25, 25, 15, 4, 4)
+    ]
+
+
+def test_more_is_to_go_after_images_were_dropped() -> None:
+    assert told((4, 50), (10, 44)) == [4, 10]
+
+
+def test_a_rise_that_is_no_chance_is_told_with_its_reason(words: SwingWords) -> None:
+    to_go = ToGo.first(4, 50).after(4, 51).after(40, 52)
+    assert (to_go.n_images, to_go.has_risen) == (40, True)
+    capturing = replace(start_swing(SETUP), phase=Phase.CAPTURING)
+
+    note = words.note(moment(capturing, to_go=to_go))
+    assert note == "at most 300 images  ·  more are needed, as U (k = 2) has risen"
+    calm = words.note(moment(capturing, to_go=to_go.after(20, 53)))
+    assert "more are needed" not in calm
