@@ -177,17 +177,21 @@ def _circles_light(board: Board, places: FloatArray) -> FloatArray:
     radius = 0.5 * board.detail
     half = np.abs(points).max(axis=0) + board.pitch
     on_sheet = (np.abs(places) < half).all(axis=-1)
-    first = points.min(axis=0)
-    row = np.round((places[..., 1] - first[1]) / board.pitch)
-    apart, offset = board.pitch, np.zeros(row.shape)
+    away = places - points.min(axis=0)
     if board.kind is BoardKind.ASYMMETRIC_CIRCLES:
-        apart, offset = 2 * board.pitch, board.pitch * (row % 2)
-    column = np.round((places[..., 0] - first[0] - offset) / apart)
-    column = np.clip(column, 0, board.columns - 1)
-    row = np.clip(row, 0, board.rows - 1)
-    if board.kind is BoardKind.ASYMMETRIC_CIRCLES:
-        offset = board.pitch * (row % 2)
-    off_x = places[..., 0] - first[0] - offset - column * apart
-    off_y = places[..., 1] - first[1] - row * board.pitch
-    black = _soft(radius - np.hypot(off_x, off_y))
+        twice, n_odd = 2 * board.pitch, board.rows // 2
+        distance = np.minimum(
+            _from_circles(away, twice, board.columns, board.rows - n_odd),
+            _from_circles(away - board.pitch, twice, board.columns, n_odd),
+        )
+    else:
+        distance = _from_circles(away, board.pitch, board.columns, board.rows)
+    black = _soft(radius - distance)
     return np.asarray(np.where(on_sheet, WHITE + (BLACK - WHITE) * black, BEHIND))
+
+
+def _from_circles(away: FloatArray, step: float, columns: int, rows: int) -> FloatArray:
+    """Return how far places are from the nearest middle of a grid's circles."""
+    most = np.array([columns, rows]) - 1
+    nearest = np.clip(np.round(away / step), 0, most)
+    return np.asarray(np.linalg.norm(away - step * nearest, axis=-1))

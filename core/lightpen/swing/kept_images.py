@@ -175,11 +175,17 @@ def keep(
 
 def first_images(rig: Rig, pen: Pen, kept: KeptImages, n_images: int) -> KeptImages:
     """Return the first of the images, and the fit to them."""
-    return _leave_out(rig, pen, kept, np.arange(len(kept)) >= n_images)
+    out = np.arange(len(kept)) >= n_images
+    return _leave_out(rig, pen, kept, out, is_near=kept.joint is not None)
 
 
-def _leave_out(rig: Rig, pen: Pen, kept: KeptImages, out: BoolArray) -> KeptImages:
-    """Return the images but those of ``out`` (N,), and the fit to the rest."""
+def _leave_out(
+    rig: Rig, pen: Pen, kept: KeptImages, out: BoolArray, *, is_near: bool = False
+) -> KeptImages:
+    """Return the images but those of ``out`` (N,), and the fit to the rest.
+
+    ``is_near`` is for images that are as good as those that stay.
+    """
     stay = ~out
     starts = kept.rotations if kept.joint is None else kept.joint.rotations
     rest = replace(
@@ -194,7 +200,7 @@ def _leave_out(rig: Rig, pen: Pen, kept: KeptImages, out: BoolArray) -> KeptImag
         joint=None,
         reach=None,
     )
-    return _refit(rig, pen, rest, starts[stay]) if len(rest) else rest
+    return _refit(rig, pen, rest, starts[stay], is_near=is_near) if len(rest) else rest
 
 
 def _refit(
