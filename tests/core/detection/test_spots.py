@@ -82,8 +82,8 @@ def render(
             cover += np.where(u**2 + v**2 <= 1, shine, 0.0) / len(times)
         if hidden is not None:
             cover[np.broadcast_to(hidden(x, y), cover.shape)] = 0.0
-        cover = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
-        patch = cover.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
+        blurred = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
+        patch = blurred.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
         rows = slice(max(top, 0), min(top + side, shape[0]))
         columns = slice(max(left, 0), min(left + side, shape[1]))
         if rows.start >= rows.stop or columns.start >= columns.stop:
