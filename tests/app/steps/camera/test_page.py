@@ -744,7 +744,6 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     assert exposure(live) == "No LED is seen"
 
     (tmp_path / "elsewhere").rename(gone)
-    live.wait("Live")
     live.wait("10 of 10 LEDs")
     assert "can be read any more" not in live.words
 
