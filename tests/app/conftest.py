@@ -42,7 +42,6 @@ from lightpen.record.names import Names
 from lightpen.record.reading import Record
 from lightpen.record.solving import solve_record
 from lightpen.simulator.hand import Operator
-from lightpen.simulator.motion import Pursuit
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
@@ -58,8 +57,6 @@ from lightpen_app.work.workbench import Workbench
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 
-# Brings the pen within a few images, where a person needs 2.5 s.
-QUICK_ARM = Pursuit(gain=12.0, lag=0.0325, top_speed=3000.0)
 PATIENCE_MS = 120_000  # on a machine that does other things besides
 
 
@@ -120,12 +117,8 @@ def look(dressed: QApplication) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Images come, and plots are drawn, less often than usual: each takes long.
-
-    The pen comes sooner, which takes fewer of them.
-    """
+    """Images come, and plots are drawn, less often than usual: each takes long."""
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
-    monkeypatch.setattr("lightpen.simulator.hand.ARM", QUICK_ARM)
     monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 300)
 
 

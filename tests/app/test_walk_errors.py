@@ -262,7 +262,7 @@ def test_a_folder_without_images_can_be_tried_again(
 
     picture_in(empty)
     prepared.click("Try again")
-    prepared.until_says("Live")
+    prepared.until_tells("8 x 8 px")
 
 
 # The camera

@@ -66,7 +66,8 @@ def test_a_tip_is_verified_from_start_without_a_key_between_touch_and_verdict(
     assert walker.tells("The length is not known. Enter the certified one.")
     walker.click_into("Certified length", f"{Artefacts().length:g}")
     walker.press(Qt.Key.Key_Tab)
-    walker.until_says("Touch the cone")
+    # The pen that came by itself may have touched the cone meanwhile.
+    walker.until(lambda: not walker.says("NOT POSSIBLE"))
     walker.click("Let the simulated operator touch")
     n_inputs = walker.n_inputs
     walker.until_says("Tip proven")

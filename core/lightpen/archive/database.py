@@ -18,6 +18,7 @@ from contextlib import (
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Timer
+from time import monotonic, sleep
 from typing import Any
 
 from sqlalchemy import (
@@ -50,6 +51,7 @@ MIGRATING = 0x4C504152  # key of the lock by which one station at a time migrate
 LONGEST_FAREWELL_S = 2  # for those who use it when it closes
 MALFORMED = "database disk image is malformed"  # as SQLite says it
 LONGEST_WAIT_S = 10  # for another program to finish what it writes
+PAUSE_S = 0.02  # between two attempts where SQLite makes none by itself
 # A server that does not answer, or not any more, is given up.
 _CALLING = {
     "connect_timeout": 5,  # s
@@ -155,7 +157,7 @@ def open_file(path: Path) -> Database:
 
     def connect() -> sqlite3.Connection:
         with _closed_on_failure(_connected(str(path))) as connection:
-            connection.execute("PRAGMA journal_mode = WAL")
+            _write_ahead(connection)
             connection.execute("PRAGMA synchronous = FULL")
             return connection
 
@@ -272,6 +274,22 @@ def _connected(place: str) -> sqlite3.Connection:
     # A text that was damaged is read all the same, to be named.
     connection.text_factory = lambda data: data.decode("utf-8", "surrogateescape")
     return connection
+
+
+def _write_ahead(connection: sqlite3.Connection) -> None:
+    """Let readers and a writer not hold up each other.
+
+    For one who does so just then, or who writes, SQLite does not wait by itself.
+    """
+    deadline = monotonic() + LONGEST_WAIT_S
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorname != "SQLITE_BUSY" or monotonic() > deadline:
+                raise
+        sleep(PAUSE_S)
 
 
 @contextmanager

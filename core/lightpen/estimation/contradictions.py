@@ -12,7 +12,7 @@ import numpy as np
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle
 from lightpen.estimation.priors import Prior, Priors
-from lightpen.estimation.refutation import FileFit, Statement
+from lightpen.estimation.refutation import FileFit, FileNumber
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen
 from lightpen.model.rig import Rig
@@ -232,7 +232,7 @@ def find_pen_contradictions(
     at, one = bundle.columns, np.ones(1)
 
     def denied(
-        statement: Statement, place: slice, stated: FloatArray, prior: Prior
+        statement: FileNumber, place: slice, stated: FloatArray, prior: Prior
     ) -> tuple[list[Contradiction], Prior]:
         fit = FileFit.of([statement], stated, bundle, place, excess)
         found = _contradictions(fit, fit.refuted)
@@ -241,13 +241,13 @@ def find_pen_contradictions(
         return found, _without(prior, fit, fit.refuted)
 
     discs, diameter = denied(
-        Statement(DIAMETER, "mm", pen.diameter, one, one),
+        FileNumber(DIAMETER, "mm", pen.diameter, one, one),
         at.diameter,
         priors.diameter.covariance,
         priors.diameter,
     )
     size, scale = denied(
-        Statement(SCALE, "", 1.0, one, one),
+        FileNumber(SCALE, "", 1.0, one, one),
         at.scale,
         priors.size_covariance,
         priors.scale,
@@ -309,7 +309,7 @@ def _known_digits(value: float, uncertainty: float) -> float:
     return round(value, 1 - floor(log10(uncertainty)))
 
 
-def _places(rig: Rig) -> list[Statement]:
+def _places(rig: Rig) -> list[FileNumber]:
     """Return what the rig's file says of all cameras but the first."""
     n = 6 * (rig.n_cameras - 1)
     unit = np.eye(n)
@@ -319,7 +319,7 @@ def _places(rig: Rig) -> list[Statement]:
             row = 6 * (c - 1) + k
             turn, shift = unit[row], unit[row + 3]
             statements += [
-                Statement(
+                FileNumber(
                     sentence(
                         "file.rig-turn",
                         "further turn of cam_from_rig about {axis}",
@@ -332,7 +332,7 @@ def _places(rig: Rig) -> list[Statement]:
                     size=float(np.degrees(1.0)),
                     camera=rig.names[c],
                 ),
-                Statement(
+                FileNumber(
                     sentence(
                         "file.rig-translation",
                         "translation of cam_from_rig along {axis}",
@@ -348,7 +348,7 @@ def _places(rig: Rig) -> list[Statement]:
     return statements
 
 
-def _of_camera(camera: Camera, fitted: Camera) -> list[Statement]:
+def _of_camera(camera: Camera, fitted: Camera) -> list[FileNumber]:
     """Return what a camera's file says of the camera that was fitted."""
     n = len(camera.intrinsics)
     unit = np.eye(n)
@@ -356,8 +356,8 @@ def _of_camera(camera: Camera, fitted: Camera) -> list[Statement]:
     along = (camera.fx * unit[0] + camera.fy * unit[1]) / focal
     ratio = camera.fy / camera.fx
     statements = [
-        Statement(FOCAL_LENGTH, "px", focal, 0.5 * (unit[0] + unit[1]), along),
-        Statement(
+        FileNumber(FOCAL_LENGTH, "px", focal, 0.5 * (unit[0] + unit[1]), along),
+        FileNumber(
             ASPECT,
             "",
             ratio,
@@ -366,11 +366,11 @@ def _of_camera(camera: Camera, fitted: Camera) -> list[Statement]:
         ),
     ]
     statements += [
-        Statement(what, "px", float(camera.intrinsics[k]), unit[k], unit[k])
+        FileNumber(what, "px", float(camera.intrinsics[k]), unit[k], unit[k])
         for k, what in zip((2, 3), PRINCIPAL_POINT, strict=True)
     ]
     statements += [
-        Statement(
+        FileNumber(
             sentence(
                 "file.distortion",
                 "distortion coefficient {name}",

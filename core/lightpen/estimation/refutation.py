@@ -27,7 +27,7 @@ TRIED_TOGETHER = 3  # numbers; more that are wrong are found one by one
 
 
 @dataclass(frozen=True, eq=False)
-class Statement:
+class FileNumber:
     """A number of a file that people know by a name.
 
     ``by`` takes it from the unknowns of the file, ``along`` moves them by one of it,
@@ -54,7 +54,7 @@ class _Solution:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedNumber:
     """What the images want a number to be, in the unit of the unknowns.
 
     Attributes
@@ -79,7 +79,7 @@ class FileFit:
 
     Attributes
     ----------
-    statements : tuple of Statement
+    statements : tuple of FileNumber
     stated : (k, k) array
         Covariance that the file states.
     information, right : (k, k) and (k,) array
@@ -88,7 +88,7 @@ class FileFit:
         By what the covariance of ``right`` is larger than the information has it.
     """
 
-    statements: tuple[Statement, ...]
+    statements: tuple[FileNumber, ...]
     stated: FloatArray
     information: FloatArray
     right: FloatArray
@@ -97,7 +97,7 @@ class FileFit:
     @classmethod
     def of(
         cls,
-        statements: Iterable[Statement],
+        statements: Iterable[FileNumber],
         stated: FloatArray,
         bundle: Bundle,
         place: slice,
@@ -141,13 +141,13 @@ class FileFit:
         """The most standard deviations that file and images are apart as stated."""
         return max(self._beyond(()).values(), default=0.0)
 
-    def wanted(self, i: int, let_go: tuple[int, ...]) -> Wanted:
+    def wanted(self, i: int, let_go: tuple[int, ...]) -> WantedNumber:
         """Return what a number is wanted to be, some others let go, too."""
         by, before = self.statements[i].by, self._before(i)
         others = tuple(j for j in let_go if j != i)
         free = self._solved((*others, i))
         own = float(by @ (free.covariance + free.lasting) @ by)
-        return Wanted(
+        return WantedNumber(
             change=float(by @ free.values),
             sigma=float(np.sqrt(max(own, ROUNDING * before))),
             stated_sigma=float(np.sqrt(before)),

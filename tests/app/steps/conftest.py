@@ -9,12 +9,21 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from lightpen.simulator.motion import Pursuit
 from lightpen_app.look.words import unbroken
 from lightpen_app.steps.page import Page
 from lightpen_app.widgets.image_view import ImageView, Marker
 from lightpen_app.widgets.state_banner import StateBanner
 
 W = TypeVar("W", bound=QWidget)
+
+QUICK_ARM = Pursuit(gain=12.0, lag=0.0325, top_speed=3000.0)
+
+
+@pytest.fixture(autouse=True)
+def quick_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The simulated pen comes within a few images; a person needs 2.5 s for it."""
+    monkeypatch.setattr("lightpen.simulator.hand.ARM", QUICK_ARM)
 
 
 class Seen:

@@ -184,6 +184,19 @@ def test_an_archive_that_another_program_holds_is_said_to_be_held(
             pass
 
 
+def test_an_archive_that_another_program_is_making_is_opened_when_that_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "archive.sqlite"
+    with closing(sqlite3.connect(file, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        monkeypatch.setattr(database, "sleep", lambda _: other.rollback())
+
+        open_file(file).close()
+
+    look_into(file).close()
+
+
 @pytest.mark.parametrize("address", ["", "sqlite:///x", "no address", "http://h/d"])
 def test_an_address_that_is_none_is_refused(address: str) -> None:
     with pytest.raises(ArchiveError, match="It has the form postgresql://"):

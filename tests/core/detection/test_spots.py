@@ -71,9 +71,9 @@ def render(
         left, top = round(lamp.x - reach), round(lamp.y - reach)
         side = 2 * round(reach) + 1
         fine = (np.arange(side * SUPERSAMPLING) + 0.5) / SUPERSAMPLING - 0.5
-        x, y = np.meshgrid(left + fine, top + fine)
+        x, y = np.meshgrid(left + fine, top + fine, sparse=True)
         times = np.linspace(-0.5, 0.5, 25) if any(motion) else np.zeros(1)
-        cover = np.zeros(x.shape, np.float32)
+        cover = np.zeros((len(fine), len(fine)), np.float32)
         for time in times:
             dx, dy = x - lamp.x - time * motion[0], y - lamp.y - time * motion[1]
             u = (np.cos(lamp.angle) * dx + np.sin(lamp.angle) * dy) / lamp.a
@@ -81,9 +81,9 @@ def render(
             shine = 1 + lamp.shading * u
             cover += np.where(u**2 + v**2 <= 1, shine, 0.0) / len(times)
         if hidden is not None:
-            cover[hidden(x, y)] = 0.0
-        cover = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
-        patch = cover.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
+            cover[np.broadcast_to(hidden(x, y), cover.shape)] = 0.0
+        blurred = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
+        patch = blurred.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
         rows = slice(max(top, 0), min(top + side, shape[0]))
         columns = slice(max(left, 0), min(left + side, shape[1]))
         if rows.start >= rows.stop or columns.start >= columns.stop:

@@ -1,5 +1,7 @@
 """Tests of finding boards in images."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -74,6 +76,21 @@ def test_the_points_of_a_board_are_found(word: str) -> None:
     assert error_of(points, board) < LIMITS[word]
     assert points is not None
     assert np.isfinite(points[:, 0]).mean() > 0.9  # a ChArUco board may lack some
+
+
+@pytest.mark.parametrize("word", ["circles:7x5:20:14", "asymmetric-circles:4x9:15:14"])
+def test_no_circle_of_a_grid_is_seen_off_its_place(word: str) -> None:
+    board = parse_board(word)
+    straight = replace(SMALL, distortion=np.zeros(5))
+    points = board.points @ TILT.T + place(board)
+    light = render_board(straight, board, TILT, place(board))
+    seen = find_points(np.round(60_000 * light).astype(np.uint16), board)
+    normals = np.broadcast_to(TILT[:, 2], points.shape)
+    there = ellipse_centers(straight, points, normals, 0.5 * board.detail)
+
+    assert seen is not None
+    off = [np.abs(seen[order] - there).max() for order in board.orders]
+    assert min(off) < 0.015
 
 
 def test_twelve_bits_tell_no_less_than_eight() -> None:

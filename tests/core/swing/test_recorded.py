@@ -14,6 +14,7 @@ from lightpen.cameras.replay import ReplayCamera
 from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import look
 from lightpen.messages import Code
+from lightpen.model.limits import SwingLimits
 from lightpen.model.origin import Origin
 from lightpen.record.reading import open_record, recorded_origin
 from lightpen.record.recorded_source import source
@@ -117,8 +118,10 @@ def test_an_image_that_cannot_be_read_is_passed_over(
 
 
 def test_the_postures_that_lack_are_named_at_the_end(
-    recording: Recording, station: "Station"
+    station: "Station", swung: Callable[..., Path]
 ) -> None:
+    recording = Recording(station, swung() / "images")
+    station.begin(SwingLimits(max_uncertainty=0.05, min_images=12))
     recording.show(N_IMAGES)
     station.wait_for_phase(Phase.VERDICT)
 

@@ -417,8 +417,9 @@ class SwingPage(Page):
         lacks = self._workbench.preparation.lacks()
         if lacks:
             self.notice_raised.emit(lack_text(lacks[0]))
-        else:
-            self._runner.start_over()
+            return
+        self._runner.start_over()
+        self._face.dial.setFocus()  # Enter would begin anew again
 
     def _try_again(self) -> None:
         """Open the camera again, or begin where it was refused."""

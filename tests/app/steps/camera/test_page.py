@@ -634,7 +634,7 @@ def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) 
     live.click("Try again")
 
     live.wait("80 x 64 px")
-    assert "Live" in live.words
+    assert "RECORDED" in live.words
 
 
 def test_a_folder_without_images_is_told(live: "Seen", tmp_path: Path) -> None:
@@ -744,7 +744,6 @@ def test_a_recording_that_vanishes_is_lost_and_goes_on_when_it_is_back(
     assert exposure(live) == "No LED is seen"
 
     (tmp_path / "elsewhere").rename(gone)
-    live.wait("Live")
     live.wait("10 of 10 LEDs")
     assert "can be read any more" not in live.words
 

@@ -306,6 +306,7 @@ def put_in_force(
     tip_pen: FloatArray,
     pen: str = "LP-04",
     names: Names | None = None,
+    origin: Origin | None = None,
     **entries: object,
 ) -> None:
     """Store a result of some time ago."""
@@ -319,7 +320,7 @@ def put_in_force(
     }
     record = workbench.run.records_folder / "elsewhere"
     workbench.run.archive.store(
-        Result(names, THEN, Grade.PASS, record, (), calibration)
+        Result(names, THEN, Grade.PASS, record, (), calibration, origin)
     )
 
 
@@ -655,6 +656,21 @@ def test_the_tip_as_found_is_told_against_its_limit(bed: Bed) -> None:
     (found,) = [each for each in remarks if each.text.startswith("As found")]
     assert re.fullmatch(r"As found: 0\.100\d* mm off, limit 0\.05 mm", found.text)
     assert found.tone is Tone.WARN
+
+
+def test_of_practice_no_older_tip_is_said_to_stay_in_force(bed: Bed) -> None:
+    told = "The old one stays in force until then."
+    bed.solve_after([0.0, 0.0, 0.001])
+    assert told in bed.show().lead()
+
+    practice = replace(bed, origin=Origin.SIMULATED)
+    tip_then = tip(practice.solve())
+    put_in_force(practice.workbench, tip_then, origin=Origin.SIMULATED)
+    practice.solve()
+    status = practice.workbench.run.status
+    assert status.assessment is not None
+    assert status.assessment.last is not None
+    assert told not in practice.show().lead()
 
 
 # What is taken along

@@ -721,6 +721,8 @@ def test_starting_over_asks_and_keeps_the_images_of_the_old_swing(
     assert f"The images of this swing ({n_before})" in asked(capturing)
     assert capturing.run.status.record_folder == old
     capturing.click("Begin anew")
+    # Enter shall press the main button, not begin anew once more.
+    assert not isinstance(capturing.window.focusWidget(), QAbstractButton)
 
     until(qtbot, lambda: capturing.run.status.record_folder not in (None, old))
     until(qtbot, lambda: open_record(old).verdict == DISCARDED)
