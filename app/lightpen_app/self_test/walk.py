@@ -49,8 +49,10 @@ class Walk(QObject):
 
     def _finish(self) -> bool:
         status = self._workbench.run.status
-        if self._window.page().key == "swing" and status.is_capturing:
-            self._workbench.run.runner.finish()
+        is_whole = status.verdict is not None  # its tip was computed at once
+        if self._window.page().key == "swing" and (status.is_capturing or is_whole):
+            if not is_whole:
+                self._workbench.run.runner.finish()
             self._next = self._review
         return False
 

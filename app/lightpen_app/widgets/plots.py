@@ -43,7 +43,7 @@ LEFT_WIDTH = 7 * GRID  # px, the same for all traces so that they line up
 TITLE_MARGIN = LEFT_WIDTH + 2 * GRID  # px that a title leaves free
 LEAST_TITLE = 9  # px
 LABEL_ROOM = 3.0  # times a limit, for the words above it where y is logarithmic
-N_LEAST = 10  # images that have room along a trace, so that its numbers are whole
+N_LEAST = 10  # that have room along a trace, so that its numbers are whole
 LABELLED = (1, 2, 5)  # of each decade
 MARGIN = 0.06  # of the range, left free around the data
 TONES = (Tone.ACTIVE, Tone.WARN, Tone.GOOD, Tone.BAD, Tone.PLAIN)
@@ -295,6 +295,10 @@ class Plot(QWidget):
             yRange=(bottom, high + margin),
             padding=0.01,
         )
+
+    def _fit_numbered(self, n: int, y: FloatArray) -> None:
+        """Show all of what is numbered from 1 to n along the plot."""
+        self._fit(np.array([0.5, max(n, N_LEAST) + 0.5]), y)
 
 
 def title_with_names(title: str, names: Sequence[str], colors: Colors) -> str:

@@ -54,7 +54,7 @@ class TrendPlot(Plot):
         if uncertainty is not None:
             self._columns["expanded_uncertainty_mm"] = uncertainty
         seen = np.concatenate((values - bars, values + bars, limits))
-        self._fit(np.append(x, (0.5, len(x) + 0.5)), seen)
+        self._fit_numbered(len(x), seen)
 
     def mark(self, number: int | None) -> None:
         """Put a ring about the dot of a calibration, counted from 1, or about none."""

@@ -42,8 +42,7 @@ class LedMovesPlot(Plot):
         self._columns = {"swing": x}
         for j in range(n_leds):
             self._columns[f"led_{j + 1}_mm"] = moves[:, j]
-        ends = np.append(x, (0.5, n_swings + 0.5))
-        self._fit(ends, np.append(moves[np.isfinite(moves)], (0.0, 0.01)))
+        self._fit_numbered(n_swings, np.append(moves.ravel(), (0.0, 0.01)))
         self._restyle()
 
     @override
