@@ -103,6 +103,7 @@ def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
         looked_at = np.linspace(0, len(shown) - 1, N_LOOKED_AT).astype(int)
         places = np.concatenate([shown[index] for index in looked_at])
         paths += [_path(padded, place) for place in places]
+    paths = [path for path in paths if np.isfinite(path[:, 0]).any()]
     found: list[FloatArray] = []
     for path in _with_jumps(paths):
         is_fixed = np.isfinite(path[:, 0]).sum() >= NEARLY_ALL * len(path)

@@ -57,6 +57,11 @@ def test_a_lamp_that_few_images_show_is_none() -> None:
     assert fixed_lamps(nothing_masked(8), sightings).shape == (8, 0, 2)
 
 
+def test_lights_of_a_masked_circle_that_stay_nowhere_are_no_lamp() -> None:
+    masked = np.array([[[70.0, 60.0]], [[90.0, 60.0]]])
+    assert lamps_among(masked, [np.zeros((0, 2))] * 2).shape == (2, 0, 2)
+
+
 def test_lamps_that_all_jump_at_once_are_the_lamps_they_were() -> None:
     """One comes to lie nearer to where another was than to where it was itself."""
     places = np.array([[80.0, 60.0], [80.0, 100.0], [250.0, 200.0]])

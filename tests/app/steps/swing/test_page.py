@@ -273,9 +273,15 @@ def capturing(qtbot: QtBot, shared_desk: Desk) -> Desk:
     """A swing that goes on and on, captured without a disturbance."""
     desk, workbench = shared_desk, shared_desk.workbench
     if workbench.preparation.limits is SHORT:
+        short = desk.run.status.record_folder
         workbench.set_preparation(replace(workbench.preparation, limits=LONG))
-        desk.run.runner.set_aside()
-        until(qtbot, lambda: desk.run.status.state is None)
+        desk.run.runner.set_aside()  # the next may begin at once
+        until(
+            qtbot,
+            lambda: (
+                desk.run.status.state is None or desk.run.status.record_folder != short
+            ),
+        )
     show(qtbot, desk)
     desk.let_operator_swing()
     keep_on(qtbot, desk)
