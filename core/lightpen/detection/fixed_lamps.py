@@ -6,8 +6,10 @@ all lamps jump at once: where one place is left by a light and another one taken
 at the same time, they are places of one lamp.
 """
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -91,7 +93,7 @@ def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
     paths = [
         _path(path[:, None], np.nanmedian(path, axis=0))
         for path in np.swapaxes(masked, 0, 1)
-        if np.isfinite(path[:, 0]).any()
+        if _is_shown(path)
     ]
     in_circles = [each[np.isfinite(each[:, 0])] for each in masked]
     every = [np.concatenate(both) for both in zip(lights, in_circles, strict=True)]
@@ -103,9 +105,10 @@ def lamps_among(masked: FloatArray, lights: Sequence[FloatArray]) -> FloatArray:
         looked_at = np.linspace(0, len(shown) - 1, N_LOOKED_AT).astype(int)
         places = np.concatenate([shown[index] for index in looked_at])
         paths += [_path(padded, place) for place in places]
-    paths = [path for path in paths if np.isfinite(path[:, 0]).any()]
+    # The same lamp, looked at in several images, has the same path.
+    distinct = {path.tobytes(): path for path in paths if _is_shown(path)}
     found: list[FloatArray] = []
-    for path in _with_jumps(paths):
+    for path in _with_jumps(list(distinct.values())):
         is_fixed = np.isfinite(path[:, 0]).sum() >= NEARLY_ALL * len(path)
         if is_fixed and not any(_are_same(path, other) for other in found):
             found.append(path)
@@ -120,6 +123,7 @@ class _Stay:
     place: FloatArray
     first: int
     last: int
+    is_lasting: bool  # shown by nearly all images of that time
 
 
 def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
@@ -131,20 +135,27 @@ def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
         for b, other in enumerate(stays)
         if _may_jump(one, other)
     }
+    nexts_of: defaultdict[int, list[int]] = defaultdict(list)
+    for a, b in steps:
+        nexts_of[a].append(b)
+    lights = np.array([a for a, _ in steps], int)
+    every = np.array(list(steps.values())).reshape(-1, 2)
 
-    def agreeing(step: FloatArray) -> int:
-        """Return how many lights go that step."""
-        return len({a for (a, _), to in steps.items() if _is_near(to, step)})
+    @cache
+    def agreeing(a: int, b: int) -> int:
+        """Return how many lights go the step from one place to the other."""
+        is_near = np.linalg.norm(every - steps[a, b], axis=1) <= STAYS
+        return len(np.unique(lights[is_near]))
 
     gone_on = []
     for a in range(len(stays)):
         path, at, n_places = stays[a].path, a, 1
-        while nexts := [b for one, b in steps if one == at]:
+        while nexts := nexts_of[at]:
             here = at
             at = min(
                 nexts,
                 key=lambda b: (
-                    -agreeing(steps[here, b]),
+                    -agreeing(here, b),
                     float(np.linalg.norm(steps[here, b])),
                 ),
             )
@@ -157,7 +168,10 @@ def _with_jumps(paths: Sequence[FloatArray]) -> list[FloatArray]:
 def _stay(path: FloatArray) -> _Stay:
     (shown,) = np.isfinite(path[:, 0]).nonzero()
     place = np.median(path[shown], axis=0)
-    return _Stay(path, place, int(shown[0]), int(shown[-1]))
+    first, last = int(shown[0]), int(shown[-1])
+    n_images = last - first + 1
+    is_lasting = n_images >= BRIEFEST and len(shown) >= NEARLY_ALL * n_images
+    return _Stay(path, place, first, last, is_lasting)
 
 
 def _may_jump(one: _Stay, other: _Stay) -> bool:
@@ -165,19 +179,14 @@ def _may_jump(one: _Stay, other: _Stay) -> bool:
     between = other.first - one.last - 1
     if not 0 <= between <= BETWEEN * len(one.path):
         return False
-    is_near = np.linalg.norm(other.place - one.place) <= FARTHEST
-    return bool(is_near and _is_lasting(one) and _is_lasting(other))
+    if not (one.is_lasting and other.is_lasting):
+        return False
+    return bool(np.linalg.norm(other.place - one.place) <= FARTHEST)
 
 
-def _is_lasting(stay: _Stay) -> bool:
-    """Tell whether nearly all images of a time show the light."""
-    n_images = stay.last - stay.first + 1
-    n_shown = int(np.isfinite(stay.path[:, 0]).sum())
-    return n_images >= BRIEFEST and n_shown >= NEARLY_ALL * n_images
-
-
-def _is_near(one: FloatArray, other: FloatArray) -> bool:
-    return bool(np.linalg.norm(one - other) <= STAYS)
+def _is_shown(path: FloatArray) -> bool:
+    """Tell whether any image shows a light."""
+    return bool(np.isfinite(path[:, 0]).any())
 
 
 def other_lights(sighting: Sighting) -> FloatArray:
