@@ -29,6 +29,7 @@ from lightpen.estimation.unknowns import Components, inverse
 
 TRIED = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.94, 0.97, 0.99])
 NEGLIGIBLE = 1e-3  # how likely a coefficient is that is left out
+FAR = 30.0  # costs beyond the least from which on none is tried farther off
 NOISE_PASSES = 2  # in which its variance is found beside the components
 
 
@@ -95,18 +96,17 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     through = rows.projected @ bundle.covariance
     known = (bundle.sigma / bundle.weight_sigma) ** 2
     shaken = None if jitter is None else jitter / known
-    models: list[_NoiseModel] = []
-    near = bundle.components
-    for whitened in rows.whitened(TRIED, shaken):
-        models.append(_noise_model(bundle, whitened, known, near))
-        near = models[-1].components
-    costs = np.array([model.cost for model in models])
+    nearest = int(np.argmin(np.abs(TRIED - seen)))
+    models = _likely_models(bundle, rows.whitened(TRIED, shaken), known, nearest)
+    costs = np.full(len(TRIED), np.inf)
+    for i, model in models.items():
+        costs[i] = model.cost
     likely = np.exp(-0.5 * (costs - costs.min())) * np.gradient(TRIED)
     likely /= likely.sum()
     of_values = np.zeros_like(bundle.covariance)
-    for coefficient, model, weight in zip(TRIED, models, likely, strict=True):
-        if weight > NEGLIGIBLE:
-            of_values += weight * model.variance * summed_products(through, coefficient)
+    for i in np.flatnonzero(likely > NEGLIGIBLE):
+        products = summed_products(through, TRIED[i])
+        of_values += likely[i] * models[i].variance * products
     noise = of_values[:6, :6]
     as_weighed = bundle.information - bundle.jitter_information
     excess = of_values - bundle.covariance @ as_weighed @ bundle.covariance
@@ -133,6 +133,25 @@ class _NoiseModel(NamedTuple):
     cost: float
     variance: float
     components: Components
+
+
+def _likely_models(
+    bundle: Bundle, tried: list[Whitened], variance: float, first: int
+) -> dict[int, _NoiseModel]:
+    """Return what is likely for each of some coefficients, by their place.
+
+    They are tried outwards from the first, each from what its neighbour gave, as far as
+    they are not all but impossible beside the likeliest.
+    """
+    models: dict[int, _NoiseModel] = {}
+    for way in (range(first, len(tried)), range(first - 1, -1, -1)):
+        near = models[first].components if models else bundle.components
+        for i in way:
+            models[i] = _noise_model(bundle, tried[i], variance, near)
+            near = models[i].components
+            if models[i].cost > FAR + min(model.cost for model in models.values()):
+                break
+    return models
 
 
 def _noise_model(

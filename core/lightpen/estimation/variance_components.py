@@ -78,7 +78,7 @@ def find_component(S: FloatArray, right: FloatArray, stated: float = 0.0) -> Com
     values, projected = values[seen], (vectors.T @ right)[seen]
     sigmas = np.concatenate([[stated], SCALES])
     excess = values * sigmas[:, None] ** 2 + 1
-    costs = np.sum(np.log(excess) + projected**2 / (values * excess), axis=1)
+    costs = np.log(excess).sum(axis=1) + (1 / excess) @ (projected**2 / values)
     best = int(np.argmin(costs))
     gain = float(costs[0] - costs[best])
     return Component(float(sigmas[best]), gain, _expected(sigmas, costs))
