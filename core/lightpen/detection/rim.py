@@ -264,8 +264,11 @@ def _line(image: Image, feet: FloatArray, rays: _Rays, s: FloatArray) -> FloatAr
     x, y = np.clip(x, 0, width - 1.001), np.clip(y, 0, height - 1.001)
     column, row = x.astype(np.int64), y.astype(np.int64)
     x, y = x - column, y - row
-    above = image[row, column] * (1 - x) + image[row, column + 1] * x
-    below = image[row + 1, column] * (1 - x) + image[row + 1, column + 1] * x
+    left = 1 - x
+    flat, at = image.reshape(-1), row * width + column
+    above = flat.take(at) * left + flat.take(at + 1) * x
+    at += width
+    below = flat.take(at) * left + flat.take(at + 1) * x
     return np.asarray(above * (1 - y) + below * y)
 
 

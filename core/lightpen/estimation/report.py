@@ -5,6 +5,7 @@ from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -548,12 +549,16 @@ def plain(value: Any) -> Any:
     """Return arrays as lists, what is not a number as null, sentences with codes."""
     if isinstance(value, Sentence):
         value = {"code": value.code, "text": str(value), "values": value.values}
-    if isinstance(value, np.ndarray | np.generic):
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f" and np.isfinite(value).all():
+            return value.tolist()
         value = value.tolist()
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return value if isfinite(value) else None
     if isinstance(value, dict):
         return {name: plain(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
         return [plain(entry) for entry in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
     return value

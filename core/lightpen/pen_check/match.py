@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import combinations, product
+from math import sqrt
 
 import numpy as np
 
@@ -274,9 +275,13 @@ def _without_pen(pen: Pen, n_views: int, advice: Sentence | None) -> PenMatch:
 def _differ(view: Spots, other: Spots) -> bool:
     """Whether most spots of two views lie at other places."""
     some = other.centers[:: 1 + len(other) // N_COMPARED]
-    gaps = np.linalg.norm(view.centers[:, None] - some, axis=2)
-    extent = float(np.ptp(other.centers, axis=0).max())
-    return float(np.median(gaps.min(axis=0))) > MOVED * extent
+    gaps = view.centers[:, None] - some
+    squares = np.sort(np.einsum("vsi,vsi->vs", gaps, gaps).min(axis=0))
+    n = len(squares)
+    # np.median takes eight times as long on some ten spots.
+    median = (sqrt(squares[(n - 1) // 2]) + sqrt(squares[n // 2])) / 2
+    extent = float((other.centers.max(axis=0) - other.centers.min(axis=0)).max())
+    return median > MOVED * extent
 
 
 def _centers(camera: Camera, spots: Sequence[Spots], spot: IntArray) -> FloatArray:

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -24,18 +25,17 @@ from lightpen.record.names import Names
 from lightpen.record.results import Result
 
 N_RIVALS, N_RIVAL_RESULTS = 4, 10
-RIVAL = f"""
-import sys
+RIVAL = """
+import pickle, sys
 from pathlib import Path
 from lightpen.record.folder_archive import FolderArchive
-sys.path.insert(0, sys.argv[1])
-from test_folder_archive import result
 
-archive = FolderArchive(Path(sys.argv[2]))
+archive = FolderArchive(Path(sys.argv[1]))
+results = pickle.loads(Path(sys.argv[2]).read_bytes())
 print("ready", flush=True)
 sys.stdin.readline()
-for n in range({N_RIVAL_RESULTS}):
-    archive.store(result(3.0 * n))
+for result in results:
+    archive.store(result)
 """
 NAMES = Names("Halle 3", "Jörg", "LP-04", "T-10", "C-1", 3.0005)
 NOON = datetime(2026, 1, 2, 12, tzinfo=UTC)
@@ -191,10 +191,12 @@ def test_nothing_is_overwritten_even_at_the_same_instant(
 
 
 def test_programs_that_accept_at_once_take_one_number_each(
-    archive: FolderArchive,
+    archive: FolderArchive, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    own, data = Path(__file__).parent, archive.folder.parent
-    words = [sys.executable, "-c", RIVAL, str(own), str(data)]
+    stored = tmp_path_factory.mktemp("stored") / "results.pickle"
+    results = [result(3.0 * n) for n in range(N_RIVAL_RESULTS)]
+    stored.write_bytes(pickle.dumps(results))
+    words = [sys.executable, "-c", RIVAL, str(archive.folder.parent), str(stored)]
     rivals = [
         subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         for _ in range(N_RIVALS)

@@ -163,15 +163,14 @@ def label_images(
     for i, found in zip(again, retried, strict=True):
         labels[i] = found
     five = [i for i, s in enumerate(spots) if _is_five(s, labels[i], constellation)]
-    found_five = _label_whole(
-        [spots[i] for i in five],
-        camera,
-        constellation_of(pen, FEWEST_LEDS),
-        ALL_ANSWERS,
-    )
-    for i, found in zip(five, found_five, strict=True):
-        if found.reason is LabelStatus.LABELLED:
-            labels[i] = found
+    if five:
+        by_five = constellation_of(pen, FEWEST_LEDS)
+        found_five = _label_whole(
+            [spots[i] for i in five], camera, by_five, ALL_ANSWERS
+        )
+        for i, found in zip(five, found_five, strict=True):
+            if found.reason is LabelStatus.LABELLED:
+                labels[i] = found
     return _with_displaced(labels, spots, camera, pen)
 
 
