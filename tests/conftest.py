@@ -488,7 +488,7 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
 
     from lightpen.cameras.clock import SkippingClock
     from lightpen.cameras.protocol import CameraSettings
-    from lightpen.detection.sighting import look
+    from lightpen.detection.sighting import Sighting, look
     from lightpen.formats.opened_files import CameraFile, PenFile
     from lightpen.formats.rig_files import read_rig
     from lightpen.live.sources import Surroundings, cameras_of
@@ -523,22 +523,22 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     live = cameras_of(sources, Surroundings(scene, clock))
     for camera in live:
         camera.open()
-        if by_two:  # looking at two images a moment takes long
-            camera.configure(CameraSettings(frame_rate=10.0))
+        camera.configure(CameraSettings(frame_rate=10.0))  # as looking takes long
         camera.start()
     assert isinstance(live[0], SimulatedCamera)
     live[0].operator.seat()
     follower = Follower(live[0].operator)
     setup = preparation.swing_setup()
     state = start_swing(setup)
+    before: Sequence[Sighting | None] = [None for _ in live]
     with RecordWriter.create(folder, preparation.header()) as writer:
         while state.n_kept < n_images:
             frames = [camera.read(1.0) for camera in live]
-            sighting, *others = (
-                look(frame.image, aim.camera, aim.pen, aim.mask)
-                for frame, aim in zip(frames, setup.aims, strict=True)
+            before = sighting, *others = [
+                look(frame.image, aim.camera, aim.pen, aim.mask, last)
+                for frame, aim, last in zip(frames, setup.aims, before, strict=True)
                 if aim.camera is not None and aim.pen is not None
-            )
+            ]
             state = capture_image(
                 *(setup, state, writer, frames[0].image),
                 replace(sighting, others=tuple(others)),

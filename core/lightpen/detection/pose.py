@@ -399,8 +399,9 @@ def _descend(
             sigmas = _image_sigmas(residuals)
             weights = cauchy_weights(residuals, sigmas)
             H, g = normal_equations(J, residuals, weights)
-            curvature = _curvature(J, residuals, weights, sigmas)
-            H = H - is_near[:, None, None] * curvature
+            if is_near.any():
+                curvature = _curvature(J, residuals, weights, sigmas)
+                H = H - is_near[:, None, None] * curvature
         else:
             H, g = normal_equations(J, residuals, seen)
         step = np.einsum("nij,nj->ni", _inverse(H), g)

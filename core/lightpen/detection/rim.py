@@ -23,6 +23,7 @@ References
    edge of an even plateau.
 """
 
+from functools import lru_cache
 from math import erfc, hypot, pi, sqrt
 from typing import NamedTuple
 
@@ -187,18 +188,24 @@ def _rim(ellipse: _Ellipse, sigma: float, is_whole: bool) -> Rim:
 def _rays(ellipse: _Ellipse) -> _Rays:
     longer, _ = ellipse.semi_axes
     n_rays = 4 * round(min(max(2 * pi * longer / RAY_SPACING, MIN_RAYS), MAX_RAYS) / 4)
-    angles = 2 * pi / n_rays * np.arange(n_rays)
-    arms = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    arms, stretching = _arms(n_rays)
     spokes = arms @ ellipse.root.T
     normals = arms @ np.linalg.inv(ellipse.root)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.sqrt(np.einsum("ri,ri->r", normals, normals))[:, None]
     lengths = np.einsum("ri,ri->r", spokes, normals)
-    stretches = np.stack(
-        [lengths, lengths * np.cos(2 * angles), lengths * np.sin(2 * angles)], axis=-1
-    )
-    return _Rays(
-        ellipse.center + spokes, normals, np.concatenate([normals, stretches], axis=1)
-    )
+    moves = np.empty((n_rays, 5))
+    moves[:, :2] = normals
+    moves[:, 2:] = lengths[:, None] * stretching
+    return _Rays(ellipse.center + spokes, normals, moves)
+
+
+@lru_cache(maxsize=MAX_RAYS // 4)
+def _arms(n_rays: int) -> tuple[FloatArray, FloatArray]:
+    """Return unit vectors all round, (N, 2), and the ways to stretch there, (N, 3)."""
+    angles = 2 * pi / n_rays * np.arange(n_rays)
+    arms = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    ways = [np.ones(n_rays), np.cos(2 * angles), np.sin(2 * angles)]
+    return arms, np.stack(ways, axis=-1)
 
 
 def _moved(ellipse: _Ellipse, step: FloatArray) -> _Ellipse:
@@ -252,24 +259,22 @@ def _profiles(image: Image, rays: _Rays, s: FloatArray) -> FloatArray:
 
     It is the mean of two lines, so that hardly a pixel is passed over.
     """
-    beside = BESIDE * rays.normals[:, ::-1] * np.array([-1.0, 1.0])
-    lines = [_line(image, rays.feet + side * beside, rays, s) for side in (-1, 1)]
-    return 0.5 * (lines[0] + lines[1])
-
-
-def _line(image: Image, feet: FloatArray, rays: _Rays, s: FloatArray) -> FloatArray:
-    """Return the light at distances s from feet along the rays, (N, S)."""
     height, width = image.shape
-    x, y = (feet[:, k, None] + rays.normals[:, k, None] * s for k in range(2))
-    x, y = np.clip(x, 0, width - 1.001), np.clip(y, 0, height - 1.001)
+    beside = BESIDE * rays.normals[:, ::-1] * np.array([-1.0, 1.0])
+    feet = np.stack([rays.feet - beside, rays.feet + beside])
+    x, y = (feet[..., k, None] + rays.normals[:, k, None] * s for k in range(2))
+    x = np.minimum(np.maximum(x, 0.0), width - 1.001)
+    y = np.minimum(np.maximum(y, 0.0), height - 1.001)
     column, row = x.astype(np.int64), y.astype(np.int64)
-    x, y = x - column, y - row
+    x -= column
+    y -= row
     left = 1 - x
     flat, at = image.reshape(-1), row * width + column
     above = flat.take(at) * left + flat.take(at + 1) * x
     at += width
     below = flat.take(at) * left + flat.take(at + 1) * x
-    return np.asarray(above * (1 - y) + below * y)
+    light = above * (1 - y) + below * y
+    return np.asarray(0.5 * (light[0] + light[1]))
 
 
 def _functions(s: FloatArray, sigma: float, shorter_axis: float) -> FloatArray:

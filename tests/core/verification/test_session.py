@@ -27,7 +27,7 @@ from lightpen.verification.touching import TouchEvent, TouchHappening
 
 LONGEST = 180.0  # s of the operator's time, from the first touch to the verdict
 GIVE_UP = 240.0  # s
-FRAME_RATE = 10.0  # 1/s: half of the usual one, as each image is rendered
+FRAME_RATE = 5.0  # 1/s: a quarter of the usual one, as each image is rendered
 
 
 def test_a_simulated_operator_verifies_a_tip_without_a_key() -> None:
