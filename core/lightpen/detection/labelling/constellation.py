@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, permutations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,7 +60,6 @@ def certain_leds(pen: Pen) -> int:
     return min(MIN_CERTAIN_LEDS, pen.n_leds)
 
 
-@lru_cache(maxsize=16)
 def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation:
     """Return the constellation of a pen.
 
@@ -72,23 +72,60 @@ def constellation_of(pen: Pen, certain: int = MIN_CERTAIN_LEDS) -> Constellation
     """
     if pen.n_leds < MIN_LEDS:
         raise ValueError(f"`pen` must have at least {MIN_LEDS} LEDs, got {pen.n_leds}.")
-    triples = np.array(list(permutations(range(pen.n_leds), 3)))
-    sides = _sides(pen.leds[triples])
-    triangles = _heights(pen.leds[triples]) > MIN_HEIGHT * sides.max(axis=1)
+    # By what they hold: a file that is read again is the same pen.
+    leds, normals = pen.leds.astype(float).tobytes(), pen.normals.astype(float).tobytes()
+    return _constellation(leds, normals, pen.diameter, min(certain, pen.n_leds))
+
+
+@lru_cache(maxsize=16)
+def _constellation(
+    leds: bytes, normals: bytes, diameter: float, min_leds: int
+) -> Constellation:
+    pattern = _pattern(leds, normals)
+    kept = pattern.n_laid >= min_leds
+    return Constellation(
+        leds=pattern.leds,
+        normals=pattern.normals,
+        radius=diameter / 2,
+        min_leds=min_leds,
+        triples=pattern.triples,
+        sides=pattern.sides,
+        self_rotations=pattern.self_rotations[kept],
+        self_translations=pattern.self_translations[kept],
+    )
+
+
+class _Pattern(NamedTuple):
+    """The same, whatever discs the LEDs have and how many of them are enough.
+
+    Attributes
+    ----------
+    n_laid : (M,) array of int
+        LEDs that each motion lays onto LEDs.
+    """
+
+    leds: FloatArray
+    normals: FloatArray
+    triples: IntArray
+    sides: FloatArray
+    self_rotations: FloatArray
+    self_translations: FloatArray
+    n_laid: IntArray
+
+
+@lru_cache(maxsize=16)
+def _pattern(led_bytes: bytes, normal_bytes: bytes) -> _Pattern:
+    leds, normals = (
+        np.frombuffer(each).reshape(-1, 3) for each in (led_bytes, normal_bytes)
+    )
+    triples = np.array(list(permutations(range(len(leds)), 3)))
+    sides = _sides(leds[triples])
+    triangles = _heights(leds[triples]) > MIN_HEIGHT * sides.max(axis=1)
     if not triangles.any():
         raise ValueError("`pen` must not have all its LEDs on one line.")
     triples, sides = triples[triangles], sides[triangles]
-    min_leds = min(certain, pen.n_leds)
-    rotations, translations = _self_motions(pen, triples, sides, min_leds)
-    return Constellation(
-        leds=pen.leds,
-        normals=pen.normals,
-        radius=pen.diameter / 2,
-        min_leds=min_leds,
-        triples=triples,
-        sides=sides,
-        self_rotations=rotations,
-        self_translations=translations,
+    return _Pattern(
+        leds, normals, triples, sides, *_self_motions(leds, normals, triples, sides)
     )
 
 
@@ -109,36 +146,33 @@ def _heights(corners: FloatArray) -> FloatArray:
 
 
 def _self_motions(
-    pen: Pen, triples: IntArray, sides: FloatArray, min_leds: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return the motions, other than none, that lay LEDs of the pen onto LEDs."""
+    leds: FloatArray, normals: FloatArray, triples: IntArray, sides: FloatArray
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return the motions, other than none, that lay LEDs onto LEDs, and how many."""
     known = {tuple(triple) for triple in triples.tolist()}
-    bases = np.array([t for t in combinations(range(pen.n_leds), 3) if t in known])
-    heights = _heights(pen.leds[bases])
+    bases = np.array([t for t in combinations(range(len(leds)), 3) if t in known])
+    heights = _heights(leds[bases])
     # A triangle that fixes the motion well; all of them where the pen has few.
     bases = bases[np.argsort(-heights, kind="stable")][:MAX_TRIANGLES]
     reach = LOOKALIKE * sides.max()
-    own = _sides(pen.leds[bases])
+    own = _sides(leds[bases])
     close = [np.abs(own[:, k, None] - sides[:, k]) < 2 * reach for k in range(3)]
     base, copy = np.nonzero(close[0] & close[1] & close[2])
     moved = (bases[base] != triples[copy]).any(axis=1)
     base, copy = base[moved], copy[moved]
-    seen: dict[tuple[int, ...], tuple[FloatArray, FloatArray]] = {}
-    R, t = fit_rigid(pen.leds[bases[base]], pen.leds[triples[copy]])
-    there = pen.leds @ np.swapaxes(R, 1, 2) + t[:, None]
-    squares = np.einsum("mli,mli->ml", there, there)[..., None] - 2 * there @ pen.leds.T
-    squares += np.einsum("li,li->l", pen.leds, pen.leds)
+    R, t = fit_rigid(leds[bases[base]], leds[triples[copy]])
+    there = leds @ np.swapaxes(R, 1, 2) + t[:, None]
+    squares = np.einsum("mli,mli->ml", there, there)[..., None] - 2 * there @ leds.T
+    squares += np.einsum("li,li->l", leds, leds)
     partner = np.where(squares.min(axis=2) < reach**2, squares.argmin(axis=2), -1)
-    normals = pen.normals @ np.swapaxes(R, 1, 2)
-    alike = np.einsum("mli,mli->ml", normals, pen.normals[partner]) > ALIKE_NORMALS
+    turned = normals @ np.swapaxes(R, 1, 2)
+    alike = np.einsum("mli,mli->ml", turned, normals[partner]) > ALIKE_NORMALS
     partner = np.where(alike, partner, -1)
-    moving = (partner >= 0) & (partner != np.arange(pen.n_leds))
-    kept = ((partner >= 0).sum(axis=1) >= min_leds) & moving.any(axis=1)
-    for which in np.flatnonzero(kept):
-        seen.setdefault(tuple(partner[which].tolist()), (R[which], t[which]))
-    if not seen:
-        return np.empty((0, 3, 3)), np.empty((0, 3))
-    return (
-        np.stack([motion[0] for motion in seen.values()]),
-        np.stack([motion[1] for motion in seen.values()]),
-    )
+    moving = (partner >= 0) & (partner != np.arange(len(leds)))
+    n_laid = (partner >= 0).sum(axis=1)
+    enough = (n_laid >= min(FEWEST_LEDS, len(leds))) & moving.any(axis=1)
+    first: dict[tuple[int, ...], int] = {}
+    for which in np.flatnonzero(enough).tolist():
+        first.setdefault(tuple(partner[which].tolist()), which)
+    kept = np.array(list(first.values()), dtype=np.int64)
+    return R[kept], t[kept], n_laid[kept]
