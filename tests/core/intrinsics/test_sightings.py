@@ -1,6 +1,7 @@
 """Tests of finding boards in images."""
 
 from dataclasses import replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -23,6 +24,7 @@ SMALL = Camera(
     *(400, 320, 600.0, 599.0, 201.0, 158.0),
     distortion=np.array([-0.1, 0.05, 3e-4, -2e-4, 0.0]),
 )
+STRAIGHT = replace(SMALL, distortion=np.zeros(5))
 TILT = rotation_from_vector(np.array([0.35, -0.3, 0.1]))
 # Rms error, px: of 8 bit with shot noise. A marker's corner is rounded by the blur.
 LIMITS = {
@@ -40,8 +42,13 @@ def place(board: Board, filled: float = 0.6) -> FloatArray:
     return np.array([3.0, -2.0, SMALL.fx * longer / (filled * SMALL.width)])
 
 
+@cache
+def light_of(board: Board, filled: float) -> FloatArray:
+    return render_board(SMALL, board, TILT, place(board, filled))
+
+
 def image_of(board: Board, bits: int = 8, seed: int = 1, filled: float = 0.6) -> Image:
-    light = render_board(SMALL, board, TILT, place(board, filled))
+    light = light_of(board, filled)
     sensor = Sensor(bits=12) if bits == 12 else Sensor()
     return expose_board(light, sensor, np.random.default_rng(seed))
 
@@ -81,12 +88,11 @@ def test_the_points_of_a_board_are_found(word: str) -> None:
 @pytest.mark.parametrize("word", ["circles:7x5:20:14", "asymmetric-circles:4x9:15:14"])
 def test_no_circle_of_a_grid_is_seen_off_its_place(word: str) -> None:
     board = parse_board(word)
-    straight = replace(SMALL, distortion=np.zeros(5))
     points = board.points @ TILT.T + place(board)
-    light = render_board(straight, board, TILT, place(board))
+    light = render_board(STRAIGHT, board, TILT, place(board))
     seen = find_points(np.round(60_000 * light).astype(np.uint16), board)
     normals = np.broadcast_to(TILT[:, 2], points.shape)
-    there = ellipse_centers(straight, points, normals, 0.5 * board.detail)
+    there = ellipse_centers(STRAIGHT, points, normals, 0.5 * board.detail)
 
     assert seen is not None
     off = [np.abs(seen[order] - there).max() for order in board.orders]
