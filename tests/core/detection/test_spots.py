@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import cos, sin
 from pathlib import Path
 
 import cv2
@@ -54,6 +56,33 @@ def grid_of_lamps(seed: int = 0, **shape: float) -> list[Lamp]:
     ]
 
 
+@lru_cache(maxsize=200)
+def cover_of(
+    lamp: Lamp, sigma: float, motion: tuple[float, float], hidden: Hidden | None
+) -> tuple[int, int, FloatArray]:
+    """Column and row where a patch begins, and how much of each pixel a disc covers."""
+    reach = max(lamp.a, lamp.b) + 5 * sigma + 4 + np.hypot(*motion)
+    left, top = round(lamp.x - reach), round(lamp.y - reach)
+    side = 2 * round(reach) + 1
+    fine = (np.arange(side * SUPERSAMPLING) + 0.5) / SUPERSAMPLING - 0.5
+    x, y = np.meshgrid(left + fine, top + fine, sparse=True)
+    times = np.linspace(-0.5, 0.5, 25) if any(motion) else np.zeros(1)
+    cover = np.zeros((len(fine), len(fine)), np.float32)
+    c, s = cos(lamp.angle), sin(lamp.angle)
+    for time in times.tolist():
+        dx = (x - lamp.x - time * motion[0]).astype(np.float32)
+        dy = (y - lamp.y - time * motion[1]).astype(np.float32)
+        u, v = c / lamp.a * dx + s / lamp.a * dy, c / lamp.b * dy - s / lamp.b * dx
+        inside = u * u + v * v <= 1
+        cover += np.where(inside, 1 + lamp.shading * u, 0.0) if lamp.shading else inside
+    cover /= len(times)
+    if hidden is not None:
+        cover[np.broadcast_to(hidden(x, y), cover.shape)] = 0.0
+    blurred = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
+    patch = blurred.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
+    return left, top, patch
+
+
 def render(
     lamps: Sequence[Lamp],
     sigma: float = 0.8,
@@ -67,23 +96,8 @@ def render(
     """
     light = np.zeros(shape)
     for lamp in lamps:
-        reach = max(lamp.a, lamp.b) + 5 * sigma + 4 + np.hypot(*motion)
-        left, top = round(lamp.x - reach), round(lamp.y - reach)
-        side = 2 * round(reach) + 1
-        fine = (np.arange(side * SUPERSAMPLING) + 0.5) / SUPERSAMPLING - 0.5
-        x, y = np.meshgrid(left + fine, top + fine, sparse=True)
-        times = np.linspace(-0.5, 0.5, 25) if any(motion) else np.zeros(1)
-        cover = np.zeros((len(fine), len(fine)), np.float32)
-        for time in times:
-            dx, dy = x - lamp.x - time * motion[0], y - lamp.y - time * motion[1]
-            u = (np.cos(lamp.angle) * dx + np.sin(lamp.angle) * dy) / lamp.a
-            v = (np.cos(lamp.angle) * dy - np.sin(lamp.angle) * dx) / lamp.b
-            shine = 1 + lamp.shading * u
-            cover += np.where(u**2 + v**2 <= 1, shine, 0.0) / len(times)
-        if hidden is not None:
-            cover[np.broadcast_to(hidden(x, y), cover.shape)] = 0.0
-        blurred = cv2.GaussianBlur(cover, (0, 0), sigma * SUPERSAMPLING)
-        patch = blurred.reshape(side, SUPERSAMPLING, side, SUPERSAMPLING).mean((1, 3))
+        left, top, patch = cover_of(replace(lamp, level=1.0), sigma, motion, hidden)
+        side = len(patch)
         rows = slice(max(top, 0), min(top + side, shape[0]))
         columns = slice(max(left, 0), min(left + side, shape[1]))
         if rows.start >= rows.stop or columns.start >= columns.stop:

@@ -103,8 +103,12 @@ def _poses(
     seen = rays * ranges[..., None]
     here, there = _triangle_frame(points), _triangle_frame(seen)
     rotations = there @ np.swapaxes(here, 1, 2)
-    middle = np.einsum("sij,sj->si", rotations, points.mean(axis=1))
-    return rotations, seen.mean(axis=1) - middle
+    middle = np.einsum("sij,sj->si", rotations, _middle(points))
+    return rotations, _middle(seen) - middle
+
+
+def _middle(points: FloatArray) -> FloatArray:
+    return np.asarray((points[:, 0] + points[:, 1] + points[:, 2]) / 3)
 
 
 def _triangle_frame(points: FloatArray) -> FloatArray:
