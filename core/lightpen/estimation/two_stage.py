@@ -93,34 +93,46 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
     require_spread(rotations)
     M = contact_matrix(rotations)
     X = _linear_start(M, translations)
+    rows, constant = M.reshape(-1, 6), translations.ravel()
+    normal = rows.T @ rows
     iterates, step_lengths, increments = [X], [], []
-    deviations = M @ X + translations
-    objectives = [float(np.sum(deviations**2))]
+    deviations = rows @ X + constant
+    objectives = [float(deviations @ deviations)]
     for _ in range(MAX_STEPS):
-        f = np.linalg.norm(deviations, axis=1)
-        directions = deviations / np.maximum(f, TINY)[:, None]
-        A = np.einsum("ni,nij->nj", directions, M)  # eq. (10)
-        dX = np.linalg.lstsq(A, f)[0]
-        slope = M @ dX
+        each = deviations.reshape(-1, 3)
+        f = np.sqrt(np.einsum("ni,ni->n", each, each))
+        directions = each / np.maximum(f, TINY)[:, None]
+        A = (directions[:, None] @ M)[:, 0]  # eq. (10)
+        gradient = deviations @ rows  # A^T f, as f times a direction is the deviation
+        dX = _solved(A.T @ A, gradient)
         # Along dX the objective is a parabola, so its minimum is known.
-        alpha = float(np.sum(slope * deviations) / max(np.sum(slope**2), TINY**2))
-        X = X - alpha * dX  # eq. (11)
-        deviations = M @ X + translations
+        alpha = float(dX @ gradient / max(dX @ normal @ dX, TINY**2))
+        step = alpha * dX
+        X = X - step  # eq. (11)
+        deviations = rows @ X + constant
         iterates.append(X)
-        objectives.append(float(np.sum(deviations**2)))
+        objectives.append(float(deviations @ deviations))
         step_lengths.append(alpha)
-        increments.append(float(np.linalg.norm(alpha * dX)))
+        increments.append(float(np.sqrt(step @ step)))
         if increments[-1] < STEP_TOLERANCE:
             break
     return TwoStageFit(
         tip_pen=X[:3],
         cone_cam=X[3:],
-        residuals=deviations,
+        residuals=deviations.reshape(-1, 3),
         iterates=np.array(iterates),
         objectives=np.array(objectives),
         step_lengths=np.array(step_lengths),
         increments=np.array(increments),
     )
+
+
+def _solved(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve normal equations, also where exact poses leave nothing to solve."""
+    try:
+        return np.asarray(np.linalg.solve(normal, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(normal, right)[0])
 
 
 def propagated_covariance(
