@@ -104,7 +104,7 @@ def measure_correlation(bundle: Bundle, pixels: FloatArray) -> Correlation:
     likely = np.exp(-0.5 * (costs - costs.min())) * np.gradient(TRIED)
     likely /= likely.sum()
     of_values = np.zeros_like(bundle.covariance)
-    for i in np.flatnonzero(likely > NEGLIGIBLE):
+    for i in np.flatnonzero(likely > NEGLIGIBLE).tolist():
         products = summed_products(through, TRIED[i])
         of_values += likely[i] * models[i].variance * products
     noise = of_values[:6, :6]

@@ -106,7 +106,7 @@ def fit_two_stage(rotations: FloatArray, translations: FloatArray) -> TwoStageFi
         gradient = deviations @ rows  # A^T f, as f times a direction is the deviation
         dX = _solved(A.T @ A, gradient)
         # Along dX the objective is a parabola, so its minimum is known.
-        alpha = float(dX @ gradient / max(dX @ normal @ dX, TINY**2))
+        alpha = float(dX @ gradient) / max(float(dX @ normal @ dX), TINY**2)
         step = alpha * dX
         X = X - step  # eq. (11)
         deviations = rows @ X + constant
