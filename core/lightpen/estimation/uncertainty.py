@@ -285,9 +285,11 @@ def _by_forms(bundle: Bundle, variances: Sequence[float]) -> FloatArray:
     is_seen = bundle.counted.seat[0].sigma > 0
     axes = alike if is_seen else once_round(bundle.state.rotations)
     by_form = np.repeat(variances, FORMS)
-    goes_once = np.arange(len(by_form)) < FORMS[0]
-    once, others = (np.where(some, by_form, 0.0) for some in (goes_once, ~goes_once))
-    return np.asarray(np.kron(np.diag(once), axes) + np.kron(np.diag(others), alike))
+    each = np.arange(len(by_form))
+    goes_once = (each < FORMS[0])[:, None, None]
+    whole = np.zeros((len(by_form), N_CONE, len(by_form), N_CONE))
+    whole[each, :, each] = by_form[:, None, None] * np.where(goes_once, axes, alike)
+    return whole.reshape(N_CONE * len(by_form), -1)
 
 
 def _by_shift_along_normals(bundle: Bundle) -> FloatArray:

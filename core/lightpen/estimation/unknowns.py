@@ -183,7 +183,7 @@ def axes_of_cone(rotations: FloatArray) -> FloatArray:
     most_across = np.eye(N_CONE)[np.argmin(np.abs(along).round(1))]
     right = most_across - (most_across @ along) * along
     right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(along, right), along])
+    return np.array([right, skew(along) @ right, along])
 
 
 def _lean(rotations: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -330,9 +330,11 @@ class Unknowns:
         ):
             n = place.stop - place.start
             prior[place, place] = np.eye(n) / max(sigma, EXACT) ** 2
-        prior[at.whole_seat, at.whole_seat] = inverse(
-            np.diag(self._seat_variances(components))
-            + components.oval.sigma**2 * self.oval @ self.oval.T
+        variances, oval = self._seat_variances(components), components.oval.sigma
+        prior[at.whole_seat, at.whole_seat] = (
+            inverse(np.diag(variances) + oval**2 * self.oval @ self.oval.T)
+            if oval > 0
+            else np.diag(1 / variances)
         )
         of_leds = priors.led_covariance
         if of_leds is not None and components.leds is NONE:  # the images do not deny it
