@@ -12,7 +12,7 @@ from lightpen.intrinsics.boards import parse_board
 from lightpen.intrinsics.page import POINTS_A_MM, board_page
 from lightpen.intrinsics.sightings import find_points
 
-SCALE = 4  # px/mm
+SCALE = 3  # px/mm
 WORDS = (
     "chessboard:8x5:20",
     "charuco:7x5:20:15:DICT_5X5_100",
