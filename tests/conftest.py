@@ -523,7 +523,8 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     live = cameras_of(sources, Surroundings(scene, clock))
     for camera in live:
         camera.open()
-        camera.configure(CameraSettings(frame_rate=10.0))  # as looking takes long
+        if by_two:  # looking at two images a moment takes long
+            camera.configure(CameraSettings(frame_rate=10.0))
         camera.start()
     assert isinstance(live[0], SimulatedCamera)
     live[0].operator.seat()

@@ -36,7 +36,7 @@ from lightpen.swing.status import SwingStatus
 
 TIMEOUT = 60.0  # s until a test gives up, on a machine that does other things besides
 MANY = 600  # images, in which all that is to be seen is seen
-FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
+FRAME_RATE = 6.0  # 1/s: a third of the usual one, as looking at an image takes long
 SHORT = SwingLimits(max_uncertainty=0.05, min_images=12, min_per_field=0)
 
 

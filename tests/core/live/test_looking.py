@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 TIMEOUT = 60.0  # s until a test gives up
 LONG_NS = 10**18  # which no swing takes
-FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
+FRAME_RATE = 6.0  # 1/s: a third of the usual one, as looking at an image takes long
 PAINTED = np.zeros((200, 200), np.uint8)  # two bright discs
 for _place in ((60, 60), (140, 130)):
     cv2.circle(PAINTED, _place, 8, 200, -1, cv2.LINE_AA)

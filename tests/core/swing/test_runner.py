@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 TIMEOUT = 60.0  # s until a test gives up
 N_IMAGES = 20  # of the record that is resumed
-FRAME_RATE = 10.0  # 1/s: half of the usual one, as looking at an image takes long
+FRAME_RATE = 6.0  # 1/s: a third of the usual one, as looking at an image takes long
 BETWEEN = (Happening.KEPT, Happening.FIELD_FULL, Happening.SLIPPED)
 Command = Callable[[Path], dict[str, Any]]
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tests.core.conftest import Station
 
 N_IMAGES = 14
-FRAME_RATE = 10.0  # 1/s, of the station
+FRAME_RATE = 6.0  # 1/s, of the station
 Command = Callable[[Path], dict[str, Any]]
 
 
