@@ -13,7 +13,15 @@ from threading import Event
 from typing import Any, NoReturn, TypeAlias
 
 import pytest
-from PySide6.QtCore import QDeadlineTimer, QEvent, QLocale, QPoint, Qt, QTimer
+from PySide6.QtCore import (
+    QDeadlineTimer,
+    QEvent,
+    QLocale,
+    QPoint,
+    Qt,
+    QThreadPool,
+    QTimer,
+)
 from PySide6.QtGui import QWindow
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -101,7 +109,10 @@ def kept_to_one_thread() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def collected(kept_to_one_thread: None) -> Iterator[None]:
+    """What a test has closed is gone before the next one: each would be styled anew."""
     yield
+    QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs are told of there
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 
 
@@ -166,10 +177,11 @@ NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
 @pytest.fixture(scope="session")
 def samples(
-    around: Surroundings, tmp_path_factory: pytest.TempPathFactory
+    small_scene: Scene, tmp_path_factory: pytest.TempPathFactory
 ) -> OpenedFiles:
     """The simulated pen's files, written and read once; copy before you change them."""
-    return sample_files(around, tmp_path_factory.mktemp("samples"))
+    folder = tmp_path_factory.mktemp("samples")
+    return sample_files(Surroundings(small_scene), folder)
 
 
 @pytest.fixture

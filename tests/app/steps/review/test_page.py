@@ -29,6 +29,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.undressed import undressed
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
@@ -206,7 +207,8 @@ class Bed:
 
     def show(self) -> ReviewPage:
         """Show the page."""
-        page = ReviewPage(self.workbench)
+        with undressed():
+            page = ReviewPage(self.workbench)
         self.pages.append(page)
         self.qtbot.addWidget(page)
         page.resize(1000, 600)
