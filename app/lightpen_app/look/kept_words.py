@@ -20,15 +20,15 @@ CATALOGUE = TRANSLATIONS / f"lightpen_{Language.CHINESE}.ts"  # names every sent
 
 @dataclass(frozen=True)
 class _Known:
-    """A sentence of the core, its own words, and the names of its places."""
+    """A sentence of the core, the longest of its own words, and its places' names."""
 
     template: str
-    words: tuple[str, ...]
+    words: str
     fields: tuple[str, ...]
 
     def match(self, text: str) -> re.Match[str] | None:
         """Return a match whose groups are what stands in the places."""
-        if not all(words in text for words in self.words):
+        if self.words not in text:
             return None  # without a pattern: hundreds take long to be compiled
         return _pattern(self.template).fullmatch(text)
 
@@ -84,7 +84,7 @@ def _known(template: str) -> _Known:
     parts = list(Formatter().parse(template))
     return _Known(
         template,
-        tuple(words for words, *_ in parts),
+        max((words for words, *_ in parts), key=len),
         tuple(name for _, name, *_ in parts if name is not None),
     )
 
