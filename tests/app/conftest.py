@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -12,7 +13,15 @@ from threading import Event
 from typing import Any, NoReturn, TypeAlias
 
 import pytest
-from PySide6.QtCore import QDeadlineTimer, QEvent, QLocale, QPoint, Qt, QTimer
+from PySide6.QtCore import (
+    QDeadlineTimer,
+    QEvent,
+    QLocale,
+    QPoint,
+    Qt,
+    QThreadPool,
+    QTimer,
+)
 from PySide6.QtGui import QWindow
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -37,6 +46,7 @@ from pytestqt.wait_signal import SignalBlocker
 from typing_extensions import override
 
 from lightpen.cameras.clock import SkippingClock
+from lightpen.formats.opened_files import OpenedFiles
 from lightpen.live.sources import Surroundings, sample_files
 from lightpen.record.names import Names
 from lightpen.record.reading import Record
@@ -99,7 +109,10 @@ def kept_to_one_thread() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def collected(kept_to_one_thread: None) -> Iterator[None]:
+    """What a test has closed is gone before the next one: each would be styled anew."""
     yield
+    QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs are told of there
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 
 
@@ -162,29 +175,41 @@ SolvingOn: TypeAlias = Callable[[], AbstractContextManager[None]]
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
 
+@pytest.fixture(scope="session")
+def samples(
+    small_scene: Scene, tmp_path_factory: pytest.TempPathFactory
+) -> OpenedFiles:
+    """The simulated pen's files, written and read once; copy before you change them."""
+    folder = tmp_path_factory.mktemp("samples")
+    return sample_files(Surroundings(small_scene), folder)
+
+
 @pytest.fixture
 def workbench(
-    settings: Settings, tmp_path: Path, around: Surroundings
+    settings: Settings, tmp_path: Path, around: Surroundings, samples: OpenedFiles
 ) -> Iterator[Workbench]:
     """A workbench with names and the simulated pen's files; its camera is not open yet.
 
     `workbench.open_camera()` opens it; images then come four times as fast as usual.
     """
     workbench = Workbench(settings, tmp_path / "data", around)
-    choose_samples(workbench, tmp_path / "samples")
+    choose_samples(workbench, samples, tmp_path / "samples")
     yield workbench
     workbench.shut_down()
 
 
-def choose_samples(workbench: Workbench, folder: Path) -> None:
-    """Choose names, and the simulated pen's files as written to a folder."""
-    files = sample_files(workbench.around, folder)
+def choose_samples(workbench: Workbench, samples: OpenedFiles, folder: Path) -> None:
+    """Choose names, and a copy of the simulated pen's files in another folder."""
+    camera, pen = samples.camera_file, samples.pen_file
+    assert camera is not None
+    assert pen is not None
+    shutil.copytree(camera.path.parent, folder)
     workbench.set_preparation(
         replace(
             workbench.preparation,
             names=NAMES,
-            camera_file=files.camera_file,
-            pen_file=files.pen_file,
+            camera_file=replace(camera, path=folder / camera.path.name),
+            pen_file=replace(pen, path=folder / pen.path.name),
         )
     )
 

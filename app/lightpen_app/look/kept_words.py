@@ -20,17 +20,23 @@ CATALOGUE = TRANSLATIONS / f"lightpen_{Language.CHINESE}.ts"  # names every sent
 
 @dataclass(frozen=True)
 class _Known:
-    """A sentence of the core, the names of its places, and what its words look like."""
+    """A sentence of the core, the longest of its own words, and its places' names."""
 
     template: str
+    words: str
     fields: tuple[str, ...]
-    pattern: re.Pattern[str]
+
+    def match(self, text: str) -> re.Match[str] | None:
+        """Return a match whose groups are what stands in the places."""
+        if self.words not in text:
+            return None  # without a pattern: hundreds take long to be compiled
+        return _pattern(self.template).fullmatch(text)
 
 
 def worded_anew(text: str) -> str:
     """Return words of the core in the language that is chosen; others as they are."""
     for known in _sentences():
-        match = known.pattern.fullmatch(text)
+        match = known.match(text)
         if match is not None:
             values = dict(zip(known.fields, map(_value, match.groups()), strict=True))
             return _filled(translated(known.template), values)
@@ -75,10 +81,20 @@ def _sentences() -> tuple[_Known, ...]:
 
 
 def _known(template: str) -> _Known:
-    fields, pattern = [], ""
+    parts = list(Formatter().parse(template))
+    return _Known(
+        template,
+        max((words for words, *_ in parts), key=len),
+        tuple(name for _, name, *_ in parts if name is not None),
+    )
+
+
+@cache
+def _pattern(template: str) -> re.Pattern[str]:
+    """Return what the words of a sentence look like, whatever stands in its places."""
+    pattern = ""
     for words, name, *_ in Formatter().parse(template):
         pattern += re.escape(words)
         if name is not None:
-            fields.append(name)
             pattern += "(.+?)"
-    return _Known(template, tuple(fields), re.compile(pattern, re.DOTALL))
+    return re.compile(pattern, re.DOTALL)

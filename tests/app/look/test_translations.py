@@ -4,6 +4,7 @@ import ast
 import importlib.util
 import re
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
@@ -85,12 +86,16 @@ def untranslated(ts_file: Path) -> list[str]:
     ]
 
 
+@lru_cache(maxsize=1)
+def calls_in(source: str) -> tuple[ast.Call, ...]:
+    nodes = ast.walk(ast.parse(source))
+    return tuple(node for node in nodes if isinstance(node, ast.Call))
+
+
 def bare_texts(source: str) -> list[str]:
     """Texts with letters that reach the screen without tr()."""
     found = []
-    for node in ast.walk(ast.parse(source)):
-        if not isinstance(node, ast.Call):
-            continue
+    for node in calls_in(source):
         name = getattr(node.func, "attr", getattr(node.func, "id", ""))
         for argument in node.args[: SHOWN.get(name, 0)]:
             match argument:
@@ -104,9 +109,8 @@ def formatted_texts(source: str) -> list[str]:
     """Calls of tr() with an f-string, which lupdate takes word for word."""
     return [
         ast.unparse(node)
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Call)
-        and getattr(node.func, "attr", "") == "tr"
+        for node in calls_in(source)
+        if getattr(node.func, "attr", "") == "tr"
         and any(isinstance(argument, ast.JoinedStr) for argument in node.args)
     ]
 
@@ -115,9 +119,8 @@ def plain_errors(source: str) -> list[str]:
     """Errors that are turned into words without a language."""
     return [
         ast.unparse(node)
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Call)
-        and ast.unparse(node.func) == "str"
+        for node in calls_in(source)
+        if getattr(node.func, "id", "") == "str"
         and any(ast.unparse(argument) == "error" for argument in node.args)
     ]
 
@@ -216,7 +219,7 @@ def missing_characters(text: str) -> set[str]:
             fonts.append((bold, QRawFont.fromFont(one)))
     return {
         character
-        for character in text
+        for character in set(text)
         if character.isprintable()
         for weight in (False, True)
         if not any(

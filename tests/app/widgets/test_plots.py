@@ -9,6 +9,7 @@ from PySide6.QtGui import QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import colors_in
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
@@ -42,12 +43,7 @@ def show(qtbot: QtBot, plot: Plot) -> None:
 
 def shown_colors(plot: Plot) -> set[str]:
     QApplication.processEvents()
-    image = plot.grab().toImage()
-    return {
-        image.pixelColor(x, y).name()
-        for x in range(image.width())
-        for y in range(image.height())
-    }
+    return colors_in(plot.grab().toImage())
 
 
 @pytest.fixture
@@ -123,10 +119,7 @@ def test_the_picture_is_saved_at_twice_its_size(
 
     saved = QImage(str(path))
     assert (saved.width(), saved.height()) == (720, 480)
-    colors = {
-        saved.pixelColor(x, y).name() for x in range(720) for y in range(100, 400)
-    }
-    assert DARK.accent in colors
+    assert DARK.accent in colors_in(saved.copy(0, 100, 720, 300))
 
 
 @pytest.mark.parametrize("save", ["save_png", "save_csv"])

@@ -30,6 +30,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.undressed import undressed
 from typing_extensions import override
 
 from lightpen.cameras.pairing import not_synchronised
@@ -97,7 +98,8 @@ def exposure(seen: "Seen") -> str:
 
 @pytest.fixture
 def page(qtbot: QtBot, workbench: Workbench) -> Iterator[CameraPage]:
-    page = CameraPage(workbench, Silence())
+    with undressed():
+        page = CameraPage(workbench, Silence())
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.undressed import undressed
 
 from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
@@ -112,7 +113,8 @@ def save_as(seen: "Seen", path: Path) -> None:
 
 @pytest.fixture
 def seen(qtbot: QtBot, workbench: Workbench, see: "See") -> Iterator["Seen"]:
-    page = LedsPage(workbench)
+    with undressed():
+        page = LedsPage(workbench)
     qtbot.addWidget(page)
     page.resize(976, 600)
     page.show()

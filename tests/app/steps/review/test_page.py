@@ -3,16 +3,17 @@
 import json
 import re
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from hashlib import sha256
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QEvent, QPoint, QPointF, Qt, QThreadPool, QUrl
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRect, Qt, QThreadPool, QUrl
 from PySide6.QtGui import QImage, QMouseEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -28,6 +29,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.pictures import colors_in
+from tests.app.undressed import undressed
 
 from lightpen.arrays import FloatArray
 from lightpen.detection.reasons import Reason
@@ -39,8 +42,10 @@ from lightpen.model.origin import Origin
 from lightpen.record.assumed import PREFIX
 from lightpen.record.library_changes import Author, add_item
 from lightpen.record.names import Names
-from lightpen.record.reading import DISCARDED, open_record
+from lightpen.record.reading import DISCARDED, Record, open_record
+from lightpen.record.recorded_source import source
 from lightpen.record.results import Result
+from lightpen.record.solving import Solution, solve_again, solve_record
 from lightpen.record.tip_library import ListedTip
 from lightpen.record.writing import RecordWriter
 from lightpen.simulator.image_plans import ImagePlan, render_plan
@@ -50,8 +55,14 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import swing_from_postures
 from lightpen.simulator.view import still_view
 from lightpen.swing.preparation import Preparation
-from lightpen.swing.resuming import Resumable, read_for_more, read_resumable
+from lightpen.swing.resuming import (
+    Resumable,
+    read_for_more,
+    read_resumable,
+    recorded_setup,
+)
 from lightpen.swing.shortfall import N_MORE
+from lightpen.swing.state import SwingState
 from lightpen_app.look.theme import Tone, colors_of
 from lightpen_app.paper.preview import PaperWindow
 from lightpen_app.steps.page import MainAction
@@ -119,6 +130,44 @@ def recorded(small_scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return folder / "swing"
 
 
+class SolvedOnce:
+    """Reads and solves each swing once, however often it is copied."""
+
+    def __init__(self) -> None:
+        self._resumed: dict[str, SwingState] = {}
+        self._solved: dict[str, Solution] = {}
+
+    def read(self, folder: Path) -> Resumable:
+        """Return a swing as `read_resumable` does."""
+        content = content_of(folder)
+        if content not in self._resumed:
+            self._resumed[content] = read_resumable(folder).state
+        record = open_record(folder)
+        return Resumable(record, recorded_setup(record), self._resumed[content])
+
+    def solve(
+        self, record: Record, report: Callable[[float], None] = lambda fraction: None
+    ) -> Solution:
+        """Return a solution as `solve_record` does."""
+        content = content_of(record.folder)
+        if content not in self._solved:
+            self._solved[content] = solve_record(record, report)
+        return replace(self._solved[content], source=source(record))
+
+
+def content_of(folder: Path) -> str:
+    """Return the checksum of all that state and tip of a swing depend on."""
+    header = json.loads((folder / "header.json").read_bytes())
+    del header["checksum"]
+    for judged_by in ("max_uncertainty_mm", "origin"):
+        header["settings"].pop(judged_by, None)
+    checksum = sha256(json.dumps(header).encode())
+    for file in sorted(folder.rglob("*")):
+        if file.is_file() and file.name != "header.json":
+            checksum.update(file.name.encode() + file.read_bytes())
+    return checksum.hexdigest()
+
+
 @dataclass(frozen=True)
 class Bed:
     """Shows the page of a swing that was solved."""
@@ -128,6 +177,7 @@ class Bed:
     swing: Path
     pages: list[ReviewPage]
     rewrite_header: Callable[..., None]
+    solved_once: SolvedOnce
     origin: Origin = Origin.LIVE
 
     def solve(self, limit: float = 0.05) -> Workbench:
@@ -137,7 +187,7 @@ class Bed:
         settings = {"max_uncertainty_mm": limit, "origin": self.origin}
         self.rewrite_header(folder, settings)
         before = workbench.run.status.assessment
-        workbench.run.runner.go_on(read_resumable(folder))
+        workbench.run.runner.go_on(self.solved_once.read(folder))
         workbench.run.runner.finish()
         self.qtbot.waitUntil(
             lambda: workbench.run.status.assessment not in (None, before)
@@ -158,7 +208,8 @@ class Bed:
 
     def show(self) -> ReviewPage:
         """Show the page."""
-        page = ReviewPage(self.workbench)
+        with undressed():
+            page = ReviewPage(self.workbench)
         self.pages.append(page)
         self.qtbot.addWidget(page)
         page.resize(1000, 600)
@@ -168,17 +219,25 @@ class Bed:
         return page
 
 
+@pytest.fixture(scope="module")
+def solved_once() -> SolvedOnce:
+    return SolvedOnce()
+
+
 @pytest.fixture
 def bed(
     qtbot: QtBot,
     workbench: Workbench,
     recorded: Path,
     rewrite_header: Callable[..., None],
+    solved_once: SolvedOnce,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[Bed]:
     """Lay a recorded swing ready."""
+    monkeypatch.setattr("lightpen.swing.course.solve_record", solved_once.solve)
     folder = workbench.run.records_folder / "swing"
     shutil.copytree(recorded, folder)
-    bed = Bed(qtbot, workbench, folder, [], rewrite_header)
+    bed = Bed(qtbot, workbench, folder, [], rewrite_header, solved_once)
     yield bed
     for page in bed.pages:
         page.shut_down()
@@ -766,10 +825,11 @@ def test_plots_that_were_not_looked_at_are_saved_whole_and_with_their_mark(
             assert picture.height() == pytest.approx(later.height(), rel=0.1), name
     colors = colors_of(page.palette())
     for name, picture in pictures.items():
-        foot = range(picture.height() - PNG_SCALE * MARK_HEIGHT, picture.height())
-        right = range(picture.width() // 2, picture.width())
-        seen = {picture.pixelColor(x, y).name() for x in right for y in foot}
-        assert seen >= {colors.panel, colors.warn}, name
+        middle, height = picture.width() // 2, PNG_SCALE * MARK_HEIGHT
+        foot = QRect(
+            middle, picture.height() - height, picture.width() - middle, height
+        )
+        assert colors_in(picture.copy(foot)) >= {colors.panel, colors.warn}, name
 
 
 def test_the_change_since_nominal_is_shown_where_it_is_known(bed: Bed) -> None:
@@ -969,20 +1029,30 @@ def test_a_click_on_the_misfit_chooses_the_image(
 
 
 def test_an_image_is_taken_out_and_put_back_with_the_tip_solved_at_once(
-    page: ReviewPage, workbench: Workbench, qtbot: QtBot
+    page: ReviewPage,
+    workbench: Workbench,
+    qtbot: QtBot,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    may_solve = Event()
+
+    def solve(solution: Solution, taken_out: Mapping[int, str]) -> Solution:
+        assert may_solve.wait(PATIENCE_MS / 1000)
+        return solve_again(solution, taken_out)
+
+    monkeypatch.setattr("lightpen.swing.course.solve_again", solve)
     before = tip(workbench).copy()
     number = table(page).number()
     assert number is not None
     assert not button(page, "Put back").isEnabled()
     assert button(page, "Put back").toolTip() == "It takes part already."
 
-    hindrances: list[str] = []
-    page.changed.connect(lambda: hindrances.append(page.main_action().why_not))
     click(page, "Take out")
+    computed = "The tip is being computed."
+    qtbot.waitUntil(lambda: page.main_action().why_not == computed)
+    may_solve.set()
     await_count(qtbot, page, f"{N_IMAGES - 1} of {N_IMAGES} used; 1 taken out")
 
-    assert "The tip is being computed." in hindrances
     assert table(page).number() == number
     assert not np.array_equal(tip(workbench), before)
     assert open_record(workbench.run.records_folder / "swing").taken_out == {

@@ -25,6 +25,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 from pytestqt.qtbot import QtBot
+from tests.app.undressed import undressed
 from typing_extensions import override
 
 from lightpen.live.sources import Surroundings
@@ -69,7 +70,8 @@ class Opened:
     """A Start page on the screen, driven as an operator does."""
 
     def __init__(self, qtbot: QtBot, workbench: Workbench, sounds: Sounds) -> None:
-        self.page = StartPage(workbench, sounds)
+        with undressed():
+            self.page = StartPage(workbench, sounds)
         self.notices: list[str] = []
         self.statuses: list[str] = []
         self.steps: list[str] = []

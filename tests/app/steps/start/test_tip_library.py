@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QImage, QKeyEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLineEdit, QWidget
 from pytestqt.qtbot import QtBot
+from tests.app.undressed import undressed
 
 from lightpen.local_time import local_now
 from lightpen.model.rigid import rotation_from_vector
@@ -50,7 +51,8 @@ class Desk:
 
     def __init__(self, qtbot: QtBot, workbench: Workbench) -> None:
         self.qtbot, self.workbench = qtbot, workbench
-        self.page = StartPage(workbench, Silence())
+        with undressed():
+            self.page = StartPage(workbench, Silence())
         self.told: list[str] = []
         self.page.status_changed.connect(self.told.append)
         qtbot.addWidget(self.page)

@@ -17,7 +17,8 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.worker import Connection
 from lightpen.formats.decoding import encode_png
-from lightpen.live.sources import Surroundings, sample_files
+from lightpen.formats.opened_files import OpenedFiles
+from lightpen.live.sources import Surroundings
 from lightpen.model.limits import SwingLimits
 from lightpen.model.posture import Posture
 from lightpen.record.journal import JOURNAL
@@ -237,23 +238,25 @@ def recording(tmp_path_factory: pytest.TempPathFactory, small_scene: Scene) -> P
 def shared_desk(
     tmp_path_factory: pytest.TempPathFactory,
     around: Surroundings,
+    samples: OpenedFiles,
     dressed: QApplication,
 ) -> Iterator[Desk]:
     """A desk at which one test goes on where the last has left off."""
     folder = tmp_path_factory.mktemp("shared")
     settings = Settings(folder / "lightpen.json")
     workbench = Workbench(settings, folder / "data", around)
-    files = sample_files(around, folder / "samples")
     workbench.set_preparation(
         replace(
             workbench.preparation,
             names=NAMES,
             limits=SHORT,
-            camera_file=files.camera_file,
-            pen_file=files.pen_file,
+            camera_file=samples.camera_file,
+            pen_file=samples.pen_file,
         )
     )
-    desk = Desk(workbench, settings)
+    with pytest.MonkeyPatch.context() as unhurried:  # that of each test comes later
+        unhurried.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 300)
+        desk = Desk(workbench, settings)
     yield desk
     desk.close()
 
