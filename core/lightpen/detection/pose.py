@@ -210,12 +210,11 @@ def start_poses(
     _require_seen(pixels)
     rotations = np.full((len(pixels), 3, 3), np.nan)
     translations = np.full((len(pixels), 3), np.nan)
-    for i, points in enumerate(pixels):
+    for i, points in enumerate(camera.unproject(pixels)):
         seen = np.isfinite(points[:, 0])
-        normalised = camera.unproject(points[seen])
         try:
             solved, vector, translation = cv2.solvePnP(
-                pen.leds[seen], normalised, np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
+                pen.leds[seen], points[seen], np.eye(3), None, flags=cv2.SOLVEPNP_SQPNP
             )
         except cv2.error:  # points that coincide
             continue
