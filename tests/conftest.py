@@ -323,16 +323,15 @@ def scene(
 
 
 @pytest.fixture(scope="session")
-def record(
+def calibrated(
     lightpen: Callable[..., CompletedProcess[str]], once: MakeOnce
-) -> Callable[..., dict[str, Any]]:
-    """Return a function that calibrates from a set and reads the JSON, each set once.
+) -> Callable[..., Path]:
+    """Return a function that calibrates from a set, each once, and returns a folder.
 
-    The JSON holds the printed text, too, as `text`.
+    It holds what was printed, `printed.txt`, and the JSON, `calibration.json`.
     """
 
-    @cache
-    def calibrated(folder: Path, *options: str) -> dict[str, Any]:
+    def calibrate_once(folder: Path, *options: str) -> Path:
         def calibrate(place: Path) -> None:
             given = options if "--centers" in options else (folder / "images", *options)
             outcome = lightpen(
@@ -344,14 +343,28 @@ def record(
             assert outcome.returncode == 0, outcome.stderr
             (place / "printed.txt").write_text(outcome.stdout, encoding="utf-8")
 
-        place = once(f"record {folder} {options}", calibrate)
+        return once(f"record {folder} {options}", calibrate)
+
+    return calibrate_once
+
+
+@pytest.fixture(scope="session")
+def record(calibrated: Callable[..., Path]) -> Callable[..., dict[str, Any]]:
+    """Return a function that calibrates from a set and reads the JSON, each set once.
+
+    The JSON holds the printed text, too, as `text`.
+    """
+
+    @cache
+    def read(folder: Path, *options: str) -> dict[str, Any]:
+        place = calibrated(folder, *options)
         fields: dict[str, Any] = json.loads(
             (place / "calibration.json").read_text(encoding="utf-8"),
             parse_constant=_refuse_constant,
         )
         return fields | {"text": (place / "printed.txt").read_text(encoding="utf-8")}
 
-    return calibrated
+    return read
 
 
 @pytest.fixture(scope="session")
