@@ -253,19 +253,33 @@ def _profiles(image: Image, rays: _Rays, s: FloatArray) -> FloatArray:
     It is the mean of two lines, so that hardly a pixel is passed over.
     """
     beside = BESIDE * rays.normals[:, ::-1] * np.array([-1.0, 1.0])
-    lines = [_line(image, rays.feet + side * beside, rays, s) for side in (-1, 1)]
-    return 0.5 * (lines[0] + lines[1])
+    feet = np.stack([rays.feet - beside, rays.feet + beside])
+    one, other = _light_at(
+        image,
+        *(feet[..., k, None] + rays.normals[:, k, None] * s for k in range(2)),
+    )
+    return np.asarray(0.5 * (one + other))
 
 
-def _line(image: Image, feet: FloatArray, rays: _Rays, s: FloatArray) -> FloatArray:
-    """Return the light at distances s from feet along the rays, (N, S)."""
+def _light_at(image: Image, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the light between four pixels, beyond the border that of the border."""
     height, width = image.shape
-    x, y = (feet[:, k, None] + rays.normals[:, k, None] * s for k in range(2))
-    x, y = np.clip(x, 0, width - 1.001), np.clip(y, 0, height - 1.001)
+    x = np.minimum(np.maximum(x, 0), width - 1.001)
+    y = np.minimum(np.maximum(y, 0), height - 1.001)
     column, row = x.astype(np.int64), y.astype(np.int64)
-    x, y = x - column, y - row
-    above = image[row, column] * (1 - x) + image[row, column + 1] * x
-    below = image[row + 1, column] * (1 - x) + image[row + 1, column + 1] * x
+    x -= column
+    y -= row
+    left, top = int(column.min()), int(row.min())
+    near = image[top : int(row.max()) + 2, left : int(column.max()) + 2].astype(float)
+    width = near.shape[1]
+    row -= top
+    row *= width
+    row += column
+    row -= left
+    fields = near.ravel()
+    rest = 1 - x
+    above = fields.take(row) * rest + fields[1:].take(row) * x
+    below = fields[width:].take(row) * rest + fields[width + 1 :].take(row) * x
     return np.asarray(above * (1 - y) + below * y)
 
 
