@@ -95,7 +95,7 @@ def assert_refused(outcome: CompletedProcess[str], *words: str) -> None:
 def assert_tip(
     outcome: CompletedProcess[str], swing: Swing, tolerance: float = 0.02
 ) -> None:
-    """Assert status 0 and the right tip in the text; 0.02 mm suits 0.015 px of noise."""
+    """Assert status 0 and the right tip in the text; 0.02 mm suits 0.015 px noise."""
     assert outcome.returncode == 0, outcome.stderr
     line = re.search(r"joint((?:\s+-?\d+\.\d+){3})", outcome.stdout)
     assert line is not None

@@ -329,7 +329,9 @@ def test_another_layout_gives_its_tip_or_is_refused(
 def test_clutter_and_missing_leds_never_mislabel_another_layout(
     pen: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene(*SMALL, "--pen", pen, "--scene", "hard", "--images", "40", "--seed", "6")
+    folder = scene(
+        *SMALL, "--pen", pen, "--scene", "hard", "--images", "40", "--seed", "6"
+    )
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
