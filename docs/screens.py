@@ -92,6 +92,7 @@ N_EARLIER = 24  # calibrations in the history
 REFRESH_MS = 200  # of the plots
 COMPARING_MS = 1500  # after which the LEDs of the file were compared with the images
 PAUSE = 0.01  # s between two looks at what is waited for
+PATIENCE_MS = 120_000  # of all that is waited for, on a machine that does other things
 
 
 @dataclass(frozen=True)
@@ -193,7 +194,10 @@ class Stage:
         What a page shows after a moment, however late that is, comes before.
         """
         before, now = None, look()
+        deadline = QDeadlineTimer(PATIENCE_MS)
         while now != before:
+            if deadline.hasExpired():
+                raise TimeoutError("The page does not come to rest.")
             self._wait_until(lambda: not self._is_about_to_change())
             before, now = now, look()
         return now
@@ -208,7 +212,7 @@ class Stage:
 
     def _fill_start(self) -> None:
         self.wizard.window.page().entered()
-        QThreadPool.globalInstance().waitForDone()
+        _await_jobs()
 
     def _fill_camera(self) -> None:
         for index in range(N_SHOWN):
@@ -219,7 +223,7 @@ class Stage:
             self._show_image(index)
         compared = QDeadlineTimer(COMPARING_MS)
         self._wait_until(compared.hasExpired)
-        QThreadPool.globalInstance().waitForDone()
+        _await_jobs()
 
     def _fill_swing(self) -> None:
         swing = _swing(self._workbench.preparation.swing_setup(), self._scene)
@@ -233,7 +237,7 @@ class Stage:
         self._wait_until(refreshed.hasExpired)
 
     def _fill_review(self) -> None:
-        QThreadPool.globalInstance().waitForDone()
+        _await_jobs()
 
     def _fill_verify(self) -> None:
         run, verification = self._workbench.run, self._workbench.verification
@@ -259,9 +263,9 @@ class Stage:
             append(logbook.database, logbook.chain, _earlier_calibration(n))
         self.wizard.window.page().entered()
         self._wait_until(lambda: self._n_shown() >= N_EARLIER)
-        QThreadPool.globalInstance().waitForDone()
+        _await_jobs()
         self._settle()
-        QThreadPool.globalInstance().waitForDone()  # of the trend, which follows
+        _await_jobs()  # of the trend, which follows
 
     def _n_shown(self) -> int:
         table = self.wizard.window.page().findChild(HistoryTable)
@@ -296,7 +300,10 @@ class Stage:
 
     def _wait_until(self, condition: Callable[[], bool]) -> None:
         self._settle()
+        deadline = QDeadlineTimer(PATIENCE_MS)
         while not condition():
+            if deadline.hasExpired():
+                raise TimeoutError("What is waited for does not come.")
             time.sleep(PAUSE)  # the work that is waited for needs the processor, too
             self._settle()
 
@@ -321,6 +328,11 @@ def draw(stage: Stage, step: str) -> Iterator[tuple[str, QImage]]:
     for each in LOOKS:
         stage.set_look(each)
         yield each.file_name(step), stage.picture()
+
+
+def _await_jobs() -> None:
+    if not QThreadPool.globalInstance().waitForDone(PATIENCE_MS):
+        raise TimeoutError("A job does not end.")
 
 
 def _earlier_result() -> Result:

@@ -2026,6 +2026,10 @@
         <translation>LED</translation>
     </message>
     <message>
+        <source>Open the file of this pen&apos;s LEDs; it is compared with what the recorded images show.</source>
+        <translation>打开本光笔的 LED 文件；程序将其与录制的图像进行比较。</translation>
+    </message>
+    <message>
         <source>Open the file of this pen&apos;s LEDs and hold the pen before the camera.</source>
         <translation>打开本光笔的 LED 文件，并把光笔举在相机前。</translation>
     </message>

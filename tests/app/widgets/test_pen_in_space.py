@@ -48,7 +48,8 @@ def test_pen_and_goal_are_drawn(qtbot: QtBot) -> None:
 
     def drawn(stand: PenStand | None) -> bytes:
         view.set_value(stand)
-        return bytes(view.grab().toImage().constBits())
+        picture = view.grab().toImage()  # its bits are there as long as it is
+        return bytes(picture.constBits())
 
     pictures = [
         drawn(stand)

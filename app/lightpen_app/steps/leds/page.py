@@ -121,6 +121,11 @@ class LedsPage(Rearranged, Page):
 
     @override
     def lead(self) -> str:
+        if self._workbench.preparation.source.kind == SourceKind.RECORDED:
+            return self.tr(
+                "Open the file of this pen's LEDs; it is compared with what the "
+                "recorded images show."
+            )
         return self.tr(
             "Open the file of this pen's LEDs and hold the pen before the camera."
         )

@@ -216,6 +216,16 @@ def test_the_simulated_pens_file_is_offered_for_that_pen_alone(
         seen.named("Use the simulated pen's file")
 
 
+def test_a_pen_is_to_be_held_before_a_camera_alone(
+    seen: "Seen", workbench: Workbench
+) -> None:
+    assert seen.page.lead().endswith("hold the pen before the camera.")
+
+    recorded = SourceChoice(SourceKind.RECORDED, "")
+    workbench.set_preparation(replace(workbench.preparation, source=recorded))
+    assert seen.page.lead().endswith("what the recorded images show.")
+
+
 def test_the_step_is_closed_until_names_and_camera_are_there(
     seen: "Seen", workbench: Workbench
 ) -> None:
