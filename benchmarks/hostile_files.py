@@ -92,6 +92,7 @@ def spoiled(good: list[Sample], folder: Path, seed: int) -> Ending:
     rng = np.random.default_rng([SEED, seed])
     sample = good[int(rng.integers(len(good)))]
     path = folder / sample.name
+    path.unlink(missing_ok=True)  # a disk takes long to empty a file for another
     path.write_bytes(mutated(sample.data, rng))
     start = time.process_time()
     try:

@@ -15,9 +15,11 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -39,6 +41,8 @@ SEED = 5
 N_KILLS = 60  # of each kind
 LONGEST = 0.3  # s that a process lives
 VICTIM = Path(__file__).with_name("write_until_killed.py")
+
+Victim: TypeAlias = "subprocess.Popen[str]"
 
 # Whether all is whole in a data folder after a kill, by what was told before it.
 Check = Callable[[Path, list[str]], bool]
@@ -67,7 +71,8 @@ def hostile_kill_rows() -> list[Row]:
     """Return what was left after kills of each kind of write."""
     if not hasattr(os, "fork"):
         return [Row("killed while it writes", "needs processes that fork")]
-    outcomes = {kind: killed(kind, N_KILLS) for kind in CHECKS}
+    with start_victim() as victim:
+        outcomes = {kind: killed(victim, kind, N_KILLS) for kind in CHECKS}
     return [
         Row(
             f"killed {N_KILLS} times while it writes ({kind}), {outcome.n_told} writes "
@@ -80,29 +85,36 @@ def hostile_kill_rows() -> list[Row]:
     ]
 
 
-def killed(kind: str, n_kills: int) -> KillCount:
+def start_victim() -> Victim:
+    """Return a process that writes what it is told to, by one that can be killed."""
+    return subprocess.Popen(
+        [sys.executable, str(VICTIM)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+    )
+
+
+def killed(victim: Victim, kind: str, n_kills: int) -> KillCount:
     """Kill a process again and again while it writes; return what was left."""
     rng = np.random.default_rng(SEED)
     n_sound = n_told = n_left = 0
     with tempfile.TemporaryDirectory(prefix="lightpen-kills-") as folder:
         data = Path(folder)
         make_data(data)
-        words = [sys.executable, str(VICTIM), kind, folder]
-        with subprocess.Popen(
-            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8"
-        ) as victim:
-            for _ in range(n_kills):
-                told = _told_until_killed(victim, float(rng.uniform(0, LONGEST)))
-                n_told += len(told)
-                n_sound += CHECKS[kind](data, told)
-                n_left += _n_left_after_start(data)
+        for _ in range(n_kills):
+            seconds = float(rng.uniform(0, LONGEST))
+            told = _told_until_killed(victim, f"{kind}\t{folder}\n", seconds)
+            n_told += len(told)
+            n_sound += CHECKS[kind](data, told)
+            n_left += _n_left_after_start(data)
     return KillCount(n_told, n_sound, n_left)
 
 
-def _told_until_killed(victim: "subprocess.Popen[str]", seconds: float) -> list[str]:
+def _told_until_killed(victim: Victim, wanted: str, seconds: float) -> list[str]:
     assert victim.stdin is not None
     assert victim.stdout is not None
-    victim.stdin.write("go\n")
+    victim.stdin.write(wanted)
     victim.stdin.flush()
     child = int(victim.stdout.readline())
     time.sleep(seconds)
@@ -129,9 +141,12 @@ def _swings_are_whole(data: Path, told: list[str]) -> bool:
     """Check that every image that was acknowledged is there as it was."""
     if find_unfinished(data / RECORDS).damaged:
         return False
+    kept = defaultdict[str, set[int]](set)
+    for name, number in map(str.split, told):
+        kept[name].add(int(number))
     return all(
-        int(line.split()[1]) in _sound_images(data / RECORDS / line.split()[0])
-        for line in told
+        numbers <= _sound_images(data / RECORDS / name)
+        for name, numbers in kept.items()
     )
 
 

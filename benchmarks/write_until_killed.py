@@ -1,9 +1,9 @@
 """Write one kind of file over and over in a process of its own, to be killed.
 
-Usage: python benchmarks/write_until_killed.py KIND FOLDER
+Usage: python benchmarks/write_until_killed.py
 
-For each line of its input it forks; the child tells its number, and then each write
-that it has acknowledged.
+For each line of its input, a kind and a folder with a tab between, it forks; the child
+tells its number, and then each write that it has acknowledged.
 """
 
 import json
@@ -129,12 +129,12 @@ KINDS: dict[str, Callable[[Path], None]] = {
 
 def main() -> int:
     """Write until killed, once for each line of the input."""
-    kind, data = sys.argv[1], Path(sys.argv[2])
-    for _ in sys.stdin:
+    for line in sys.stdin:
+        kind, folder = line.rstrip("\n").split("\t")
         child = os.fork()
         if child == 0:
             tell(os.getpid())
-            KINDS[kind](data)
+            KINDS[kind](Path(folder))
         os.waitpid(child, 0)
         tell("dead")
     return 0

@@ -323,35 +323,51 @@ def scene(
 
 
 @pytest.fixture(scope="session")
-def record(
+def calibration_of(
     lightpen: Callable[..., CompletedProcess[str]], once: MakeOnce
-) -> Callable[..., dict[str, Any]]:
-    """Return a function that calibrates from a set and reads the JSON, each set once.
+) -> Callable[..., Path]:
+    """Return a function that calibrates from a set or a recorded swing, each once.
+
+    It returns a folder with what was printed, `printed.txt`, and the JSON,
+    `calibration.json`.
+    """
+
+    def calibrated(folder: Path, *options: str) -> Path:
+        files: tuple[str | Path, ...] = ()
+        images = folder
+        if (folder / "leds.csv").exists():
+            files = "--camera", folder / "camera.yaml", "--pen", folder / "leds.csv"
+            images = folder / "images"
+
+        def calibrate(place: Path) -> None:
+            given = options if "--centers" in options else (images, *options)
+            json_file = place / "calibration.json"
+            outcome = lightpen("calibrate", *given, *files, "--json", json_file)
+            assert outcome.returncode == 0, outcome.stderr
+            (place / "printed.txt").write_text(outcome.stdout, encoding="utf-8")
+
+        return once(f"record {folder} {options}", calibrate)
+
+    return calibrated
+
+
+@pytest.fixture(scope="session")
+def record(calibration_of: Callable[..., Path]) -> Callable[..., dict[str, Any]]:
+    """Return a function that calibrates as `calibration_of`, and reads the JSON.
 
     The JSON holds the printed text, too, as `text`.
     """
 
     @cache
-    def calibrated(folder: Path, *options: str) -> dict[str, Any]:
-        def calibrate(place: Path) -> None:
-            given = options if "--centers" in options else (folder / "images", *options)
-            outcome = lightpen(
-                "calibrate", *given,
-                "--camera", folder / "camera.yaml",
-                "--pen", folder / "leds.csv",
-                "--json", place / "calibration.json",
-            )  # fmt: skip
-            assert outcome.returncode == 0, outcome.stderr
-            (place / "printed.txt").write_text(outcome.stdout, encoding="utf-8")
-
-        place = once(f"record {folder} {options}", calibrate)
+    def read(folder: Path, *options: str) -> dict[str, Any]:
+        place = calibration_of(folder, *options)
         fields: dict[str, Any] = json.loads(
             (place / "calibration.json").read_text(encoding="utf-8"),
             parse_constant=_refuse_constant,
         )
         return fields | {"text": (place / "printed.txt").read_text(encoding="utf-8")}
 
-    return calibrated
+    return read
 
 
 @pytest.fixture(scope="session")
@@ -529,14 +545,14 @@ def _record_swing(folder: Path, n_images: int, *, by_two: bool) -> None:
     assert isinstance(live[0], SimulatedCamera)
     live[0].operator.seat()
     follower = Follower(live[0].operator)
+    before: Sequence[Sighting | None] = [None] * len(live)
     setup = preparation.swing_setup()
     state = start_swing(setup)
-    before: Sequence[Sighting | None] = [None for _ in live]
     with RecordWriter.create(folder, preparation.header()) as writer:
         while state.n_kept < n_images:
             frames = [camera.read(1.0) for camera in live]
             before = sighting, *others = [
-                look(frame.image, aim.camera, aim.pen, aim.mask, last)
+                look(frame.image, aim.camera, aim.pen, aim.mask, last, is_followed=True)
                 for frame, aim, last in zip(frames, setup.aims, before, strict=True)
                 if aim.camera is not None and aim.pen is not None
             ]

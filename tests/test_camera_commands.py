@@ -1,6 +1,7 @@
 """Tests of the commands about cameras: intrinsics, extrinsics, board, check-camera."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -123,9 +124,9 @@ def test_a_page_of_another_kind_is_refused(
 
 
 def test_a_swing_says_whether_file_and_camera_agree(
-    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    scene: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    swing = shared_data / "swing-clean"
+    swing = scene("--binning", "2", "--images", "40", "--seed", "8")
     record_file = tmp_path / "record.json"
     status = run(
         *("check-camera", swing, "--camera", swing / "camera.yaml"),

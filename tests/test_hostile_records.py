@@ -4,9 +4,10 @@ The same trials as those of the benchmark's section `hostile`, in small.
 """
 
 import os
+from collections.abc import Iterator
 
 import pytest
-from benchmarks.hostile_kills import CHECKS, killed
+from benchmarks.hostile_kills import CHECKS, Victim, killed, start_victim
 from benchmarks.hostile_records import (
     Data,
     foreign_errors,
@@ -30,10 +31,18 @@ def test_damaged_files_end_in_the_errors_of_the_program_alone(data: Data) -> Non
     assert foreign_errors(data, N_MUTATIONS) == []
 
 
+@pytest.fixture(scope="module")
+def victim() -> Iterator[Victim]:
+    with start_victim() as process:
+        yield process
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 @pytest.mark.parametrize("kind", CHECKS)
-def test_a_killed_write_loses_nothing_and_leaves_nothing(kind: str) -> None:
-    outcome = killed(kind, N_KILLS)
+def test_a_killed_write_loses_nothing_and_leaves_nothing(
+    kind: str, victim: Victim
+) -> None:
+    outcome = killed(victim, kind, N_KILLS)
 
     assert outcome.n_sound == N_KILLS
     assert outcome.n_left == 0

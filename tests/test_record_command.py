@@ -49,21 +49,31 @@ def calibrated(
 Calibrated = Callable[..., tuple[dict[str, Any], str]]
 
 
-def test_the_tip_is_that_of_the_wizard_to_the_last_bit(
-    calibrated: Calibrated, folder: Path
-) -> None:
-    fields, text = calibrated(folder)
-    joint = solve_record(open_record(folder)).calibration.joint
+@pytest.fixture
+def untouched(
+    swung: Callable[..., Path], record: Callable[..., dict[str, Any]]
+) -> dict[str, Any]:
+    """The JSON of the record that nobody changed, with the `text`."""
+    return record(swung())
 
-    assert fields["tip_pen_mm"] == joint.tip_pen.tolist()
-    assert fields["cone_cam_mm"] == joint.cone_cam.tolist()
-    assert f"{N_IMAGES} of {N_IMAGES} used" in text
+
+def test_the_tip_is_that_of_the_wizard_to_the_last_bit(
+    untouched: dict[str, Any], swung: Callable[..., Path]
+) -> None:
+    joint = solve_record(open_record(swung())).calibration.joint
+
+    assert untouched["tip_pen_mm"] == joint.tip_pen.tolist()
+    assert untouched["cone_cam_mm"] == joint.cone_cam.tolist()
+    assert f"{N_IMAGES} of {N_IMAGES} used" in untouched["text"]
 
 
 def test_the_record_may_be_called_from_another_folder_or_with_a_slash(
-    calibrated: Calibrated, folder: Path, monkeypatch: pytest.MonkeyPatch
+    calibrated: Calibrated,
+    untouched: dict[str, Any],
+    folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    tip = calibrated(folder)[0]["tip_pen_mm"]
+    tip = untouched["tip_pen_mm"]
     monkeypatch.chdir(folder)
 
     assert calibrated(Path())[0]["tip_pen_mm"] == tip
@@ -72,28 +82,28 @@ def test_the_record_may_be_called_from_another_folder_or_with_a_slash(
 
 def test_a_swing_that_another_program_captures_can_be_calibrated(
     calibrated: Calibrated,
+    untouched: dict[str, Any],
     folder: Path,
     holding: Callable[[Path], "subprocess.Popen[str]"],
 ) -> None:
-    tip = calibrated(folder)[0]["tip_pen_mm"]
     holding(folder)
 
-    assert calibrated(folder)[0]["tip_pen_mm"] == tip
+    assert calibrated(folder)[0]["tip_pen_mm"] == untouched["tip_pen_mm"]
 
 
 def test_the_nominal_tip_of_the_record_is_compared_with(
-    calibrated: Calibrated, folder: Path
+    untouched: dict[str, Any],
 ) -> None:
-    fields, text = calibrated(folder)
+    nominal = untouched["nominal_tip_mm"]
 
-    assert fields["nominal_tip_mm"] == pytest.approx([0.0, -95.0, -25.0], abs=100)
-    assert "change from nominal" in text
+    assert nominal == pytest.approx([0.0, -95.0, -25.0], abs=100)
+    assert "change from nominal" in untouched["text"]
 
 
 def test_the_files_of_the_record_are_named_with_their_hashes(
-    calibrated: Calibrated, folder: Path
+    untouched: dict[str, Any], swung: Callable[..., Path]
 ) -> None:
-    inputs = calibrated(folder)[0]["inputs"]
+    inputs, folder = untouched["inputs"], swung()
 
     assert (inputs["camera"]["file"], inputs["pen"]["file"]) == (
         "camera.yaml",
@@ -106,24 +116,24 @@ def test_the_files_of_the_record_are_named_with_their_hashes(
 
 
 def test_the_verdict_goes_by_the_limits_of_the_record(
-    calibrated: Calibrated, folder: Path
+    untouched: dict[str, Any],
 ) -> None:
-    fields, text = calibrated(folder)
-    verdict = fields["verdict"]
+    verdict = untouched["verdict"]
 
     assert verdict["grade"] == "repeat"
     assert verdict["limits"]["max_uncertainty_mm"] == 1e-6
     assert verdict["limits"]["min_images"] == N_IMAGES
     assert verdict["text"].startswith("U (k = 2) of the tip is 0.0")
-    assert f"Verdict      REPEAT: {verdict['text']}\n" in text
+    assert f"Verdict      REPEAT: {verdict['text']}\n" in untouched["text"]
 
 
-def test_both_methods_can_be_asked_for(calibrated: Calibrated, folder: Path) -> None:
+def test_both_methods_can_be_asked_for(
+    calibrated: Calibrated, untouched: dict[str, Any], folder: Path
+) -> None:
     two_stage, _ = calibrated(folder, "--method", "two-stage")
-    joint, _ = calibrated(folder)
 
     assert two_stage["method"] == "two-stage"
-    assert two_stage["tip_pen_mm"] != joint["tip_pen_mm"]
+    assert two_stage["tip_pen_mm"] != untouched["tip_pen_mm"]
 
 
 def test_images_taken_out_are_named_with_their_reason(
@@ -145,9 +155,9 @@ def test_images_taken_out_are_named_with_their_reason(
 
 
 def test_taking_out_and_putting_back_gives_the_tip_of_before(
-    calibrated: Calibrated, folder: Path
+    calibrated: Calibrated, untouched: dict[str, Any], folder: Path
 ) -> None:
-    before = calibrated(folder)[0]["tip_pen_mm"]
+    before = untouched["tip_pen_mm"]
     note_taken_out(folder, {4: "taken out"})
     without = calibrated(folder)[0]["tip_pen_mm"]
     note_taken_out(folder, {})
@@ -271,9 +281,9 @@ def test_a_damaged_record_is_refused_with_what_is_wrong(
 
 
 def test_what_a_crash_left_behind_is_passed_over(
-    calibrated: Calibrated, folder: Path
+    calibrated: Calibrated, untouched: dict[str, Any], folder: Path
 ) -> None:
-    before = calibrated(folder)[0]["tip_pen_mm"]
+    before = untouched["tip_pen_mm"]
     with (folder / JOURNAL).open("ab") as journal:
         journal.write(b'{"kind": "image", "number": 21, "sha2')
     (folder / image_name(21)).write_bytes(b"half an image")

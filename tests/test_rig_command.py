@@ -18,7 +18,7 @@ Run = Callable[..., CompletedProcess[str]]
 @pytest.fixture(scope="module")
 def station(scene: Callable[..., Path]) -> Path:
     """Return a folder with what two cameras saw of 12 postures."""
-    return scene("--images", "12", "--seed", "3", "--cameras", "2")
+    return scene("--binning", "2", "--images", "12", "--seed", "3", "--cameras", "2")
 
 
 @pytest.fixture
@@ -177,13 +177,13 @@ def test_exchanged_folders_of_other_names_are_told_by_their_images(
 
 
 def test_images_of_another_size_name_the_camera(copied: Path, lightpen: Run) -> None:
-    for name, width in (("left", 2448), ("right", 2400)):
+    for name, width in (("left", 1224), ("right", 1200)):
         path = copied / f"{name}.yaml"
         text = path.read_text()
-        path.write_text(text.replace("image_width: 2448", f"image_width: {width}"))
+        path.write_text(text.replace("image_width: 1224", f"image_width: {width}"))
     outcome = calibrate(lightpen, copied)
 
-    assert_refused(outcome, "Camera right: 12 of 12 images are 2448 x 2048 px", 2)
+    assert_refused(outcome, "Camera right: 12 of 12 images are 1224 x 1024 px", 2)
     assert "They have the size of left" in outcome.stderr
 
 

@@ -17,7 +17,13 @@ Record = Callable[..., dict[str, Any]]
 Scene = Callable[..., Path]
 Truth = Callable[[Path], dict[str, Any]]
 
-HARD_SEEDS = ("1", "2", "3", "4", "24")
+HARD = ("--scene", "hard", "--images", "60", "--seed")
+SMALL = ("--binning", "2")  # a quarter of the pixels
+HARD_SCENES = tuple(
+    (*HARD, seed, *size)
+    for seed, size in (("1", ()), ("24", ()), ("2", SMALL), ("3", SMALL), ("4", SMALL))
+)
+CLEAN = (*SMALL, "--images", "40", "--seed", "8")
 OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")
 CALIBRATED = ("eight", "fanned")  # whatever becomes of the others
 
@@ -65,18 +71,16 @@ def assert_refused(outcome: CompletedProcess[str], words: str) -> None:
     assert outcome.stderr.rstrip().endswith(".")
 
 
-@pytest.fixture(params=HARD_SEEDS)
+@pytest.fixture(params=HARD_SCENES, ids=" ".join)
 def hard(request: pytest.FixtureRequest, scene: Scene) -> Path:
-    return scene("--scene", "hard", "--images", "60", "--seed", request.param)
+    return scene(*request.param)
 
 
 def test_a_hard_scene_holds_what_it_must(scene: Scene, truth: Truth) -> None:
     flags = {
         flag
-        for seed in HARD_SEEDS
-        for frame in truth(scene("--scene", "hard", "--images", "60", "--seed", seed))[
-            "frames"
-        ]
+        for options in HARD_SCENES
+        for frame in truth(scene(*options))["frames"]
         for flag in frame["flags"]
     }
     assert flags >= USELESS | {"clutter", "fingers", "missing", "saturated"}
@@ -112,7 +116,7 @@ def test_a_hard_scene_gives_an_uncertainty_that_covers_the_error(
 def test_noise_hardly_changes_the_covariance_of_a_hard_scene(
     scene: Scene, record: Record, tmp_path: Path
 ) -> None:
-    folder = scene("--scene", "hard", "--images", "60", "--seed", "24")
+    folder = scene(*HARD, "24")
     fields = record(folder)
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -162,7 +166,7 @@ def test_good_images_of_a_hard_scene_are_used(
 def test_hard_images_in_any_order_give_the_same_labels(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--scene", "hard", "--images", "60", "--seed", "3")
+    folder = scene(*HARD, "3", *SMALL)
     mixed = tmp_path / "images"
     mixed.mkdir()
     answer = truth(folder)
@@ -186,7 +190,7 @@ def test_hard_images_in_any_order_give_the_same_labels(
 def test_images_with_three_whole_leds_are_dropped_with_their_reason(
     scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--images", "40", "--seed", "8")
+    folder = scene(*CLEAN)
     images = tmp_path / "images"
     shutil.copytree(folder / "images", images)
     spoilt = truth(folder)["frames"][4:7]
@@ -196,7 +200,7 @@ def test_images_with_three_whole_leds_are_dropped_with_their_reason(
         assert image is not None
         for led in frame["leds"][:-3]:
             x, y = led["ellipse_center"]
-            cv2.circle(image, (round(x), round(y) - 20), 5, 200, cv2.FILLED)
+            cv2.circle(image, (round(x), round(y) - 10), 3, 200, cv2.FILLED)
         file.write_bytes(cv2.imencode(".png", image)[1].tobytes())
     out = tmp_path / "out.json"
     outcome = lightpen(
@@ -213,13 +217,13 @@ def test_images_with_three_whole_leds_are_dropped_with_their_reason(
 def test_images_without_any_pen_are_refused(
     scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    folder = scene("--images", "40", "--seed", "8")
+    folder = scene(*CLEAN)
     images = tmp_path / "images"
     images.mkdir()
     noise = np.random.default_rng(8)
     for i in range(6):
-        image = noise.integers(0, 40, (2048, 2448), dtype=np.uint8)
-        cv2.circle(image, (300 * i + 200, 900), 20, 255, -1)
+        image = noise.integers(0, 40, (1024, 1224), dtype=np.uint8)
+        cv2.circle(image, (150 * i + 100, 450), 10, 255, -1)
         (images / f"{i}.png").write_bytes(cv2.imencode(".png", image)[1].tobytes())
     outcome = lightpen(
         "calibrate", images,
@@ -232,7 +236,7 @@ def test_images_without_any_pen_are_refused(
 def test_images_of_any_depth_give_the_tip_to_8_um(
     bits: str, scene: Scene, record: Record, truth: Truth
 ) -> None:
-    folder = scene("--bits", bits, "--images", "12", "--seed", "8")
+    folder = scene(*SMALL, "--bits", bits, "--images", "12", "--seed", "8")
     image = cv2.imread(str(folder / "images" / "frame_0001.png"), cv2.IMREAD_UNCHANGED)
     assert image is not None
     assert image.dtype == (np.uint8 if bits == "8" else np.uint16)
@@ -246,7 +250,7 @@ def test_a_swing_about_one_axis_is_refused_and_the_axis_named(
     scene: Scene, lightpen: Run
 ) -> None:
     for seed in ("1", "2", "3"):
-        folder = scene("--swing", "one-axis", "--images", "12", "--seed", seed)
+        folder = scene(*SMALL, "--swing", "one-axis", "--images", "12", "--seed", seed)
         outcome = calibrate_set(lightpen, folder)
         assert_refused(outcome, "axis|direction")
         assert_refused(outcome, "tilt|lean|turn")
@@ -256,7 +260,7 @@ def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
     scene: Scene, lightpen: Run
 ) -> None:
     for seed in ("1", "2", "3"):
-        folder = scene("--swing", "upright", "--images", "12", "--seed", seed)
+        folder = scene(*SMALL, "--swing", "upright", "--images", "12", "--seed", seed)
         outcome = calibrate_set(lightpen, folder)
         assert_refused(outcome, "tilt|lean")
 
@@ -265,7 +269,7 @@ def test_a_swing_of_too_little_tilt_is_refused_and_tilt_asked_for(
 def test_degenerate_swings_are_refused_by_either_method(
     method: str, scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    folder = scene("--swing", "one-axis", "--images", "12", "--seed", "1")
+    folder = scene(*SMALL, "--swing", "one-axis", "--images", "12", "--seed", "1")
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--method", method, "--json", str(file))
     assert outcome.returncode == 1
@@ -276,7 +280,7 @@ def test_degenerate_swings_are_refused_by_either_method(
 def test_too_few_images_are_refused_and_more_asked_for(
     n_images: int, scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    folder = scene("--images", "40", "--seed", "8")
+    folder = scene(*CLEAN)
     images = tmp_path / "images"
     images.mkdir()
     for path in sorted((folder / "images").iterdir())[:n_images]:
@@ -291,7 +295,7 @@ def test_too_few_images_are_refused_and_more_asked_for(
 def test_one_image_again_and_again_is_refused(
     scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    folder = scene("--images", "40", "--seed", "8")
+    folder = scene(*CLEAN)
     images = tmp_path / "images"
     images.mkdir()
     for i in range(20):
@@ -308,7 +312,7 @@ def test_one_image_again_and_again_is_refused(
 def test_another_layout_gives_its_tip_or_is_refused(
     pen: str, seed: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--pen", pen, "--images", "24", "--seed", seed)
+    folder = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", seed)
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
@@ -325,7 +329,9 @@ def test_another_layout_gives_its_tip_or_is_refused(
 def test_clutter_and_missing_leds_never_mislabel_another_layout(
     pen: str, scene: Scene, lightpen: Run, truth: Truth, tmp_path: Path
 ) -> None:
-    folder = scene("--pen", pen, "--scene", "hard", "--images", "40", "--seed", "6")
+    folder = scene(
+        *SMALL, "--pen", pen, "--scene", "hard", "--images", "40", "--seed", "6"
+    )
     file = tmp_path / "out.json"
     outcome = calibrate_set(lightpen, folder, "--json", str(file))
     if outcome.returncode == 1:
@@ -351,8 +357,8 @@ def assert_pen_refused(lightpen: Run, folder: Path, pen: Path, some: Path) -> No
 def test_the_file_of_another_pen_is_refused(
     pen: str, scene: Scene, lightpen: Run, tmp_path: Path
 ) -> None:
-    images = scene("--images", "40", "--seed", "8")
-    other = scene("--pen", pen, "--images", "24", "--seed", "1")
+    images = scene(*CLEAN)
+    other = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", "1")
     assert_pen_refused(lightpen, images, other / "leds.csv", tmp_path / "some")
 
 
@@ -360,6 +366,6 @@ def test_the_file_of_another_pen_is_refused(
 def test_the_file_of_another_pen_is_refused_for_independent_images(
     pen: str, scene: Scene, lightpen: Run, shared_data: Path, tmp_path: Path
 ) -> None:
-    other = scene("--pen", pen, "--images", "24", "--seed", "1")
+    other = scene(*SMALL, "--pen", pen, "--images", "24", "--seed", "1")
     clean = shared_data / "swing-clean"
     assert_pen_refused(lightpen, clean, other / "leds.csv", tmp_path / "some")

@@ -3,24 +3,18 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
 
-Run = Callable[..., CompletedProcess[str]]
-
 
 @pytest.fixture(scope="module")
 def fields(
-    swung: Callable[..., Path],
-    lightpen: Run,
-    tmp_path_factory: pytest.TempPathFactory,
+    swung: Callable[..., Path], calibration_of: Callable[..., Path]
 ) -> dict[str, Any]:
     """The record of a recorded swing."""
-    file = tmp_path_factory.mktemp("schema") / "tip.json"
-    assert lightpen("calibrate", swung(), "--json", file).returncode == 0
+    file = calibration_of(swung()) / "calibration.json"
     written: dict[str, Any] = json.loads(file.read_bytes())
     return written
 

@@ -64,7 +64,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_kept(
 def test_a_swing_is_no_spin(
     lightpen: Run, scene: Callable[..., Path], tmp_path: Path
 ) -> None:
-    images = scene()
+    images = scene("--binning", "2", "--images", "40", "--seed", "8")
     where = ("--data", tmp_path / "data")
     lightpen("tips", "add", "tip", "T-1", *where)
 

@@ -52,6 +52,13 @@ def add_simulate(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--bits", type=int, choices=(8, 12, 16), default=8)
     parser.add_argument(
+        "--binning",
+        type=int,
+        choices=(1, 2, 4),
+        default=1,
+        help="so many pixels in a row, and in a column, are read out as one",
+    )
+    parser.add_argument(
         "--cameras",
         type=int,
         choices=range(1, MAX_RIG + 1),
@@ -103,6 +110,7 @@ def _simulate(options: argparse.Namespace) -> None:
     from lightpen.simulator.scene_files import write_rig_scene, write_scene
     from lightpen.simulator.scenes import LEDS, SCENES, Scene
     from lightpen.simulator.sensor import Sensor
+    from lightpen.simulator.swings import paper_camera
 
     looks = LEDS[options.leds]
 
@@ -117,13 +125,14 @@ def _simulate(options: argparse.Namespace) -> None:
         has_lamp=options.lamp,
         camera_turn=options.camera_turn,
         pen=replace(SAMPLE_PENS[options.pen](), diameter=options.led_diameter),
+        camera=paper_camera(options.binning),
     )
     with progress("Rendering") as report:
         if options.cameras == 1:
             x, y, z = write_scene(scene, options.out, report)
             written = f"{scene.n_images} images, camera.yaml"
         else:
-            rig = row_of_cameras(options.cameras, options.baseline)
+            rig = row_of_cameras(options.cameras, options.baseline, options.binning)
             x, y, z = write_rig_scene(scene, rig, options.out, report)
             folders = ", ".join(rig.names)
             written = (

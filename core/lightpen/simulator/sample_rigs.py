@@ -18,7 +18,7 @@ TRANSLATION_SIGMA = 0.1  # mm
 BASELINE = 500.0  # mm, of a camera and the one beside it
 
 
-def row_of_cameras(n_cameras: int, baseline: float) -> Rig:
+def row_of_cameras(n_cameras: int, baseline: float, binning: int = 1) -> Rig:
     """Return cameras in a row, given from its middle, where the paper's would stand.
 
     Parameters
@@ -27,6 +27,8 @@ def row_of_cameras(n_cameras: int, baseline: float) -> Rig:
         2 to 4.
     baseline : float
         From the first to the last, mm.
+    binning : int
+        As for `paper_camera`.
     """
     u, _, w = PAPER_CONE
     places = np.linspace(-baseline / 2, baseline / 2, n_cameras)
@@ -35,7 +37,7 @@ def row_of_cameras(n_cameras: int, baseline: float) -> Rig:
     rotations = rotation_from_vector(turns)
     sigmas = np.tile(np.repeat([ROTATION_SIGMA, TRANSLATION_SIGMA], 3), n_cameras - 1)
     return Rig(
-        cameras=tuple(_camera(number) for number in range(n_cameras)),
+        cameras=tuple(_camera(number, binning) for number in range(n_cameras)),
         rotations=rotations,
         translations=-rotations[:, :, 0] * places[:, None],
         covariance=np.diag(sigmas**2),
@@ -63,11 +65,11 @@ def beside(camera: Camera, cone_cam: FloatArray) -> Rig:
     )
 
 
-def _camera(number: int) -> Camera:
+def _camera(number: int, binning: int) -> Camera:
     """Return the paper's camera with a lens of its own."""
-    camera = paper_camera()
+    camera = paper_camera(binning)
     longer = 1 + LENS_SPREAD * number
-    cx, cy = np.array([camera.cx, camera.cy]) + CENTRE_SPREAD * number
+    cx, cy = np.array([camera.cx, camera.cy]) + CENTRE_SPREAD * number / binning
     return replace(
         camera, fx=longer * camera.fx, fy=longer * camera.fy, cx=float(cx), cy=float(cy)
     )
