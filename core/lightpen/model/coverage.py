@@ -57,7 +57,7 @@ class Coverage:
     tilts: FloatArray
     directions: FloatArray
     turns: FloatArray
-    counts: FloatArray
+    counts: IntArray
     n_upright: int
     spread: FloatArray
     axes: FloatArray

@@ -104,4 +104,4 @@ def _upright(pen: Pen) -> FloatArray:
     z = facing / length if length > MIN_SIDEWAYS else np.array([0.0, 0.0, 1.0])
     y = np.array([0.0, 1.0, 0.0])
     x = np.array([z[2], 0.0, -z[0]])
-    return FACING @ np.stack([x, y, z])
+    return np.asarray(FACING @ np.stack([x, y, z]))
