@@ -109,12 +109,24 @@ class Look:
         return f"{step}-{self.language}-{self.appearance}-{size}.png"
 
 
-LOOKS = tuple(  # one appearance after the other: to change it takes long
-    Look(language, appearance, size)
-    for appearance in (Appearance.DARK, Appearance.LIGHT)
-    for language in Language
-    for size in SIZES
-)
+def looks_of(step: str) -> tuple[Look, ...]:
+    """Return how a step is drawn, in turn.
+
+    One appearance after the other, that in which the step before was drawn last first:
+    to change it takes long.
+    """
+    appearances = (Appearance.DARK, Appearance.LIGHT)
+    return tuple(
+        Look(language, appearance, size)
+        for appearance in appearances[:: 1 if STEPS.index(step) % 2 else -1]
+        for language in Language
+        for size in SIZES
+    )
+
+
+def look_before(step: str) -> Look:
+    """Return the look in which a step is gone to, and from which it is drawn."""
+    return replace(looks_of(step)[-1], appearance=looks_of(step)[0].appearance)
 
 
 class StillCamera(SimulatedCamera):
@@ -173,9 +185,22 @@ class Stage:
         )
         # Wrapped words are laid out by what was there before; one more change of the
         # size makes that always the same.
-        for size in (look.size + QSize(GRID, GRID), look.size):
-            self.wizard.window.resize(size)
+        with self.unpainted():
+            self.wizard.window.resize(look.size + QSize(GRID, GRID))
             self._settle()
+        self.wizard.window.resize(look.size)
+        self._settle()
+
+    @contextmanager
+    def unpainted(self) -> Iterator[None]:
+        """Lay out the window without painting it, which takes longest."""
+        window = self.wizard.window
+        before = window.updatesEnabled()
+        window.setUpdatesEnabled(False)
+        try:
+            yield
+        finally:
+            window.setUpdatesEnabled(before)
 
     def go_to(self, step: str) -> None:
         """Go to a step and fill it."""
@@ -315,7 +340,7 @@ class Stage:
 def walk(stage: Stage) -> Iterator[str]:
     """Go through the steps, and yield each."""
     for step in STEPS:
-        stage.set_look(LOOKS[-1])  # what comes first is laid out by what was before
+        stage.set_look(look_before(step))  # by which what comes first is laid out
         if step == "review":
             stage.solve()
         stage.go_to(step)
@@ -324,8 +349,8 @@ def walk(stage: Stage) -> Iterator[str]:
 
 def draw(stage: Stage, step: str) -> Iterator[tuple[str, QImage]]:
     """Yield the name and the picture of the step that is shown in every look."""
-    stage.set_look(LOOKS[-1])
-    for each in LOOKS:
+    stage.set_look(look_before(step))
+    for each in looks_of(step):
         stage.set_look(each)
         yield each.file_name(step), stage.picture()
 

@@ -212,7 +212,9 @@ def run_demo(make_pages: MakePages) -> int:
     records of the user are left alone.
     """
     is_seen = has_display() and os.environ.get("QT_QPA_PLATFORM") != "offscreen"
-    around = Surroundings(clock=MachineClock() if is_seen else SkippingClock())
+    around = Surroundings(
+        clock=MachineClock() if is_seen else SkippingClock(rests=True)
+    )
     if not is_seen:
         os.environ["QT_QPA_PLATFORM"] = "offscreen"
         qInstallMessageHandler(_tell_but_hints)

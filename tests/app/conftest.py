@@ -132,7 +132,7 @@ def look(dressed: QApplication) -> Iterator[None]:
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Images come, and plots are drawn, less often than usual: each takes long."""
     monkeypatch.setattr("lightpen.simulator.camera.USUAL_FRAME_RATE", 7.0)
-    monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 300)
+    monkeypatch.setattr("lightpen_app.steps.swing.page.PLOTTING_MS", 1000)
 
 
 @pytest.fixture
@@ -235,7 +235,7 @@ def solving_on(monkeypatch: pytest.MonkeyPatch) -> SolvingOn:
 
 # The whole wizard, used as an operator uses it
 
-LOOK_MS = 150  # between two looks at what the window shows
+LOOK_MS = 30  # between two looks at what the window shows
 LONGEST_ROUND = 200  # presses of the Tab key
 LEFT = Qt.MouseButton.LeftButton
 NONE = Qt.KeyboardModifier.NoModifier

@@ -24,31 +24,32 @@ LOCALES = ("tr_TR", "de_DE", "fa_IR", USUAL)
 
 DEMO = """
 import sys
+from dataclasses import replace
 from pathlib import Path
 from PySide6.QtCore import QLocale, QTimer
 import lightpen.simulator.camera
 from lightpen.cameras.clock import SkippingClock
 from lightpen.live.sources import Surroundings
+from lightpen.model.limits import SwingLimits
 from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import Wizard, make_application
-from lightpen_app.demo import NAMES, Demo
+from lightpen_app.demo import Demo
 from lightpen_app.wizard_pages import make_pages
-from lightpen_app.work.settings import Settings, Station
+from lightpen_app.work.settings import Settings
 
 lightpen.simulator.camera.USUAL_FRAME_RATE = 7.0  # looking at images takes long
 folder = Path(sys.argv[1])
 application = make_application(["lightpen"])
 settings = Settings(folder / "lightpen.json")
-settings.set_station(
-    NAMES.station, Station(max_uncertainty=0.05, min_images=12, max_images=30)
-)
-around = Surroundings(Scene(camera=paper_camera(binning=2)), SkippingClock())
+around = Surroundings(Scene(camera=paper_camera(binning=2)), SkippingClock(rests=True))
 wizard = Wizard(application, make_pages, settings, folder, around)
 demo = Demo(wizard.window, wizard.workbench, is_watched=False)
 demo.ended.connect(wizard.window.close_unasked)
 wizard.window.show()
 wizard.workbench.start()
+limits = SwingLimits(max_uncertainty=0.05, min_images=12, min_per_field=0)
+wizard.workbench.set_preparation(replace(wizard.workbench.preparation, limits=limits))
 QTimer.singleShot(0, demo.start)
 application.exec()
 print(QLocale.system().name(), demo.is_accepted, wizard.workbench.shut_down(60.0))

@@ -22,7 +22,6 @@ from PySide6.QtWidgets import QApplication, QTabWidget
 from tests.app.room import Room, room_of
 
 from lightpen_app.look.languages import Language
-from lightpen_app.look.theme import Appearance
 
 ROOT = Path(__file__).parents[2]
 DIFFERENT = ROOT / "screens-different"
@@ -41,7 +40,11 @@ def load_screens() -> ModuleType:
 
 
 SCREENS = load_screens()
-NAMES = [look.file_name(step) for step in SCREENS.STEPS for look in SCREENS.LOOKS]
+NAMES = [
+    look.file_name(step)
+    for step in SCREENS.STEPS
+    for look in sorted(SCREENS.looks_of(step), key=lambda look: look.appearance)
+]
 LEAST = QSize(940, 500)
 SIZES = (LEAST, QSize(960, 540), QSize(1280, 800))
 KEYS = [
@@ -142,18 +145,20 @@ def rooms_of(stage: Any, step: str) -> Iterator[tuple[Key, list[Room]]]:
     In the appearance that it was drawn in last: to change it takes long.
     """
     window = stage.wizard.window
+    appearance = SCREENS.looks_of(step)[-1].appearance
 
     def room() -> Room:
         return room_of(window)
 
     for language in Language:
         for size in SIZES:
-            stage.set_look(SCREENS.Look(language, Appearance.LIGHT, size))
-            rooms = [stage.still(room)]
-            for tabs in window.page().findChildren(QTabWidget):
-                for index in range(tabs.count()):
-                    tabs.setCurrentIndex(index)
-                    rooms.append(stage.still(room))
+            with stage.unpainted():
+                stage.set_look(SCREENS.Look(language, appearance, size))
+                rooms = [stage.still(room)]
+                for tabs in window.page().findChildren(QTabWidget):
+                    for index in range(tabs.count()):
+                        tabs.setCurrentIndex(index)
+                        rooms.append(stage.still(room))
             yield (step, str(language), size.width()), rooms
 
 

@@ -52,8 +52,15 @@ KEYS = (
 
 
 @pytest.fixture
-def prepared(settings: Settings, open_wizard: "OpenWizard") -> "Walker":
-    """The program at a station that is known; a swing there would go on and on."""
+def prepared(
+    settings: Settings, open_wizard: "OpenWizard", monkeypatch: pytest.MonkeyPatch
+) -> "Walker":
+    """The program at a station that is known; a swing there would go on and on.
+
+    It begins a second after the tip was seated; whole swings are walked elsewhere.
+    """
+    for module in ("lightpen.swing.rules", "lightpen_app.steps.swing.moment"):
+        monkeypatch.setattr(f"{module}.COUNTDOWN", 1.0)
     settings.set_station(STATION, LONG)
     settings.set_last_station(STATION)
     return open_wizard()
@@ -116,7 +123,7 @@ def go_to(walker: "Walker", title: str) -> None:
         walker.click_on(walker.main_button())
 
 
-def keep_on(walker: "Walker", n_more: int = 4) -> None:
+def keep_on(walker: "Walker", n_more: int = 3) -> None:
     """Wait until the swing has kept some more images."""
     run = walker.workbench.run
     walker.until(lambda: run.status.state is not None)
@@ -420,7 +427,7 @@ def test_a_full_disk_pauses_the_swing_until_there_is_room(
 
     small_disk(50_000_000)
     prepared.press(Key.Key_Space)
-    keep_on(prepared)
+    keep_on(prepared, 4)
     assert len(open_record(record_folder(prepared)).used_images) >= n_before + 4
     prepared.until(lambda: not prepared.tells("the disk is full"))
 
@@ -614,6 +621,10 @@ def test_pressing_enter_again_and_again_accepts_once(
     settings.set_station(STATION, short)
     settings.set_last_station(STATION)
     walker = open_wizard()
+    go_to(walker, "LEDs")
+    now = walker.workbench.preparation
+    limits = replace(now.limits, min_per_field=0)  # few images will do
+    walker.workbench.set_preparation(replace(now, limits=limits))
     go_to(walker, "Swing")
     walker.swing()
     walker.until(lambda: walker.workbench.run.status.solution is not None)

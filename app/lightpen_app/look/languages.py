@@ -32,7 +32,8 @@ class LanguageSwitch(QObject):
         super().__init__(application)
         self._application = application
         self._language = Language.ENGLISH
-        self._translators: list[QTranslator] = []
+        self._read: dict[str, QTranslator] = {}
+        self._installed: list[QTranslator] = []
 
     def language(self) -> Language:
         """Return the language in use."""
@@ -49,13 +50,19 @@ class LanguageSwitch(QObject):
 
     def remove(self) -> None:
         """Take the translations out; the texts in the program itself are left."""
-        for translator in self._translators:
+        for translator in self._installed:
             self._application.removeTranslator(translator)
-            translator.deleteLater()
-        self._translators.clear()
+        self._installed.clear()
 
     def _install(self, name: str, folder: str) -> None:
-        translator = QTranslator(self)
-        if translator.load(name, folder):
+        """Use translations, which are read once.
+
+        None is deleted while the program runs: at times PySide crashes in that.
+        """
+        translator = self._read.get(name)
+        if translator is None:
+            translator = self._read[name] = QTranslator()
+            translator.load(name, folder)
+        if not translator.isEmpty():
             self._application.installTranslator(translator)
-            self._translators.append(translator)
+            self._installed.append(translator)

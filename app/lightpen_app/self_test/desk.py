@@ -73,7 +73,7 @@ class Desk:
 
     def walked_wizard(self, picture: Path) -> str:
         """Have the wizard find and accept the tip of the swing; draw it at its end."""
-        around = Surroundings(SCENE, SkippingClock())
+        around = Surroundings(SCENE, SkippingClock(rests=True))
         settings = Settings(self._settings)
         wizard = Wizard(self._application, make_pages, settings, self._data, around)
         walk = Walk(wizard, self._record)

@@ -44,11 +44,18 @@ class SkippingClock:
 
     With it a simulated hour takes as long as its images take to make, and the same
     calls give the same images.
+
+    Parameters
+    ----------
+    rests : bool
+        Whether a wait that may be ended takes its time nevertheless: a camera of which
+        nobody needs images leaves the processor to others.
     """
 
     is_real = False
 
-    def __init__(self) -> None:
+    def __init__(self, *, rests: bool = False) -> None:
+        self._rests = rests
         self._now_ns = 0
         self._lock = Lock()
 
@@ -58,7 +65,7 @@ class SkippingClock:
 
     def wait(self, seconds: float, wake: Event | None = None) -> bool:
         """Let ``seconds`` pass unless ``wake`` is set; return whether it is."""
-        if wake is not None and wake.is_set():
+        if wake is not None and wake.wait(max(seconds, 0.0) if self._rests else 0.0):
             return True
         with self._lock:
             self._now_ns += round(max(seconds, 0.0) * 1e9)

@@ -1,6 +1,7 @@
 """How frames pass from the thread of a camera to those that use them."""
 
 from collections import deque
+from collections.abc import Callable
 from threading import Condition, Lock
 
 from lightpen.cameras.protocol import EndOfImages, Frame, FrameTimeout
@@ -48,15 +49,25 @@ class FrameQueue:
             self._changed.notify_all()
             return True
 
-    def put(self, frame: Frame) -> None:
-        """Append a frame as soon as there is room; drop it if the end comes first."""
+    def hand_over(self, frame: Frame, is_wanted: Callable[[], bool]) -> None:
+        """Append a frame, and return when it was taken.
+
+        Nothing is made ahead of its reader, so one who answers an image sees what comes
+        of it in the next but one.
+
+        Parameters
+        ----------
+        is_wanted : callable
+            Returns whether anybody takes frames; asked again after `clear`.
+        """
         with self._changed:
+            if self._is_ended:
+                return
+            self._frames.append(frame)
+            self._changed.notify_all()
             self._changed.wait_for(
-                lambda: len(self._frames) < self._n_frames or self._is_ended
+                lambda: not self._frames or self._is_ended or not is_wanted()
             )
-            if not self._is_ended:
-                self._frames.append(frame)
-                self._changed.notify_all()
 
     def take(self, timeout_s: float) -> Frame:
         """Return the oldest frame.

@@ -133,7 +133,7 @@ class CameraWorker:
     clock : Clock, optional
         The one that the camera goes by.
     n_queued : int
-        Frames that wait to be measured at most.
+        Frames of a live camera that wait to be measured at most.
     """
 
     def __init__(
@@ -358,7 +358,7 @@ class CameraWorker:
 
     def _enqueue(self, frame: Frame) -> None:
         if self._camera.caps.waits:
-            self._queue.put(frame)
+            self._queue.hand_over(frame, self._measures.is_set)
             return
         self._n_offered += 1
         if self._queue.offer(frame) or self._stopping.is_set():

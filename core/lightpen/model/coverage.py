@@ -57,7 +57,7 @@ class Coverage:
     tilts: FloatArray
     directions: FloatArray
     turns: FloatArray
-    counts: FloatArray
+    counts: IntArray
     n_upright: int
     spread: FloatArray
     axes: FloatArray
@@ -73,22 +73,18 @@ class Coverage:
 
 def measure_coverage(rotations: FloatArray) -> Coverage:
     """Measure which postures rotations (N, 3, 3) of cam_from_pen hold."""
-    tilts, directions = tilts_of(rotations), directions_of(rotations)
-    ring = np.digitize(tilts, TILT_RINGS)
-    sector = np.rint(directions / (2 * np.pi / N_DIRECTIONS)).astype(int) % N_DIRECTIONS
-    counts = np.zeros((2, N_DIRECTIONS), dtype=int)
-    np.add.at(counts, (ring[ring > 0] - 1, sector[ring > 0]), 1)
+    counts = dial_counts(rotations)
     spread, axes = posture_spread(rotations)
     mean = nearest_rotation(rotations.mean(axis=0))
     relative = mean.T @ rotations
     return Coverage(
-        tilts=tilts,
-        directions=directions,
+        tilts=tilts_of(rotations),
+        directions=directions_of(rotations),
         turns=np.arctan2(
             relative[:, 0, 2] - relative[:, 2, 0], relative[:, 0, 0] + relative[:, 2, 2]
         ),
-        counts=counts,
-        n_upright=int(np.sum(ring == 0)),
+        counts=counts[1:],
+        n_upright=int(counts[0, 0]),
         spread=spread,
         axes=axes,
     )
@@ -194,9 +190,8 @@ def dial_counts(rotations: FloatArray) -> IntArray:
     right against the clock, as `DIRECTION_NAMES` has them. All upright ones are in the
     first column.
     """
+    ring = np.digitize(tilts_of(rotations), TILT_RINGS)
+    sector = np.rint(directions_of(rotations) / (2 * np.pi / N_DIRECTIONS)).astype(int)
     counts = np.zeros((3, N_DIRECTIONS), dtype=np.int64)
-    if len(rotations):
-        coverage = measure_coverage(rotations)
-        counts[0, 0] = coverage.n_upright
-        counts[1:] = coverage.counts
+    np.add.at(counts, (ring, np.where(ring > 0, sector % N_DIRECTIONS, 0)), 1)
     return counts

@@ -103,5 +103,5 @@ def _upright(pen: Pen) -> FloatArray:
     length = float(np.linalg.norm(facing))
     z = facing / length if length > MIN_SIDEWAYS else np.array([0.0, 0.0, 1.0])
     y = np.array([0.0, 1.0, 0.0])
-    x = np.cross(y, z)
+    x = np.array([z[2], 0.0, -z[0]])
     return np.asarray(FACING @ np.stack([x, y, z]))

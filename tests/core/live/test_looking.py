@@ -17,7 +17,6 @@ from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, ImageCamera
 from lightpen.cameras.replay import ReplayCamera
 from lightpen.cameras.worker import (
-    N_QUEUED,
     Connection,
     ConnectionChanged,
     Failed,
@@ -382,39 +381,41 @@ def test_a_swing_is_given_every_image_in_order_however_slow_the_reader_is(
     station: "Station", make_live: MakeLive, screen: Screen, interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    live = make_live()
+    camera = station.new_camera()
+    make_live(camera)
     screen.wait_for_images(3)
     screen.may_go_on.clear()
-    wait_until_queue_is_full(live, screen)
+    wait_until_camera_waits(camera, screen)
     screen.may_go_on.set()
-    screen.wait_for_images(2 * N_QUEUED)
+    screen.wait_for_images(8)
     seqs = [image.frame.seq for image in screen.images]
 
     assert seqs == list(range(seqs[0], seqs[0] + len(seqs)))
 
 
-def wait_until_queue_is_full(live: Live, screen: Screen) -> None:
-    """Wait until a camera that waits for its reader delivers no more."""
+def wait_until_camera_waits(camera: ImageCamera, screen: Screen) -> None:
+    """Wait until a camera that waits for its reader has made the image after his."""
     pause = threading.Event()
     for _ in range(round(TIMEOUT / 0.01)):
-        if live.stats.delivered > screen.images[-1].frame.seq + N_QUEUED:
+        if camera.stats().delivered > screen.images[-1].frame.seq + 1:
             return
         pause.wait(0.01)
-    pytest.fail("The queue never was full.")
+    pytest.fail("Nothing was made ahead.")
 
 
 def test_after_a_swing_a_recording_that_waited_for_its_reader_goes_on(
     station: "Station", make_live: MakeLive, screen: Screen, interrupted: Path
 ) -> None:
     station.go_on(interrupted)
-    live = make_live(ReplayCamera(str(interrupted), loops=True, clock=SkippingClock()))
+    camera = ReplayCamera(str(interrupted), loops=True, clock=SkippingClock())
+    make_live(camera)
     screen.wait_for_images(1)
     screen.may_go_on.clear()
-    wait_until_queue_is_full(live, screen)
+    wait_until_camera_waits(camera, screen)
     station.runner.finish()
     screen.may_go_on.set()
     station.wait_until(lambda: not station.status.is_capturing)
-    screen.wait_for_images(2 * N_QUEUED)
+    screen.wait_for_images(8)
 
 
 def test_a_recording_ends_the_swing_after_a_whole_pass_without_a_new_image(

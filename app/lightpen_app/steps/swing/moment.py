@@ -1,6 +1,7 @@
 """What the operator is shown at one moment of a swing, as a value for the widgets."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil, isfinite
 
 from PySide6.QtCore import QObject
@@ -98,6 +99,11 @@ class Moment:
     is_away: bool = False
     to_go: ToGo | None = None
 
+    @cached_property
+    def dial(self) -> DialValue:
+        """What the dial shows."""
+        return _dial(self)
+
     @property
     def asks_upright(self) -> bool:
         """Whether the pen held upright and still leads to the review."""
@@ -130,7 +136,7 @@ class SwingWords(QObject):
             time_left=self._time_left(moment),
             fraction=_fraction(moment),
             keys=self._keys(moment),
-            dial=_dial(moment),
+            dial=moment.dial,
         )
 
     def resting_value(self) -> OperatorValue:
@@ -205,7 +211,7 @@ class SwingWords(QObject):
         tip = pen.nominal_tip if seat is None else seat.tip_pen
         if tip is None:
             return None
-        dial = _dial(moment)
+        dial = moment.dial
         return PenStand(pen, tip, dial.posture, dial.target, dial.heading)
 
     def _told(self, moment: Moment) -> Phrase:
