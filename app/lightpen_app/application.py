@@ -32,6 +32,7 @@ from lightpen_app.crash import CrashHook
 from lightpen_app.demo import Demo
 from lightpen_app.end_signals import EndSignals
 from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.layout_items import forget_layout_items
 from lightpen_app.look.sounds import Mute, Sounds, find_sounds
 from lightpen_app.look.theme import Tone, apply_theme, colors_for, load_fonts
 from lightpen_app.shell.main_window import LEAST_SIZE, MainWindow
@@ -91,6 +92,7 @@ class Wizard(QObject):
         # Last: under a style sheet Qt styles all of a widget whenever it gets a parent,
         # which takes four times as long as to make the window.
         self._apply_appearance()
+        forget_layout_items()
         self.workbench.live.set_watched(self.window.page().shows_images)
         self.crash_hook = CrashHook(folder / "crashes", self)
 

@@ -56,6 +56,7 @@ from lightpen.simulator.scenes import Scene
 from lightpen.simulator.swings import paper_camera
 from lightpen_app.application import SWITCH_INTERVAL, Wizard
 from lightpen_app.look.languages import LanguageSwitch
+from lightpen_app.look.layout_items import forget_layout_items
 from lightpen_app.look.theme import DARK, apply_theme, load_fonts
 from lightpen_app.wizard_pages import make_pages
 from lightpen_app.work.garbage import collect_if_due
@@ -112,6 +113,7 @@ def collected(kept_to_one_thread: None) -> Iterator[None]:
     """What a test has closed is gone before the next one: each would be styled anew."""
     yield
     QThreadPool.globalInstance().waitForDone(PATIENCE_MS)  # its jobs are told of there
+    forget_layout_items()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     collect_if_due()
 

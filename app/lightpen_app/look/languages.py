@@ -55,10 +55,7 @@ class LanguageSwitch(QObject):
         self._installed.clear()
 
     def _install(self, name: str, folder: str) -> None:
-        """Use translations, which are read once.
-
-        None is deleted while the program runs: at times PySide crashes in that.
-        """
+        """Use translations, which are read once."""
         translator = self._read.get(name)
         if translator is None:
             translator = self._read[name] = QTranslator()

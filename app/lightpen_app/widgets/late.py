@@ -8,6 +8,8 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from typing_extensions import override
 
+from lightpen_app.look.layout_items import forget_layout_items
+
 W = TypeVar("W", bound=QWidget)
 
 
@@ -39,6 +41,7 @@ class Late(QWidget, Generic[W]):
         """Return the widget, made now if it has not been."""
         if self._content is None:
             self._content = self._make()
+            forget_layout_items()
             self._layout.addWidget(self._content)
             self._content.show()  # as it is added while this is being shown
             self.made.emit(self._content)

@@ -1,4 +1,4 @@
-"""Python's garbage collector, kept to the thread of the window.
+"""Python's garbage collector, kept to the thread of the window, and what PySide leaves.
 
 The collector runs in whatever thread happens to allocate. It may free a Qt object there
 whose thread is another one, and Qt ends the program (PYSIDE-810).
@@ -7,6 +7,8 @@ whose thread is another one, and Qt ends the program (PYSIDE-810).
 import gc
 
 from PySide6.QtCore import QObject, QTimer
+
+from lightpen_app.look.layout_items import forget_layout_items
 
 PERIOD_MS = 500
 
@@ -22,6 +24,7 @@ class GarbageCollector(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(PERIOD_MS)
         self._timer.timeout.connect(collect_if_due)
+        self._timer.timeout.connect(forget_layout_items)
         self._timer.start()
 
 
