@@ -16,5 +16,7 @@ def undressed() -> Iterator[None]:
     assert isinstance(application, QApplication)
     sheet = application.styleSheet()
     application.setStyleSheet("")
-    yield
-    application.setStyleSheet(sheet)
+    try:
+        yield
+    finally:
+        application.setStyleSheet(sheet)
