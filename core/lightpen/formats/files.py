@@ -13,6 +13,7 @@ from typing import BinaryIO
 from lightpen.errors import FileError, NameTakenError
 from lightpen.formats.file_locks import folder_locked
 from lightpen.formats.part_files import part_of, renamed, sweep_parts
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import Sentence, sentence
 
 MEGABYTE = 1_000_000  # bytes
@@ -314,11 +315,6 @@ def why_unwritten(error: OSError) -> Sentence:
         reason=strerror(error),
     )
     return _REASONS.get(error.errno or 0, other)
-
-
-def strerror(error: OSError) -> str:
-    """Return what the system says of an error."""
-    return error.strerror or type(error).__name__
 
 
 def _check_readable(
