@@ -102,7 +102,7 @@ def opened(path: Path, what: Sentence, limit: int) -> Iterator[BinaryIO]:
     """
     shown = printable(str(path))
     try:
-        _check_readable(path.stat(), what, shown, limit)
+        _check_readable(_status(path, what), what, shown, limit)
         with path.open("rb") as stream:
             _check_readable(os.fstat(stream.fileno()), what, shown, limit)
             yield stream
@@ -315,6 +315,20 @@ def why_unwritten(error: OSError) -> Sentence:
         reason=strerror(error),
     )
     return _REASONS.get(error.errno or 0, other)
+
+
+def _status(path: Path, what: Sentence) -> os.stat_result:
+    try:
+        return path.stat()
+    except ValueError as error:  # a null character in it, or half a letter
+        raise FileError(
+            sentence(
+                "read.no-name",
+                "The {what} {path} has a name that no file can have. Check the name.",
+                what=what,
+                path=printable(str(path)),
+            )
+        ) from error
 
 
 def _check_readable(
