@@ -17,7 +17,7 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.estimation.bundle import Bundle
-from lightpen.estimation.unknowns import inverse, known_by
+from lightpen.estimation.information import inverse, known_by
 from lightpen.sentences import Sentence
 
 LIMIT = 3.0  # standard deviations

@@ -23,10 +23,10 @@ from lightpen.estimation.rig_report import (
     rig_record,
     rig_warnings,
 )
+from lightpen.estimation.seat_forms import FORMS
 from lightpen.estimation.second_cone import SecondCone
 from lightpen.estimation.single_images import USUAL_SIGMA
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
-from lightpen.estimation.unknowns import FORMS
 from lightpen.estimation.verdict import judge
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.own_json import with_checksum
