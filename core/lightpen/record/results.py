@@ -24,9 +24,9 @@ from msgspec import Meta, Struct, to_builtins
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import FileError
-from lightpen.estimation.report import json_bytes
 from lightpen.estimation.verdict import Change
 from lightpen.formats.files import printable
+from lightpen.formats.json_records import json_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Digest,
