@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QSize, QTimer, Slot
@@ -52,6 +52,7 @@ from lightpen_app.work.workbench import Workbench
 
 if TYPE_CHECKING:
     from lightpen_app.steps.review.images_panel import ImagesPanel
+    from lightpen_app.steps.review.plot_card import NamedPicture
     from lightpen_app.steps.review.plots_panel import PlotsPanel
 
 PATIENCE_MS = 300  # before the progress of a solution is shown
@@ -79,7 +80,7 @@ class ReviewPage(Rearranged, Page):
         self._result_shown: Result | None = None
         self._wants_more = self._repeats = self._to_next_tip = False
         self._place = SavePlace(workbench)
-        self._along = TakingAlong(self._run, self._place, self._save_plots, self)
+        self._along = TakingAlong(self._run, self._place, self._draw_plots, self)
         self._search: Job | None = None
         self._on_yes: Callable[[], object] = self._repeat_swing
 
@@ -601,11 +602,11 @@ class ReviewPage(Rearranged, Page):
         workbench.set_preparation(replace(chosen, names=names))
         self._to_next_tip = True
 
-    def _save_plots(self, folder: Path, stem: str) -> None:
+    def _draw_plots(self) -> "list[NamedPicture]":
         for panel in self._panels:
             self._show_solution(panel.content())
-            for card in panel.content().cards():
-                card.save_beside(folder, stem)
+        cards = chain.from_iterable(panel.content().cards() for panel in self._panels)
+        return [card.picture() for card in cards]
 
     def _on_run_troubled(self) -> None:
         self._repeats = False
