@@ -506,7 +506,7 @@ class CameraWorker:
         except ConfigError:
             self._start(before)
             raise
-        self._settings = merged(before, self._applied)
+        self._settings = merged_settings(before, self._applied)
 
     def _set_exposure(self, exposure_us: float) -> None:
         # Where the camera is lost over it, it is set when it comes back.
@@ -531,7 +531,7 @@ class CameraWorker:
             self._on_event(ConnectionChanged(connection))
 
 
-def merged(before: CameraSettings, now: CameraSettings) -> CameraSettings:
+def merged_settings(before: CameraSettings, now: CameraSettings) -> CameraSettings:
     """Return settings, and of what they leave open those before."""
     given = {f.name: getattr(now, f.name) for f in fields(now)}
     return replace(before, **{n: v for n, v in given.items() if v is not None})

@@ -12,7 +12,11 @@ from lightpen.estimation.instrument import instrument_record
 from lightpen.estimation.lamp_report import lamps_record
 from lightpen.estimation.methods import METHODS, result_of
 from lightpen.estimation.report_warnings import warnings_of
-from lightpen.estimation.rig_report import count_dropped, intrinsics_record, rig_record
+from lightpen.estimation.rig_report import (
+    adjusted_intrinsics_record,
+    count_dropped,
+    rig_record,
+)
 from lightpen.estimation.second_cone import SecondCone
 from lightpen.estimation.uncertainty import COVERAGE_FACTOR, ShareName
 from lightpen.estimation.verdict import judge
@@ -183,7 +187,7 @@ def _adjusted(calibration: Calibration) -> dict[str, Any]:
     prior = calibration.priors.cameras[0]
     reading = calibration.priors.reading
     return {
-        "intrinsics": intrinsics_record(calibration, 0),
+        "intrinsics": adjusted_intrinsics_record(calibration, 0),
         "intrinsics_uncertainty_assumed": prior.assumed,
         "scale_uncertainty_before": np.sqrt(calibration.stated.scale.covariance[0, 0]),
         "scale_uncertainty_assumed": calibration.priors.scale.assumed,

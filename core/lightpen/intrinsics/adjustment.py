@@ -163,7 +163,7 @@ class _System(NamedTuple):
     own_right: FloatArray
 
 
-def adjust(
+def adjust_board(
     views: Views,
     start: BoardState,
     tolerances: BoardTolerances,
@@ -211,7 +211,7 @@ def adjust(
     )
 
 
-def fit_poses(views: Views, state: BoardState) -> FloatArray:
+def fit_board_poses(views: Views, state: BoardState) -> FloatArray:
     """Return the residuals of views of which only the poses are fitted.
 
     Parameters

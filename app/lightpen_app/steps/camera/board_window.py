@@ -246,7 +246,7 @@ class BoardWindow(Translated, QWidget):
         job.ended.connect(self._on_leading_ended)
         job.start()
 
-    def _on_led(self, wanted: "_Wanted") -> None:
+    def _on_led(self, wanted: "_WantedOutline") -> None:
         self._outline = wanted.outline
         self._refresh()
 
@@ -516,7 +516,7 @@ class _Computed:
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
+class _WantedOutline:
     outline: FloatArray
 
 
@@ -529,8 +529,8 @@ def _look(image: Image, board: Board, asks_why: bool, report: Report) -> _Looked
     return _Looked(points, sha256(image.tobytes()).hexdigest())
 
 
-def _wanted(capture: Capture, report: Report) -> _Wanted:
-    return _Wanted(wanted_outline(capture))
+def _wanted(capture: Capture, report: Report) -> _WantedOutline:
+    return _WantedOutline(wanted_outline(capture))
 
 
 def _calibrate(views: Views, hashes: dict[str, str], report: Report) -> _Computed:
