@@ -9,6 +9,7 @@ from threading import get_ident, main_thread
 from types import FrameType
 
 import lightpen_app
+import lightpen_resources
 
 TOUCHES = {
     *("open", "sqlite3.connect", "os.listdir", "os.scandir", "os.mkdir"),
@@ -24,6 +25,7 @@ MAY = tuple(
     )
 )
 USERS = str(Path(tempfile.gettempdir()).resolve()) + os.sep  # where tests put files
+RESOURCES = str(Path(lightpen_resources.__file__).parent) + os.sep
 
 
 class DiskWatch:
@@ -45,7 +47,7 @@ class DiskWatch:
         if event not in TOUCHES or get_ident() != main_thread().ident:
             return
         path = str(values[0])
-        if not path.startswith(USERS):
+        if not path.startswith(USERS) or path.startswith(RESOURCES):
             return
         place = _place_in_program(sys._getframe(1))
         if place:

@@ -34,6 +34,7 @@ from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
+from lightpen_app.shell.page_focus import PageFocus
 from lightpen_app.shell.placement import FRAME, fitted_place
 from lightpen_app.shell.sidebar import Sidebar
 from lightpen_app.shell.step_states import Status, Step, list_steps
@@ -97,9 +98,6 @@ class MainWindow(Rearranged, QMainWindow):
         self._pages = tuple(pages)
         self._settings = settings
         self._now = 0
-        self._notice_is_of_page = False
-        self._unwritable = self._trouble = ""  # the data folder, and why
-        self._status_holds: Callable[[], bool] | None = None  # None: until another
         self._asks = True
 
         # Widgets: the order of making them is the order of the Tab key
@@ -112,6 +110,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._help_window = HelpWindow()
         self._options = OptionsMenu(preferences, self)
         self._stream_dialog = StreamDialog(self)
+        self._focus = PageFocus(self, self.page, self._action_bar.focus_main)
         self._make_actions()
 
         # Layout
@@ -137,9 +136,6 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
-        application = QApplication.instance()
-        assert isinstance(application, QApplication)
-        application.focusChanged.connect(self._on_focus_changed)
 
         self._use_room()
         self._retranslate()
@@ -150,7 +146,7 @@ class MainWindow(Rearranged, QMainWindow):
             self.resize(FIRST_SIZE.boundedTo(available.size() - FRAME))
         self._pages[0].entered()
         self._refresh()
-        self._focus_page()
+        self._focus.set()
 
     def pages(self) -> tuple[Page, ...]:
         """Return the pages in the order of the steps."""
@@ -167,18 +163,19 @@ class MainWindow(Rearranged, QMainWindow):
         why_closed = self._pages[index].why_closed()
         if why_closed:
             asked = self._pages[index]
-            self._say_while(why_closed, lambda: asked.why_closed() == why_closed)
+            self._action_bar.set_status(
+                why_closed, lambda: asked.why_closed() == why_closed
+            )
             return
         self.page().left()
         self._now = index
-        self._set_status("")
-        if self._notice_is_of_page:
-            self._notice.clear()
+        self._action_bar.set_status("")
+        self._notice.clear_page()
         self._area.show_page(self.page())
         self._tell_attention()
         self.page().entered()
         self._refresh()
-        self._focus_page()
+        self._focus.set()
 
     def go_back(self) -> None:
         """Show the page before this one."""
@@ -196,41 +193,15 @@ class MainWindow(Rearranged, QMainWindow):
 
     def show_notice(self, text: str, tone: Tone = Tone.BAD) -> None:
         """Show a sentence until the user has read it."""
-        self._tell(text, tone)
-
-    def _tell(self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False) -> None:
-        """Show a notice, but none more on the data folder while that is told of."""
-        told, is_of_folder = self._notice.text(), self._with_way(text) != text
-        if is_of_folder and told == self._with_way(self._trouble):
-            return
-        self._notice_is_of_page = of_page
-        self._notice.show_text(self._with_way(text), tone)
+        self._notice.show_text(text, tone)
 
     def drop_notice(self, text: str) -> None:
         """Take a sentence away whose cause is gone, and no other."""
-        if self._notice.text() in (text, self._with_way(text)):
-            self._notice.clear()
+        self._notice.drop(text)
 
     def set_unwritable(self, folder: str, trouble: str) -> None:
-        """Say why nothing can be kept in the data folder, until that is empty.
-
-        Whatever is told of the folder meanwhile says where another one is chosen.
-        """
-        if trouble:
-            self._unwritable, self._trouble = folder, trouble
-            self.show_notice(trouble)
-        else:
-            self.drop_notice(self._trouble)
-            self._unwritable = self._trouble = ""
-
-    def _with_way(self, text: str) -> str:
-        """Return a sentence, of an unwritable data folder with the way to another."""
-        if not self._unwritable or self._unwritable not in text:
-            return text
-        way = self.tr(
-            "The data folder is chosen at the step Start, or in the options (F10)."
-        )
-        return f"{text} {way}"
+        """Say why nothing can be kept in the data folder, until that is empty."""
+        self._notice.set_unwritable(folder, trouble)
 
     def show_crash_report(self, path: str) -> None:
         """Tell that the program met a bug of its own; path "" if none is written."""
@@ -339,7 +310,7 @@ class MainWindow(Rearranged, QMainWindow):
         page.changed.connect(self._refresh)
         page.advance_requested.connect(self.advance)
         page.step_requested.connect(self._on_step_requested)
-        page.status_changed.connect(self._set_status)
+        page.status_changed.connect(self._action_bar.set_status)
         page.notice_raised.connect(self._on_notice_raised)
         page.operator_value_changed.connect(self._operator_view.set_value)
         page.data_folder_requested.connect(self._on_data_folder_asked)
@@ -421,48 +392,8 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.set_steps(list_steps(statuses, self._now))
         self._area.set_heading(page.title(), page.lead(), page.lead_tone())
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
-        if self._status_holds is not None and not self._status_holds():
-            self._set_status("")
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
-
-    def _set_status(self, text: str) -> None:
-        """Show a sentence in the status line until there is another."""
-        self._status_holds = None
-        self._action_bar.set_status(text)
-
-    def _say_while(self, text: str, holds: Callable[[], bool]) -> None:
-        """Show a sentence in the status line as long as it is true."""
-        self._set_status(text)
-        self._status_holds = holds
-
-    def _focus_page(self) -> None:
-        """Put the focus on the control that the page chose, or on its first one."""
-        page = self.page()
-        first = page.first_control()
-        if first is not None:
-            first.setFocus(Qt.FocusReason.TabFocusReason)
-            return
-        widget = page.nextInFocusChain()
-        while widget is not None and page.isAncestorOf(widget):
-            takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
-            if takes_tab and widget.isEnabled() and widget.isVisibleTo(page):
-                widget.setFocus(Qt.FocusReason.TabFocusReason)
-                return
-            widget = widget.nextInFocusChain()
-        self._action_bar.focus_main()
-
-    def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
-        """Let the page choose where the focus goes when what had it has vanished.
-
-        Qt gives it to whatever comes next, such as a button that Enter then presses.
-        """
-        if not isinstance(now, QAbstractButton) or now.window() is not self:
-            return
-        if before is None or before.isVisible() or not self._area.isAncestorOf(before):
-            return
-        if self.page().isAncestorOf(before):
-            self._focus_page()
 
     def _show_options(self) -> None:
         """Open the options above their button."""
@@ -477,7 +408,9 @@ class MainWindow(Rearranged, QMainWindow):
         """Do as a presenter's remote asks, unless someone must be at the screen."""
         if self.page().main_action().at_screen:
             words = self.tr("Press this button at the screen.")
-            self._say_while(words, lambda: self.page().main_action().at_screen)
+            self._action_bar.set_status(
+                words, lambda: self.page().main_action().at_screen
+            )
         else:
             self._action_bar.press_main()
 
@@ -493,9 +426,9 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_notice_raised(self, text: str) -> None:
         if text:
-            self._tell(text, of_page=True)
-        elif self._notice_is_of_page:
-            self._notice.clear()
+            self._notice.show_text(text, of_page=True)
+        else:
+            self._notice.clear_page()
 
     def _on_space_pressed(self) -> None:
         """Press the button that has the focus; pause where none has."""
@@ -534,7 +467,7 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _on_mute_toggled(self, muted: bool) -> None:
         words = self.tr("Sounds are off.") if muted else self.tr("Sounds are on.")
-        self._set_status(words)
+        self._action_bar.set_status(words)
 
     def _on_data_folder_asked(self) -> None:
         dialog = QFileDialog(self, self.tr("Data folder"))
@@ -575,4 +508,4 @@ class MainWindow(Rearranged, QMainWindow):
 
     def _retranslate(self) -> None:
         self.setWindowTitle(self.tr("Pen tip calibration"))
-        self._set_status("")  # it was said in the language before
+        self._action_bar.set_status("")  # it was said in the language before
