@@ -34,7 +34,6 @@ from lightpen_app.shell.action_bar import ActionBar
 from lightpen_app.shell.help_window import HelpWindow
 from lightpen_app.shell.options_menu import OptionsMenu
 from lightpen_app.shell.page_area import PageArea
-from lightpen_app.shell.page_focus import PageFocus
 from lightpen_app.shell.placement import FRAME, fitted_place
 from lightpen_app.shell.sidebar import Sidebar
 from lightpen_app.shell.step_states import Status, Step, list_steps
@@ -110,7 +109,6 @@ class MainWindow(Rearranged, QMainWindow):
         self._help_window = HelpWindow()
         self._options = OptionsMenu(preferences, self)
         self._stream_dialog = StreamDialog(self)
-        self._focus = PageFocus(self, self.page, self._action_bar.focus_main)
         self._make_actions()
 
         # Layout
@@ -136,6 +134,9 @@ class MainWindow(Rearranged, QMainWindow):
         self._sidebar.subject_told.connect(self._operator_view.set_subject)
         for page in self._pages:
             self._connect_page(page)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.focusChanged.connect(self._on_focus_changed)
 
         self._use_room()
         self._retranslate()
@@ -146,7 +147,7 @@ class MainWindow(Rearranged, QMainWindow):
             self.resize(FIRST_SIZE.boundedTo(available.size() - FRAME))
         self._pages[0].entered()
         self._refresh()
-        self._focus.set()
+        self._focus_page()
 
     def pages(self) -> tuple[Page, ...]:
         """Return the pages in the order of the steps."""
@@ -175,7 +176,7 @@ class MainWindow(Rearranged, QMainWindow):
         self._tell_attention()
         self.page().entered()
         self._refresh()
-        self._focus.set()
+        self._focus_page()
 
     def go_back(self) -> None:
         """Show the page before this one."""
@@ -394,6 +395,34 @@ class MainWindow(Rearranged, QMainWindow):
         self._action_bar.set_action(page.main_action(), can_go_back=self._now > 0)
         for each in self._hands_free_actions:
             each.setEnabled(page.is_hands_free())
+
+    def _focus_page(self) -> None:
+        """Put the focus on the control that the page chose, or on its first one."""
+        page = self.page()
+        first = page.first_control()
+        if first is not None:
+            first.setFocus(Qt.FocusReason.TabFocusReason)
+            return
+        widget = page.nextInFocusChain()
+        while widget is not None and page.isAncestorOf(widget):
+            takes_tab = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus)
+            if takes_tab and widget.isEnabled() and widget.isVisibleTo(page):
+                widget.setFocus(Qt.FocusReason.TabFocusReason)
+                return
+            widget = widget.nextInFocusChain()
+        self._action_bar.focus_main()
+
+    def _on_focus_changed(self, before: QWidget | None, now: QWidget | None) -> None:
+        """Let the page choose where the focus goes when what had it has vanished.
+
+        Qt gives it to whatever comes next, such as a button that Enter then presses.
+        """
+        if not isinstance(now, QAbstractButton) or now.window() is not self:
+            return
+        if before is None or before.isVisible() or not self._area.isAncestorOf(before):
+            return
+        if self.page().isAncestorOf(before):
+            self._focus_page()
 
     def _show_options(self) -> None:
         """Open the options above their button."""
