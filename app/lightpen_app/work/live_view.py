@@ -17,7 +17,7 @@ from lightpen.cameras.protocol import (
     ImageCamera,
     Stats,
 )
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Ended,

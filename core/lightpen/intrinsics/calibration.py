@@ -14,7 +14,7 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import N_SHAPE, BoardFit
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit
 from lightpen.intrinsics.distortion import (
     FEW,
     Choice,

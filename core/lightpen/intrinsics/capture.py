@@ -7,7 +7,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import N_SHAPE, BoardState, adjust_board
+from lightpen.intrinsics.adjustment import adjust_board
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardState
 from lightpen.intrinsics.boards import Board
 from lightpen.intrinsics.calibration import MIN_VIEWS
 from lightpen.intrinsics.coverage import cells_of

@@ -13,14 +13,8 @@ import numpy as np
 
 from lightpen.arrays import FloatArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    FINEST,
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust_board,
-    fit_board_poses,
-)
+from lightpen.intrinsics.adjustment import FINEST, adjust_board, fit_board_poses
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.uncertainty_map import error_fields
 from lightpen.intrinsics.views import BoardTolerances, Views

@@ -11,13 +11,8 @@ import numpy as np
 
 from lightpen.arrays import BoolArray, FloatArray, IntArray
 from lightpen.errors import CalibrationError
-from lightpen.intrinsics.adjustment import (
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust_board,
-    stated_information,
-)
+from lightpen.intrinsics.adjustment import adjust_board, stated_information
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.calibration import CameraCalibration, calibrate_camera
 from lightpen.intrinsics.start import BoardPoses, start_board_poses
 from lightpen.intrinsics.views import BoardTolerances, Views

@@ -7,13 +7,8 @@ import numpy as np
 import pytest
 
 from lightpen.arrays import FloatArray
-from lightpen.intrinsics.adjustment import (
-    N_SHAPE,
-    BoardFit,
-    BoardState,
-    adjust_board,
-    fit_board_poses,
-)
+from lightpen.intrinsics.adjustment import adjust_board, fit_board_poses
+from lightpen.intrinsics.board_fit import N_SHAPE, BoardFit, BoardState
 from lightpen.intrinsics.start import start_board_poses, start_camera
 from lightpen.intrinsics.views import BoardTolerances, Views
 from lightpen.model.camera import Camera
