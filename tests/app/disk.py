@@ -9,23 +9,23 @@ from threading import get_ident, main_thread
 from types import FrameType
 
 import lightpen_app
-import lightpen_resources
 
 TOUCHES = {
     *("open", "sqlite3.connect", "os.listdir", "os.scandir", "os.mkdir"),
     *("os.remove", "os.rename", "os.link", "os.rmdir", "shutil.copyfile"),
 }
 APP = str(Path(lightpen_app.__file__).parent) + os.sep
-# Before there is a window, after a bug, and where the program tries or installs itself.
+# Before there is a window, after a bug, where the program tries or installs itself, and
+# files of its own.
 MAY = tuple(
     str(Path(APP) / name)
     for name in (
         *("work/settings_store.py", "crash.py", "self_test", "desktop_entry.py"),
-        *("look/sounds.py", "paper/printing.py"),
+        *("look/sounds.py", "look/theme.py", "paper/printing.py"),
     )
 )
 USERS = str(Path(tempfile.gettempdir()).resolve()) + os.sep  # where tests put files
-RESOURCES = str(Path(lightpen_resources.__file__).parent) + os.sep
+SOURCES = str(Path(__file__).parents[2]) + os.sep
 
 
 class DiskWatch:
@@ -47,7 +47,7 @@ class DiskWatch:
         if event not in TOUCHES or get_ident() != main_thread().ident:
             return
         path = str(values[0])
-        if not path.startswith(USERS) or path.startswith(RESOURCES):
+        if not path.startswith(USERS) or path.startswith(SOURCES):
             return
         place = _place_in_program(sys._getframe(1))
         if place:

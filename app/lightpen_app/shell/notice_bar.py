@@ -51,10 +51,6 @@ class NoticeBar(Translated, QFrame):
         """Return what it says; empty while it is hidden."""
         return self._text.text()
 
-    def close_text(self) -> str:
-        """Return the word on the button that puts it away."""
-        return self._close.text()
-
     def show_text(
         self, text: str, tone: Tone = Tone.BAD, *, of_page: bool = False
     ) -> None:
