@@ -266,7 +266,7 @@ def test_a_slip_that_cannot_be_recorded_leaves_state_and_record_together(
         raise FileError(sentence("test.trouble", "The disk is full."))
 
     with monkeypatch.context() as patch:
-        patch.setattr("lightpen.swing.capture.advance", slipped_and_kept)
+        patch.setattr("lightpen.swing.capture.advance_swing", slipped_and_kept)
         patch.setattr(RecordWriter, "take_out", fail)
         with pytest.raises(FileError, match="disk is full"):
             wizard.run(4)
