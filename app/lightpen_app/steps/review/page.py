@@ -27,7 +27,6 @@ from lightpen_app.steps.review.remark_list import RemarkList
 from lightpen_app.steps.review.result_panel import Outcome, ResultPanel
 from lightpen_app.steps.review.result_tools import ResultTools
 from lightpen_app.steps.review.state_words import (
-    is_recording,
     next_step_text,
     remarks,
     review_state,
@@ -168,7 +167,7 @@ class ReviewPage(Rearranged, Page):
         match None if verdict is None else verdict.next_step:
             case None | NextStep.ACCEPT:
                 return MainAction(self.tr("Accept"), why_not, at_screen=True)
-            case NextStep.CAPTURE_MORE if not is_recording(status):
+            case NextStep.CAPTURE_MORE if not status.is_recording:
                 return MainAction(self.tr("Capture more"), why_not)
             case NextStep.SEE_TO_CAUSE:
                 return MainAction(self.tr("Check the settings"), why_not)
@@ -188,7 +187,7 @@ class ReviewPage(Rearranged, Page):
         match status.verdict.next_step:
             case NextStep.ACCEPT:
                 self._run.runner.accept()
-            case NextStep.CAPTURE_MORE if not is_recording(status):
+            case NextStep.CAPTURE_MORE if not status.is_recording:
                 self._on_capture_more_clicked()
             case NextStep.SEE_TO_CAUSE:
                 self.step_requested.emit("start")
@@ -390,7 +389,7 @@ class ReviewPage(Rearranged, Page):
         if images is not None:
             self._lock(images)
         all_read = ""
-        if is_recording(status):
+        if status.is_recording:
             all_read = self.tr("All recorded images are read.")
         self._capture_more.set_why_not(
             why_locked or all_read, self.tr("Add images to this swing")

@@ -58,7 +58,7 @@ def next_step_text(status: SwingStatus) -> str:
         return translate("ReviewPage", "Nothing is in force until it is accepted.")
     next_step = status.verdict.next_step
     text = worded(next_step.sentence)
-    if next_step is NextStep.CAPTURE_MORE and is_recording(status):
+    if next_step is NextStep.CAPTURE_MORE and status.is_recording:
         text = translate(
             "ReviewPage", "Next: record more images, and read them all again."
         )
@@ -68,11 +68,6 @@ def next_step_text(status: SwingStatus) -> str:
         form = translate("ReviewPage", "{0} The old one stays in force until then.")
         text = form.format(text)
     return text
-
-
-def is_recording(status: SwingStatus) -> bool:
-    """Return whether no more images can be captured: all were recorded before."""
-    return status.setup is not None and status.setup.is_recording
 
 
 def why_not_now(status: SwingStatus) -> str:
