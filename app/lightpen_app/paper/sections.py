@@ -10,7 +10,6 @@ from PySide6.QtGui import QPainter
 from lightpen.estimation.verdict import Grade
 from lightpen.record.retraced import Retraced
 from lightpen.record.statement import Entered, Statement
-from lightpen_app.look.kept_words import worded_anew
 from lightpen_app.look.phrases import grade_text, origin_text
 from lightpen_app.look.theme import LIGHT
 from lightpen_app.paper.evidence import file_pieces, image_pieces, led_pieces
@@ -28,6 +27,7 @@ from lightpen_app.paper.pieces import (
     printed_text,
     text_height,
 )
+from lightpen_app.paper.recorded_words import worded_anew
 
 translate = QCoreApplication.translate
 

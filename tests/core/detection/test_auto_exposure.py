@@ -50,7 +50,7 @@ class Loop:
             )
             assert seen.spots is not None
             before = now
-            now = now.fed(frame, seen.spots, inspect(seen.spots, seen.labels), caps)
+            now = now.after(frame, seen.spots, inspect(seen.spots, seen.labels), caps)
             if now.outcome is not Standing.ADJUSTING:
                 return now
             if now.asked != before.asked:
@@ -117,5 +117,5 @@ def test_images_of_another_exposure_are_passed_over() -> None:
     spots = look(frame.image, SCENE.camera, SCENE.pen).spots
     assert spots is not None
 
-    assert now.fed(frame, spots, inspect(spots), loop.camera.caps) is now
+    assert now.after(frame, spots, inspect(spots), loop.camera.caps) is now
     assert np.isinf(now.saturating)

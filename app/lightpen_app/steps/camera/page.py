@@ -361,7 +361,7 @@ class CameraPage(Rearranged, Page):
         if before is None or caps is None:
             return
         self._live.hurry()
-        self._adjustment = now = before.fed(seen.frame, seen.spots, inspection, caps)
+        self._adjustment = now = before.after(seen.frame, seen.spots, inspection, caps)
         exposure_us, gain_db = now.asked.exposure_us, now.asked.gain_db
         if exposure_us is not None and exposure_us != before.asked.exposure_us:
             self._live.set_exposure(exposure_us)
