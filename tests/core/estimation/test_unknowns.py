@@ -11,7 +11,13 @@ from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.joint import fit_joint
 from lightpen.estimation.uncertainty import ShareName
-from lightpen.estimation.unknowns import FULL_LEAN, lean_forms, led_basis, oval_seat
+from lightpen.estimation.unknowns import (
+    FULL_LEAN,
+    drift_forms,
+    lean_forms,
+    led_basis,
+    oval_seat,
+)
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen
 from lightpen.model.posture import rotations_of
@@ -237,6 +243,11 @@ def test_jitter_of_the_seat_is_found_with_its_size_and_its_share() -> None:
     assert result.bundle.sigma == pytest.approx(0.02, rel=0.1)
     # In x and y of the tip the mean of 60 such places is off by 10 um / sqrt(60).
     assert (share(result, ShareName.SEAT) > 0.5 * 0.01 / np.sqrt(60)).all()
+    still = calibrated(replace(PEN, led_sigma=0.002), 0.02, 9)
+    noise, of_still = (
+        np.diag(each.budget.independent_noise)[:3] for each in (result, still)
+    )
+    assert (np.sqrt(noise / of_still) < 1.6).all()  # 2.2 if it were noise as well
 
 
 def test_jitter_of_the_seat_in_few_images_is_taken_for_nothing_else() -> None:
@@ -297,6 +308,13 @@ def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
     np.testing.assert_allclose(np.mean(forms**2, axis=0), 1)
 
 
+def test_a_drift_in_time_says_nothing_of_where_the_cone_is_on_average() -> None:
+    (in_time,) = drift_forms(7).T
+
+    assert in_time.mean() == pytest.approx(0)
+    assert np.ptp(in_time) == pytest.approx(1)
+
+
 ANGLES = np.linspace(0, 2 * np.pi, 60, endpoint=False)
 ROUND = rotations_of(PEN, np.full(60, 0.4), ANGLES, np.zeros(60))
 
@@ -345,6 +363,8 @@ def test_an_oval_seat_is_found_as_such_and_leaves_the_tip(phase: float) -> None:
     components = result.bundle.components
     assert 0.003 < components.oval.sigma < 0.02
     assert not any(form.sigma for form in components.seat)
+    # Of 10 um, U holds as much along the pen as the images leave open.
+    assert share(result, ShareName.SEAT)[1] == pytest.approx(0.002, rel=0.4)
     moved = np.abs(result.joint.tip_pen - still.joint.tip_pen)
     assert (moved < 0.005).all()
     assert (moved < result.budget.expanded_uncertainty[:3]).all()
