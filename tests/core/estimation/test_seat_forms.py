@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from lightpen.estimation.seat_forms import FULL_LEAN, lean_forms, oval_seat
+from lightpen.estimation.seat_forms import (
+    FULL_LEAN,
+    drift_forms,
+    lean_forms,
+    oval_seat,
+)
 from lightpen.model.posture import rotations_of
 from lightpen.model.rigid import rotation_from_vector
 from lightpen.simulator.swings import paper_pen, swing_poses
@@ -16,6 +21,13 @@ def test_forms_of_the_seat_say_nothing_of_where_it_is_on_average() -> None:
 
     np.testing.assert_allclose(forms.mean(axis=0), 0, atol=1e-12)
     np.testing.assert_allclose(np.mean(forms**2, axis=0), 1)
+
+
+def test_a_drift_in_time_says_nothing_of_where_the_cone_is_on_average() -> None:
+    (in_time,) = drift_forms(7).T
+
+    assert in_time.mean() == pytest.approx(0)
+    assert np.ptp(in_time) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 1.2])

@@ -237,6 +237,11 @@ def test_jitter_of_the_seat_is_found_with_its_size_and_its_share() -> None:
     assert result.bundle.sigma == pytest.approx(0.02, rel=0.1)
     # In x and y of the tip the mean of 60 such places is off by 10 um / sqrt(60).
     assert (share(result, ShareName.SEAT) > 0.5 * 0.01 / np.sqrt(60)).all()
+    still = calibrated(replace(PEN, led_sigma=0.002), 0.02, 9)
+    noise, of_still = (
+        np.diag(each.budget.independent_noise)[:3] for each in (result, still)
+    )
+    assert (np.sqrt(noise / of_still) < 1.6).all()  # 2.2 if it were noise as well
 
 
 def test_jitter_of_the_seat_in_few_images_is_taken_for_nothing_else() -> None:
@@ -300,6 +305,8 @@ def test_an_oval_seat_is_found_as_such_and_leaves_the_tip(phase: float) -> None:
     components = result.bundle.components
     assert 0.003 < components.oval.sigma < 0.02
     assert not any(form.sigma for form in components.seat)
+    # Of 10 um, U holds as much along the pen as the images leave open.
+    assert share(result, ShareName.SEAT)[1] == pytest.approx(0.002, rel=0.4)
     moved = np.abs(result.joint.tip_pen - still.joint.tip_pen)
     assert (moved < 0.005).all()
     assert (moved < result.budget.expanded_uncertainty[:3]).all()

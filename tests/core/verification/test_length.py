@@ -34,6 +34,21 @@ def test_a_length_is_measured_within_its_uncertainty(
     assert found.runs[0].along_view < 0.1
 
 
+def test_a_camera_that_moved_makes_a_length_less_certain_along_it(
+    instrument: Instrument, touching: Touching
+) -> None:
+    run = ("here", touching(np.array([START, END])))
+
+    still, across, along = (
+        measure_length([run], instrument, LENGTH, LIMITS, drift=np.array(drift))
+        for drift in ([0.0, 0.0, 0.0], [0.0, 0.01, 0.0], [0.01, 0.0, 0.0])
+    )
+
+    assert across.uncertainties[0] == pytest.approx(still.uncertainties[0])
+    moved = np.hypot(still.uncertainties[0], 2 * 0.01)
+    assert along.uncertainties[0] == pytest.approx(moved, rel=1e-3)
+
+
 @pytest.mark.parametrize("ball_offset", [2.0, -2.0])
 def test_at_faces_the_ball_is_compensated_along_the_length(
     instrument: Instrument, touching: Touching, ball_offset: float

@@ -17,6 +17,7 @@ from lightpen.verification.touch import (
     Touch,
     TouchFrame,
     joint_covariance,
+    mean_point,
     measure_touches,
     on_surface,
     point_sensitivities,
@@ -65,6 +66,8 @@ def test_a_point_follows_the_parameters_as_its_derivative_says(
     poses = fit_poses(instrument.camera, instrument.pen, pixels, R[None], t[None])
     (derivative,) = point_sensitivities(instrument, poses)
     by_scale = derivative[:, at.leds] @ instrument.pen.leds.ravel()
+    # No image depends on the tip, which goes with the pen.
+    np.testing.assert_allclose(derivative[:, at.tip], R, atol=1e-6)
     for by_this, step in (
         (derivative[:, at.cameras[0].start], (0.1, 0.0, 0.0)),
         (by_scale, (0.0, 1e-4, 0.0)),
@@ -117,6 +120,10 @@ def test_what_touches_share_drops_out_of_their_difference(
     together = D @ covariance @ D.T
 
     assert np.trace(together) < 0.1 * np.trace(alone)
+    np.testing.assert_allclose(covariance[:3, :3], touches[0].covariance(instrument))
+    np.testing.assert_allclose(
+        mean_point(touches).noise, (touches[0].noise + touches[1].noise) / 4
+    )
 
 
 def test_a_ball_is_compensated_along_approach_or_axis(touching: Touching) -> None:
