@@ -65,6 +65,10 @@ class Supervision:
         """Whether it takes a supervisor to change limits and to go beyond them."""
         return bool(self.password_hash)
 
+    def limits_at(self, station: str, chosen: StationLimits) -> StationLimits:
+        """Return what holds at a station: what is laid down for it, or was chosen."""
+        return self.limits.get(station, chosen)
+
 
 class _SwingLimits(Struct):
     max_uncertainty_mm: float
