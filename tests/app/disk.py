@@ -61,11 +61,11 @@ def disk_watch() -> DiskWatch:
 
 
 def _place_in_program(frame: FrameType | None) -> str:
-    """Return where the program does what it does; nothing where a test does it."""
+    """Return where the program does what it does; nothing where a test does."""
     place = ""
     while frame is not None:
         file = frame.f_code.co_filename
-        if file.startswith(MAY):
+        if file.startswith((*MAY, "<frozen importlib")):
             return ""
         if file.startswith(APP) and not place:
             place = f"{file.removeprefix(APP)}:{frame.f_lineno}"
