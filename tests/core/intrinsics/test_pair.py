@@ -72,6 +72,16 @@ def test_the_scale_of_the_board_is_part_of_the_baseline(camera: Camera) -> None:
     assert found.baseline_sigma == pytest.approx(0.01 * found.baseline, rel=0.05)
 
 
+def test_views_of_the_second_camera_alone_are_used(camera: Camera) -> None:
+    views = both_see(camera)
+    pixels = views.pixels.copy()
+    pixels[9:, 0] = np.nan
+    found = calibrate_pair(replace(views, pixels=pixels), BoardTolerances(), NAMES)
+
+    assert (found.n_pairs, found.views.n_views) == (9, 14)
+    assert np.abs(errors(found)).max() < 3.5
+
+
 def test_a_board_numbered_from_its_other_end_is_turned_round(camera: Camera) -> None:
     views = both_see(camera)
     pixels = views.pixels.copy()
