@@ -22,7 +22,6 @@ from lightpen.record.names import Names
 from lightpen.record.reading import open_record
 from lightpen.record.results import Result
 from lightpen.record.unfinished import discard_damaged, discard_swing
-from lightpen.record.writing import note_taken_out
 
 NAMES = Names("Hall 2", "Ann", "LP-04", "T-10", "C-1", 10.0)
 
@@ -94,19 +93,6 @@ def test_an_accepted_tip_is_entered_with_all_that_it_was_made_from(
     (written,) = entries_of(logbook.database, logbook.chain)
     (record,) = records_of(logbook.database, [written]).values()
     assert '"observations": [{"file": "000001.png"' in record
-
-
-def test_a_journal_that_has_grown_since_is_no_change(
-    data: Path, logbook: Logbook
-) -> None:
-    FolderArchive(data).store(result(data))
-    logbook.enter_owed()
-    note_taken_out(data / RECORDS / "swing", {2: "by hand"})
-    assert checked(data).findings == ()
-    header = data / RECORDS / "swing" / "header.json"
-    header.write_bytes(header.read_bytes() + b" ")
-    (finding, *_) = checked(data).findings
-    assert "header.json" in str(finding)
 
 
 def test_results_of_earlier_versions_are_taken_over_once_and_stay(data: Path) -> None:
