@@ -61,7 +61,7 @@ def title_text() -> str:
     return translate("paper", "Calibration record")
 
 
-def moment_text(moment: datetime) -> str:
+def zoned_moment_text(moment: datetime) -> str:
     """Return a moment with the time zone that it was written in."""
     return moment.isoformat(sep=" ", timespec="seconds")
 
@@ -135,12 +135,14 @@ def _items(statement: Statement) -> Iterable[Piece]:
             ),
             (
                 translate("paper", "Computed"),
-                moment_text(calibration.created),
+                zoned_moment_text(calibration.created),
             ),
             (translate("paper", "Cone"), _stated(names.cone)),
             (
                 translate("paper", "Accepted"),
-                translate("paper", "no") if accepted is None else moment_text(accepted),
+                translate("paper", "no")
+                if accepted is None
+                else zoned_moment_text(accepted),
             ),
             (translate("paper", "Images are"), origin_text(statement.origin)),
             (

@@ -367,7 +367,8 @@ class Workbench(QObject):
         self.run.runner.shut_down()
         self.verification.runner.shut_down()
         self.live.close()
-        jobs_ended = QThreadPool.globalInstance().waitForDone(round(1000 * timeout_s))
+        pool = QThreadPool.globalInstance()
+        jobs_ended = pool.waitForDone(round(1000 * timeout_s))
         # A dead camera may take longer, and has nothing to tell any more.
         of_camera = min(max(0.0, deadline - monotonic()), LONGEST_FAREWELL)
         has_closed = self.live.await_closed(of_camera)
@@ -377,6 +378,7 @@ class Workbench(QObject):
         )
         self.streaming.shut_down()
         self.folder_watch.leave()
+        pool.waitForDone(round(1000 * max(0.0, deadline - monotonic())))
         is_saved = self._settings.await_saved(max(0.0, deadline - monotonic()))
         return jobs_ended and has_closed and has_ended and is_saved
 

@@ -18,8 +18,8 @@ from pathlib import Path
 from msgspec import Struct, to_builtins
 
 from lightpen.errors import AcceptanceError, FileError
-from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import MEGABYTE, printable, read_bytes
+from lightpen.formats.json_records import record_bytes
 from lightpen.formats.own_json import (
     DamagedError,
     Moment,

@@ -20,7 +20,7 @@ from lightpen.estimation.linearised import (
     views_at,
 )
 from lightpen.estimation.priors import priors_of
-from lightpen.estimation.unknowns import forms_of
+from lightpen.estimation.seat_forms import forms_of
 from lightpen.model.assumptions import USUAL
 from lightpen.model.camera import Camera
 from lightpen.model.pen import Pen

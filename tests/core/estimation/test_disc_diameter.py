@@ -15,7 +15,7 @@ from lightpen.estimation.disc_diameter import (
     read_diameter,
 )
 from lightpen.estimation.linearised import BundleState
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.estimation.verdict import Grade, judge
 from lightpen.formats.observation_files import Centers

@@ -12,7 +12,7 @@ from lightpen.arrays import FloatArray
 from lightpen.detection.observations import observe_centers
 from lightpen.estimation.calibrate import Calibration, calibrate
 from lightpen.estimation.noise_correlation import lag1
-from lightpen.estimation.report import warnings_of
+from lightpen.estimation.report_warnings import warnings_of
 from lightpen.estimation.uncertainty import ShareName
 from lightpen.formats.observation_files import Centers
 from lightpen.model.pen import Pen

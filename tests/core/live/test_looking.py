@@ -16,7 +16,7 @@ import pytest
 from lightpen.cameras.clock import SkippingClock
 from lightpen.cameras.protocol import CameraSettings, ImageCamera
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,

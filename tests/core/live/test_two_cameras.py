@@ -19,7 +19,7 @@ from lightpen.cameras.clock import MachineClock
 from lightpen.cameras.device_camera import DeviceCamera
 from lightpen.cameras.protocol import CameraSettings, Frame, ImageCamera, Region
 from lightpen.cameras.replay import ReplayCamera
-from lightpen.cameras.worker import (
+from lightpen.cameras.worker_events import (
     Connection,
     ConnectionChanged,
     Failed,

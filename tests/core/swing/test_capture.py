@@ -18,9 +18,7 @@ from lightpen.detection.reasons import Reason
 from lightpen.detection.sighting import Sighting, look
 from lightpen.errors import FileError
 from lightpen.estimation.calibrate import Calibration, calibrate
-from lightpen.estimation.report import (
-    calibration_record,
-)
+from lightpen.estimation.report import calibration_record
 from lightpen.formats.camera_files import CAMERA_FILE, write_camera
 from lightpen.formats.hashes import InputFile, Inputs
 from lightpen.formats.pen_files import PEN_FILE, write_pen

@@ -18,7 +18,7 @@ from lightpen.arrays import FloatArray
 from lightpen.cameras.protocol import CameraSettings
 from lightpen.cameras.source import FoundDevice
 from lightpen.cameras.sources import absent_sources
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.detection.auto_exposure import AutoExposure
 from lightpen.detection.inspection import Exposure, Inspection, inspect
 from lightpen.detection.mask import clicked, with_circle

@@ -9,7 +9,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 from typing_extensions import override
 
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.model.limits import SwingLimits
 from lightpen.swing.kept_images import KeptImages
 from lightpen.swing.preparation import SourceKind

@@ -35,7 +35,7 @@ from typing_extensions import override
 
 from lightpen.cameras.pairing import not_synchronised
 from lightpen.cameras.protocol import CameraSettings, Frame, sealed
-from lightpen.cameras.worker import Connection
+from lightpen.cameras.worker_events import Connection
 from lightpen.detection.inspection import SEARCHED_IMAGES
 from lightpen.detection.spots import detect_spots
 from lightpen.formats.camera_files import write_camera
