@@ -103,6 +103,22 @@ def test_the_area_of_a_saturated_led_is_not_known() -> None:
     )
 
 
+def test_the_width_of_the_rims_is_that_of_the_leds_alone() -> None:
+    sighting = look(seen(1.0)[0], SCENE.camera, SCENE.pen)
+    assert sighting.spots is not None
+    assert sighting.labels is not None
+    labelled = sighting.labels.spot.copy()
+    lamp, labelled[4] = labelled[4], -1
+    widths = sighting.spots.edge_widths.copy()
+    widths[lamp] = 100.0
+    beside_lamp = replace(
+        sighting,
+        spots=replace(sighting.spots, edge_widths=widths),
+        labels=replace(sighting.labels, spot=labelled),
+    )
+    assert beside_lamp.edge_width == pytest.approx(np.delete(widths, lamp).mean())
+
+
 def test_a_dark_image_is_empty() -> None:
     dark = np.zeros((SCENE.camera.height, SCENE.camera.width), np.uint8)
     sighting = look(dark, SCENE.camera, SCENE.pen)

@@ -90,6 +90,11 @@ def test_a_pen_that_grew_is_told_by_the_length(
 
     assert found.scale.factor - 1 == pytest.approx(grown, rel=0.3)
     assert found.scale.uncertainty < 0.2 * found.scale.uncertainty_before
+    vague = measure_length(runs, unsure, LENGTH, LIMITS, certified_uncertainty=0.1)
+    # All three are off by what is certified; before that, U is 0.2 %.
+    by_length = np.hypot(0.1 / LENGTH, found.scale.uncertainty)
+    together = (by_length**-2 + found.scale.uncertainty_before**-2) ** -0.5
+    assert vague.scale.uncertainty == pytest.approx(together, rel=0.05)
 
 
 def test_one_end_touched_twice_is_refused(

@@ -88,6 +88,26 @@ def test_more_images_make_a_point_less_noisy(touching: Touching) -> None:
     assert ratio == pytest.approx(25, rel=0.3)  # the noise itself is estimated
 
 
+def test_images_that_scatter_by_more_than_their_noise_make_a_point_less_certain(
+    instrument: Instrument,
+) -> None:
+    R = np.diag([1.0, -1.0, -1.0])
+    rng = np.random.default_rng(0)
+    t = PAPER_CONE - R @ PAPER_TIP + 0.05 * rng.standard_normal((25, 3))
+    pixels = simulate_centers(
+        instrument.camera, instrument.pen, np.tile(R, (25, 1, 1)), t, 0.01, rng
+    )
+    frames = tuple(
+        TouchFrame(f"image {i}", each[None], R, t[i]) for i, each in enumerate(pixels)
+    )
+
+    (touch,) = measure_touches(instrument, [StillFrames(frames)])
+
+    # Along the view the noise is as large as the scatter.
+    across = np.sqrt(np.diag(touch.noise))[:2]
+    assert (across > 0.5 * 0.05 / np.sqrt(25)).all()
+
+
 def test_an_image_that_slipped_is_left_out_and_named(instrument: Instrument) -> None:
     R = np.diag([1.0, -1.0, -1.0])
     t = np.tile(PAPER_CONE - R @ PAPER_TIP, (6, 1))
