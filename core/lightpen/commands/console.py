@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from lightpen.errors import UsageError
-from lightpen.estimation.report import record_bytes
 from lightpen.formats.files import A_FILE, printable, unreadable, write_whole
+from lightpen.formats.json_records import record_bytes
 from lightpen.sentences import sentence
 
 DONE, NO_TIP, BAD_INPUT = 0, 1, 2

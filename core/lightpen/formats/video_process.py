@@ -32,7 +32,7 @@ MAX_DECODER_MEMORY = 300_000_000  # bytes, beyond what Python and OpenCV take
 
 
 def count_frames(path: Path) -> int:
-    """Return how many frames a video has; see `videos.count_frames`.
+    """Return how many frames a video has; see `videos`.
 
     Raises
     ------
@@ -115,11 +115,11 @@ def _hush_decoders() -> None:
 
 
 def _send_count(to: "Connection", path: Path) -> None:
-    to.send(videos.count_frames(path))
+    to.send(videos.count_frames_in_process(path))
 
 
 def _send_frames(to: "Connection", path: Path, n_frames: int) -> None:
-    for load in videos.frame_loaders(path, n_frames):
+    for load in videos.frame_loaders_in_process(path, n_frames):
         try:
             to.send(load())
         except FileError as error:

@@ -25,7 +25,7 @@ from lightpen.swing.state import (
 )
 
 
-def read_image(
+def take_recorded_image(
     setup: SwingSetup,
     state: SwingState,
     sighting: Sighting,

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 from PySide6.QtCore import QCoreApplication
 from PySide6.QtGui import QFont, QRawFont
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication
 from pytestqt.qtbot import QtBot
 
 from lightpen_app.look.languages import Language, LanguageSwitch
@@ -222,16 +222,17 @@ def test_the_language_changes_while_a_widget_is_shown(
 ) -> None:
     notice = NoticeBar()
     qtbot.addWidget(notice)
+    (close,) = notice.findChildren(QAbstractButton)
     switch = LanguageSwitch(qapp)
 
     switch.set_language(Language.CHINESE)
     QCoreApplication.processEvents()
-    chinese = notice.close_text()
+    chinese = close.text()
     switch.set_language(Language.ENGLISH)
     QCoreApplication.processEvents()
 
     assert chinese == "\u5173\u95ed"
-    assert notice.close_text() == "Close"
+    assert close.text() == "Close"
 
 
 def test_texts_of_qt_itself_are_translated_too(qapp: QApplication) -> None:
