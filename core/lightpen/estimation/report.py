@@ -25,6 +25,7 @@ from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
+from lightpen.sentences import Sentence
 
 
 def calibration_record(
