@@ -160,7 +160,7 @@ def main() -> int:
         application.exec()
         print(json.dumps(soak.figures()))
         workbench.run.runner.abandon()
-        wizard.window.close()
+        wizard.window.close_unasked()
     return 0
 
 

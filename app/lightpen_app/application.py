@@ -235,7 +235,7 @@ def run_demo(make_pages: MakePages) -> int:
         if not is_seen:
             demo.told.connect(partial(print, flush=True))
             demo.ended.connect(partial(_print_tip, wizard.workbench.run))
-            demo.ended.connect(wizard.window.close)
+            demo.ended.connect(wizard.window.close_unasked)
         QTimer.singleShot(0, demo.start)
         status = _shown(application, wizard, signals)
         if not is_seen and not demo.is_accepted:

@@ -2,6 +2,8 @@
 
 import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from subprocess import CompletedProcess
@@ -62,6 +64,34 @@ def test_the_demo_plays_without_a_screen_in_1_5_gb_and_prints_the_tip(
     tip = [float(number) for number in JOINT.findall(outcome.stdout)[0]]
     assert np.linalg.norm(np.array(tip) - Scene().tip_pen) <= 0.005
     assert list(tmp_path.rglob("*")) == []  # nothing of it is kept
+
+
+FAILING = """
+import sys
+from lightpen_app.__main__ import main
+from lightpen_app.demo import Demo
+def has_failed(self):
+    state = self._workbench.run.status.state
+    return state is not None and state.n_kept > 3
+Demo._has_failed = has_failed
+sys.argv = ["lightpen", "--demo"]
+sys.exit(main())
+"""
+
+
+def test_an_unseen_demo_that_fails_asks_nobody_before_it_closes(tmp_path: Path) -> None:
+    homes = {name: str(tmp_path) for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME")}
+    outcome = subprocess.run(
+        [sys.executable, "-c", FAILING],
+        env=os.environ | NO_SCREEN | homes,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_S,
+        check=False,
+    )
+
+    assert outcome.returncode == 1, outcome.stderr
+    assert "there is no tip to accept" in outcome.stdout
 
 
 def test_the_window_is_refused_in_a_sentence_without_a_screen(newcomer: Run) -> None:
