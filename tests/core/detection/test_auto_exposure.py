@@ -116,7 +116,7 @@ def test_the_least_light_that_saturates_is_remembered() -> None:
 
     for known, least in ((np.inf, 4000.0), (5000.0, 4000.0), (3000.0, 3000.0)):
         now = replace(begun, saturating=known)
-        now = now.fed(frame, seen.spots, leds, loop.camera.caps)
+        now = now.after(frame, seen.spots, leds, loop.camera.caps)
         assert now.saturating == pytest.approx(least)
 
 

@@ -625,6 +625,7 @@ def test_a_folder_is_picked_in_the_dialog(
     live.wait("80 x 64 px")
     live.wait("lost: 1")
 
+
 def test_a_missing_folder_is_told_and_tried_again(live: "Seen", tmp_path: Path) -> None:
     folder = tmp_path / "swing"
     live.choose("Recorded images")
