@@ -928,6 +928,7 @@ def test_a_corrupt_image_is_dropped_and_named_and_the_rest_used(
     frames = json.loads(file.read_text(encoding="utf-8"))["frames"]
     assert [frame["file"] for frame in frames if not frame["used"]] == [corrupt.name]
     assert frames[19]["reason"]
+    assert re.fullmatch(r"(image|read)\.[a-z-]+", frames[19]["detail_code"])
 
 
 def test_a_folder_of_nothing_but_corrupt_images_is_refused(

@@ -285,7 +285,9 @@ def test_the_text_shows_images_residuals_and_the_weakest_direction(
 
 
 def test_the_text_counts_dropped_images_by_reason(record: Record, scene: Scene) -> None:
-    fields = record(scene("--scene", "hard", "--images", "60", "--seed", "1"))
+    fields = record(
+        scene("--scene", "hard", "--images", "60", "--seed", "1", "--binning", "2")
+    )
     reasons = [frame["reason"] for frame in fields["frames"] if not frame["used"]]
     assert len(set(reasons)) >= 2
     for reason in set(reasons):

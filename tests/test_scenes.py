@@ -19,9 +19,9 @@ Truth = Callable[[Path], dict[str, Any]]
 
 HARD = ("--scene", "hard", "--images", "60", "--seed")
 SMALL = ("--binning", "2")  # a quarter of the pixels
-HARD_SCENES = tuple(
-    (*HARD, seed, *size)
-    for seed, size in (("1", ()), ("24", ()), ("2", SMALL), ("3", SMALL), ("4", SMALL))
+HARD_SCENES = (
+    (*HARD, "24"),
+    *((*HARD, seed, *SMALL) for seed in ("1", "2", "3", "4")),
 )
 CLEAN = (*SMALL, "--images", "40", "--seed", "8")
 OTHER_PENS = ("six", "eight", "near-symmetric", "fanned")

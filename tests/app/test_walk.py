@@ -1,11 +1,9 @@
 """From Start to Accept through the whole wizard, as an operator walks it."""
 
-import json
 import re
+import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 from pathlib import Path
-from subprocess import CompletedProcess
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,14 +17,18 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QTabBar,
 )
+from tests.app.walks import (
+    FEW,
+    NAMES,
+    Run,
+    calibrated,
+    read_out,
+    result_on_disk,
+    told,
+    watch_the_swing,
+)
 
-from lightpen.arrays import FloatArray
-from lightpen.live.sources import Surroundings
 from lightpen.model.origin import Origin
-from lightpen.record.reading import open_record
-from lightpen.record.results import Result
-from lightpen.record.unfinished import find_unfinished
-from lightpen.simulator.scenes import Scene
 from lightpen_app.look.languages import Language
 from lightpen_app.work.settings import Preferences, Settings, Station
 
@@ -34,24 +36,6 @@ if TYPE_CHECKING:
     from tests.app.conftest import OpenWizard, Walker
 
 Key = Qt.Key
-Run = Callable[..., CompletedProcess[str]]
-NAMES = {
-    "Station": "Hall 2",
-    "Operator": "Ann",
-    "Pen, serial number": "LP-04",
-    "Probe tip": "T-10",
-    "Cone": "C-1",
-}
-FEW = {"U (k = 2) at most": "0.01", "Images at least": "20", "Images at most": "150"}
-AT_FIRST = {
-    "Start": "now",
-    "Camera": "closed",
-    "LEDs": "closed",
-    "Swing": "closed",
-    "Review": "closed",
-    "Verify": "closed",
-    "History": "to do",
-}
 HANDLES = (
     QAbstractButton,
     QAbstractItemView,
@@ -74,85 +58,6 @@ SAME_EVERYWHERE = {
 BEST_FIT = "tip_in_leds_csv_frame_bestfit"
 
 
-@dataclass(frozen=True)
-class ReadOut:
-    """The tip and its U (k = 2) as they are shown, x y z each, mm."""
-
-    numbers: tuple[str, ...]
-
-    @property
-    def tip(self) -> FloatArray:
-        return np.array(self.numbers[:3], dtype=np.float64)
-
-    @property
-    def u(self) -> FloatArray:
-        return np.array(self.numbers[3:], dtype=np.float64)
-
-
-def test_the_simulated_pen_by_the_mouse(walker: "Walker", lightpen: Run) -> None:
-    assert walker.title() == "Start"
-    assert walker.steps() == AT_FIRST
-    assert walker.says("Enter the name of the station.")
-    assert not walker.main_button().isEnabled()
-    for name, text in {**NAMES, **FEW}.items():
-        walker.click_into(name, text)
-    walker.until_says("Pen LP-04\nTip T-10\nCone C-1")
-    assert walker.says("SIMULATED")
-    walker.click("Continue to the camera")
-
-    assert walker.title() == "Camera"
-    walker.until_says("Live")
-    walker.until_tells("10 of 10 LEDs")
-    assert walker.tells("Fits the live images: 1224 x 1024")
-    walker.click("Continue to the LEDs")
-
-    assert walker.title() == "LEDs"
-    walker.until_says("10 of 10 LEDs")
-    walker.until(lambda: _misfit(walker) < 0.1)
-    assert walker.steps()["LEDs"] == "now"
-    walker.click("Continue to the swing")
-
-    assert walker.title() == "Swing"
-    assert walker.main_button().text() == "Finish early"
-    assert walker.says("No image is kept yet.")
-    walker.swing()
-    _watch_the_swing(walker)
-    n_inputs = walker.n_inputs
-    walker.operator.hold()
-    walker.operator.lean(0.0, 0.0, 0.0)  # upright and still: on to the review
-    walker.until_shows("Review")
-    assert walker.n_inputs == n_inputs
-
-    assert walker.says("PASS: Good")
-    walker.until(walker.main_button().isEnabled)
-    shown = _read_out(walker)
-    # Four standard deviations: U is two.
-    assert (
-        np.abs(shown.tip - walker.workbench.around.scene.tip_pen) <= 2 * shown.u
-    ).all()
-    walker.click("Accept")
-
-    walker.until_says("PRACTICE KEPT")
-    steps = walker.steps()
-    assert steps.pop("Verify") == "to do"
-    assert set(steps.values()) == {"done", "now"}
-    result = _result_on_disk(walker)
-    assert result.grade == "pass"
-    np.testing.assert_allclose(result.tip_pen, shown.tip, atol=1e-4)
-    record = open_record(Path(result.record))
-    assert record.verdict == "pass"
-    assert find_unfinished(record.folder.parent).interrupted == ()
-    assert _calibrated(lightpen, record.folder) == result.tip_pen.tolist()
-    walker.until(walker.main_button().isEnabled)
-    walker.click("Start the next calibration")
-
-    assert walker.title() == "Start"
-    walker.until_says("Today")
-    assert walker.says("PASS")
-    assert all(walker.says(number) for number in shown.numbers)
-    assert walker.steps()["Swing"] == "to do"
-
-
 def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     _check_round(walker)
     for name, text in {**NAMES, **FEW}.items():
@@ -172,7 +77,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     _check_round(walker)
     walker.tab_to("Let the simulated operator swing")
     walker.press(Key.Key_Return)
-    _watch_the_swing(walker)
+    watch_the_swing(walker)
     walker.press(Key.Key_PageDown)
 
     assert walker.says("PASS: Good")
@@ -182,7 +87,7 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
     walker.press(Key.Key_Return)
 
     walker.until_says("PRACTICE KEPT")
-    assert _result_on_disk(walker).names.operator == "Ann"
+    assert result_on_disk(walker).names.operator == "Ann"
     walker.until(walker.main_button().isEnabled)
     walker.press(Key.Key_PageDown)
     walker.until_says("Today")
@@ -190,13 +95,15 @@ def test_the_simulated_pen_by_the_keys_alone(walker: "Walker") -> None:
 
 def test_a_recorded_swing_gives_its_tip(
     open_wizard: "OpenWizard",
-    around: Surroundings,
-    shared_data: Path,
+    scene: Callable[..., Path],
+    tmp_path: Path,
     truth: Callable[[Path], dict[str, Any]],
     lightpen: Run,
 ) -> None:
-    folder = shared_data / "swing-clean"
-    walker = open_wizard(replace(around, scene=Scene()))
+    rendered = scene("--binning", "2", "--images", "60", "--seed", "8")
+    folder = tmp_path / "recorded"  # as of a real pen, without the simulator's mark
+    shutil.copytree(rendered, folder, ignore=shutil.ignore_patterns("SIMULATED.txt"))
+    walker = open_wizard()
     for name, text in NAMES.items():
         walker.click_into(name, text)
     walker.click("Continue to the camera")
@@ -210,7 +117,7 @@ def test_a_recorded_swing_gives_its_tip(
     walker.until_says("Open the intrinsics file.")
     walker.until_says("Beside the images: camera.yaml and leds.csv")
     walker.click("Use both")
-    walker.until_tells("Fits the live images: 2448 x 2048")
+    walker.until_tells("Fits the live images: 1224 x 1024")
     walker.until(walker.main_button().isEnabled)
     assert not walker.offers("Use both")
     walker.click("Continue to the LEDs")
@@ -219,7 +126,7 @@ def test_a_recorded_swing_gives_its_tip(
 
     n_inputs = walker.n_inputs
     walker.until_says("READING")
-    walker.until(lambda: bool(re.search(r"\d+ of 60 read", _told(walker))))
+    walker.until(lambda: bool(re.search(r"\d+ of 60 read", told(walker))))
     assert not walker.tells("Lean")
     walker.until_says("Review")
     walker.until(walker.main_button().isEnabled)
@@ -227,16 +134,15 @@ def test_a_recorded_swing_gives_its_tip(
     walker.click("Review")
     walker.until(walker.main_button().isEnabled)
 
-    tip = _read_out(walker).tip
+    tip = read_out(walker).tip
     true_tip = np.array(truth(folder)["pen"][BEST_FIT])
-    # A solver that knows the images' model comes as near as 3.1 um.
     assert np.linalg.norm(tip - true_tip) <= 0.004
     walker.click("Accept")
     walker.until_says("IN FORCE")
     assert walker.says("RECORDED")
-    result = _result_on_disk(walker)
+    result = result_on_disk(walker)
     assert result.origin is Origin.RECORDED
-    assert _calibrated(lightpen, Path(result.record)) == result.tip_pen.tolist()
+    assert calibrated(lightpen, Path(result.record)) == result.tip_pen.tolist()
     names = [frame["file"] for frame in result.calibration["frames"]]
     assert len(names) == 60
 
@@ -309,57 +215,6 @@ def _english_in(text: str) -> str:
 )
 def test_the_search_for_english_words_finds_them(text: str, is_english: bool) -> None:
     assert bool(_english_in(text)) is is_english
-
-
-def _watch_the_swing(walker: "Walker") -> None:
-    """See a swing go by itself from the seat to a good verdict."""
-    n_inputs = walker.n_inputs
-    walker.until_tells("Starts in ")
-    walker.until_says("Lean RIGHT")
-    walker.until(lambda: bool(re.search(r"\d+ kept, \d+ to go", _told(walker))))
-    walker.until_says("CAPTURING")
-    walker.until_tells("10 of 10 LEDs, ")
-    assert walker.main_button().isEnabled()
-    walker.until_says("PASS")
-    assert walker.main_button().text() == "Review"
-    assert walker.steps()["Swing"] == "now"
-    assert walker.n_inputs == n_inputs
-
-
-def _told(walker: "Walker") -> str:
-    return "\n".join(walker.texts())
-
-
-def _misfit(walker: "Walker") -> float:
-    """The misfit that is told with the LEDs, px."""
-    return float(re.findall(r"misfit (\S+) px", _told(walker))[0])
-
-
-def _read_out(walker: "Walker") -> ReadOut:
-    told = _told(walker)
-    tip = re.findall(r"^[xyz] = (\S+) mm$", told, re.MULTILINE)
-    u = re.findall(r"^\u00b1 (\S+) mm$", told, re.MULTILINE)
-    assert len(tip) == len(u) == 3
-    return ReadOut((*tip, *u))
-
-
-def _result_on_disk(walker: "Walker") -> Result:
-    archive, folder = walker.workbench.run.archive, walker.workbench.folder
-    assert len(list(folder.rglob("results/*.json"))) == 1
-    is_simulated = walker.workbench.preparation.origin is Origin.SIMULATED
-    pen, tip = NAMES["Pen, serial number"], NAMES["Probe tip"]
-    result = archive.in_force(pen, tip, is_simulated=is_simulated)
-    assert result is not None
-    return result
-
-
-def _calibrated(lightpen: Run, record: Path) -> list[float]:
-    """The tip that the command line makes of a record."""
-    file = record.parent / "calibration.json"
-    outcome = lightpen("calibrate", record, "--json", file)
-    assert outcome.returncode == 0, outcome.stderr
-    tip: list[float] = json.loads(file.read_text(encoding="utf-8"))["tip_pen_mm"]
-    return tip
 
 
 def _check_round(walker: "Walker") -> None:

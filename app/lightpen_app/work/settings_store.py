@@ -19,12 +19,12 @@ from lightpen.formats.files import (
     MEGABYTE,
     printable,
     read_bytes,
-    strerror,
     sync_folder,
     write_whole,
 )
 from lightpen.formats.own_json import DamagedError, parse_own_json
 from lightpen.formats.part_files import sweep_parts
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import Sentence, sentence
 
 WHAT = sentence("file.settings", "settings file")

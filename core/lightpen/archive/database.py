@@ -1,8 +1,8 @@
 """The database of an archive: a file of SQLite, or a server of PostgreSQL.
 
 It is looked at before anything is written: one of another program, or of a later
-version of this one, stays as it is. One of an earlier version is brought up to date by
-the steps in the folder ``migrations``.
+version of this one, stays as it is. A new one gets the tables as they are now, one of
+an earlier version is brought up to date by the steps in the folder ``migrations``.
 """
 
 import socket
@@ -22,15 +22,18 @@ from time import monotonic, sleep
 from typing import Any
 
 from sqlalchemy import (
+    Column,
     Connection,
     Engine,
+    MetaData,
+    PrimaryKeyConstraint,
     String,
-    column,
+    Table,
     create_engine,
     event,
+    insert,
     inspect,
     select,
-    table,
     text,
 )
 from sqlalchemy.engine import URL, make_url
@@ -38,9 +41,10 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.pool import QueuePool
 
 from lightpen.archive import earlier
+from lightpen.archive.tables import METADATA
 from lightpen.archive.uses import Uses
 from lightpen.errors import ArchiveError, FileError, NoArchiveError
-from lightpen.formats.files import printable
+from lightpen.formats.files import A_FILE, printable, unreadable
 from lightpen.record.numbered_files import make_folder
 from lightpen.sentences import sentence
 
@@ -73,7 +77,12 @@ SET lock_timeout = 30000"""
 # A relay between may keep a line open though nobody is at its other end any more.
 LONGEST_ANSWER_S = 120.0
 
-_VERSION = table(VERSION_TABLE, column("version_num", String))
+_VERSION = Table(
+    VERSION_TABLE,
+    MetaData(),
+    Column("version_num", String(32), nullable=False),
+    PrimaryKeyConstraint("version_num", name=f"{VERSION_TABLE}_pkc"),  # as Alembic's
+)
 
 
 @dataclass(frozen=True)
@@ -147,7 +156,9 @@ def open_file(path: Path) -> Database:
         It is not of this program, or cannot be used.
     """
     name = printable(str(path))
-    if path.exists():
+    with _looking_at(path):
+        is_there = path.exists()
+    if is_there:
         with closing(_read_only(path)) as database:  # which changes nothing
             _require_known(database)
     try:
@@ -175,7 +186,9 @@ def look_into(path: Path) -> Database:
         It is not of this program, or cannot be used.
     """
     database = _read_only(path)
-    if not path.is_file() or _require_known(database) is None:
+    with _looking_at(path):
+        is_there = path.is_file()
+    if not is_there or _require_known(database) is None:
         database.close()
         raise NoArchiveError(
             sentence(
@@ -189,8 +202,15 @@ def look_into(path: Path) -> Database:
 
 
 def is_open(path: Path) -> bool:
-    """Return whether a program has the archive in a file open, or was killed so."""
-    return Path(f"{path}-wal").exists()
+    """Return whether a program has the archive in a file open, or was killed so.
+
+    Raises
+    ------
+    ArchiveError
+        It may not be looked at.
+    """
+    with _looking_at(path):
+        return Path(f"{path}-wal").exists()
 
 
 def open_server(address: str) -> Database:
@@ -329,7 +349,7 @@ def _brought_up_to_date(database: Database) -> Database:
     try:
         with database.writing() as connection:
             if _found_version(connection) != VERSION:
-                _migrate(connection)
+                _make_or_migrate(connection)
     except ArchiveError:
         database.close()
         raise
@@ -370,16 +390,25 @@ def _found_version(connection: Connection) -> str | None:
     return connection.execute(select(_VERSION.c.version_num)).scalar_one_or_none()
 
 
-def _migrate(connection: Connection) -> None:
-    """Bring the tables up to date, if nobody else has done so meanwhile."""
-    # Half a second, which only the first start of a version takes.
+def _make_or_migrate(connection: Connection) -> None:
+    """Make the tables or bring them up to date, if nobody else has meanwhile."""
+    if connection.dialect.name == "postgresql":
+        connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
+    found = _found_version(connection)
+    if found is None:
+        for tables in (METADATA, _VERSION.metadata):
+            tables.create_all(connection, checkfirst=False)
+        connection.execute(insert(_VERSION).values(version_num=VERSION))
+    elif found != VERSION:
+        _migrate(connection, found)
+
+
+def _migrate(connection: Connection, found: str) -> None:
+    # Half a second, which only the first start of a later version takes.
     from alembic.migration import MigrationContext
     from alembic.operations import Operations
     from alembic.script import ScriptDirectory
 
-    if connection.dialect.name == "postgresql":
-        connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
-    found = _found_version(connection) or "base"
     script = ScriptDirectory(str(MIGRATIONS))
     context = MigrationContext.configure(
         connection, opts={"version_table": VERSION_TABLE}
@@ -388,6 +417,15 @@ def _migrate(connection: Connection) -> None:
         for step in reversed(list(script.iterate_revisions("head", found))):
             step.module.upgrade()
     context.stamp(script, "head")
+
+
+@contextmanager
+def _looking_at(path: Path) -> Iterator[None]:
+    """Say that a file may not be looked at."""
+    try:
+        yield
+    except OSError as error:
+        raise ArchiveError(unreadable(path, A_FILE, error).sentence) from error
 
 
 @contextmanager

@@ -29,8 +29,9 @@ from lightpen.archive.chains import (
 from lightpen.archive.database import Database
 from lightpen.archive.entries import Written, read_entry
 from lightpen.errors import FileError, NameTakenError
-from lightpen.formats.files import MEGABYTE, opened, printable, strerror
+from lightpen.formats.files import MEGABYTE, opened, printable
 from lightpen.formats.own_json import DamagedError, parse_own_json
+from lightpen.formats.system_reasons import strerror
 from lightpen.sentences import sentence
 
 FORMAT = 2

@@ -25,6 +25,7 @@ from lightpen.formats.json_records import file_entry, plain, record_heading
 from lightpen.local_time import local_now
 from lightpen.model.coverage import DIRECTION_NAMES
 from lightpen.model.limits import SwingLimits
+from lightpen.sentences import Sentence
 
 
 def calibration_record(
@@ -280,7 +281,7 @@ def _frames(calibration: Calibration) -> list[dict[str, Any]]:
                 "file": observations.names[i],
                 "used": reason is Reason.NONE,
                 "reason": str(reason),
-                "detail": str(observations.details[i] or ""),
+                **_detail_of(observations.details[i]),
                 "rms_px": rms[i],
                 "tip_cam_mm": tips[i],
                 "edge_width_px": observations.edge_widths[i],
@@ -308,3 +309,10 @@ def _camera_of(calibration: Calibration, c: int, moment: int) -> dict[str, Any]:
     """Return which of several cameras took an image, and when; nothing of one."""
     names = calibration.bundle.state.rig.names
     return {"camera": names[c], "moment": moment + 1} if names else {}
+
+
+def _detail_of(detail: Sentence | None) -> dict[str, str]:
+    """Return what else there is to say of an image that is left out, and its code."""
+    if detail is None:
+        return {"detail": "", "detail_code": ""}
+    return {"detail": str(detail), "detail_code": detail.code}

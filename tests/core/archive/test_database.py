@@ -37,12 +37,19 @@ from lightpen.archive.tables import METADATA
 from lightpen.errors import ArchiveError, NoArchiveError
 
 
-def test_the_migrations_lead_to_the_tables_that_are_used(station: Station) -> None:
-    assert ScriptDirectory(str(MIGRATIONS)).get_current_head() == VERSION
+def differences(database: Database) -> list[object]:
+    """Return in what the tables of a database are not those that are used."""
     options = {"version_table": VERSION_TABLE}
-    with station.database.reading() as connection:
+    with database.reading() as connection:
         context = MigrationContext.configure(connection, opts=options)
-        assert compare_metadata(context, METADATA) == []
+        return list(compare_metadata(context, METADATA))
+
+
+def test_a_new_archive_has_the_tables_that_the_migrations_lead_to(
+    station: Station,
+) -> None:
+    assert ScriptDirectory(str(MIGRATIONS)).get_current_head() == VERSION
+    assert differences(station.database) == []
 
 
 def test_an_archive_is_safe_against_a_power_cut(station: Station) -> None:
@@ -104,6 +111,7 @@ def test_an_archive_of_version_1_is_read_as_it_is_and_brought_up_to_date(
     assert sorted(path.suffix for path in file.parent.iterdir()) == [".seal", ".sqlite"]
 
     again = make_station(station.name)
+    assert differences(again.database) == []
     assert listed(again.database) == [3, 2]
     assert told[-1] in check_archive(again.database).findings
 
@@ -123,6 +131,7 @@ def test_a_server_of_version_1_is_brought_up_to_date(
 
     station.enter(1, first=2)
     with closing(open_server(address)) as server:
+        assert differences(server) == []
         deliver(station.database, station.chain, server)
         assert n_wanted(server, Wanted(begin=NOON + timedelta(minutes=1))) == 2
         assert check_archive(server).findings == ()
@@ -153,6 +162,15 @@ def test_a_file_that_is_no_database_is_refused_and_untouched(tmp_path: Path) -> 
 def test_an_archive_that_is_not_there_is_said_to_be_missing(tmp_path: Path) -> None:
     with pytest.raises(NoArchiveError, match="There is no archive"):
         look_into(tmp_path / "archive.sqlite")
+
+
+@pytest.mark.parametrize("opening", [look_into, open_file])
+def test_an_archive_that_may_not_be_looked_at_is_told(
+    tmp_path: Path, opening: Callable[[Path], Database]
+) -> None:
+    path = tmp_path / (300 * "x") / "archive.sqlite"  # no system has names so long
+    with pytest.raises(ArchiveError, match="xxx"):
+        opening(path)
 
 
 def test_an_archive_that_was_cut_off_while_it_was_made_is_empty_and_made_anew(

@@ -4,15 +4,17 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import pytest
-from xmlschema import XMLSchema
 
 from lightpen.formats.json_records import record_bytes
 from lightpen.record.dcc import DCC, NO_CERTIFICATE, SI, VERSION, Laboratory, dcc_text
 from lightpen.record.statement import Statement, read_statement
+
+if TYPE_CHECKING:
+    from xmlschema import XMLSchema
 
 SUBSET = Path(__file__).parents[2] / "data" / f"dcc-{VERSION}-subset.xsd"
 # PTB's own, where somebody put it beside the image sets.
@@ -31,17 +33,19 @@ def statement(
 
 
 @pytest.fixture(scope="module", params=[SUBSET, WHOLE], ids=["subset", "whole"])
-def schema(request: pytest.FixtureRequest) -> XMLSchema:
+def schema(request: pytest.FixtureRequest) -> "XMLSchema":
+    from xmlschema import XMLSchema  # takes long
+
     if not request.param.exists():
         pytest.skip("The schema of PTB is not there.")
     return XMLSchema(str(request.param))
 
 
-def faults(schema: XMLSchema, text: str) -> list[str]:
+def faults(schema: "XMLSchema", text: str) -> list[str]:
     return [str(error.reason) for error in schema.iter_errors(text)]
 
 
-def test_it_is_as_the_schema_says(schema: XMLSchema, statement: Statement) -> None:
+def test_it_is_as_the_schema_says(schema: "XMLSchema", statement: Statement) -> None:
     assert faults(schema, dcc_text(statement, LABORATORY)) == []
 
 
@@ -55,7 +59,7 @@ def test_it_is_as_the_schema_says(schema: XMLSchema, statement: Statement) -> No
     ],
 )
 def test_one_that_is_otherwise_is_refused(
-    schema: XMLSchema, statement: Statement, old: str, new: str
+    schema: "XMLSchema", statement: Statement, old: str, new: str
 ) -> None:
     text = dcc_text(statement, LABORATORY)
     assert old in text
@@ -98,7 +102,7 @@ def test_it_says_that_it_is_no_certificate_and_of_which_json_it_is(
 
 
 def test_texts_that_xml_cannot_hold_are_made_fit(
-    stated: Mapping[str, Any], schema: XMLSchema, tmp_path: Path
+    stated: Mapping[str, Any], schema: "XMLSchema", tmp_path: Path
 ) -> None:
     changed = json.loads(json.dumps(stated))
     changed["inputs"]["pen"]["file"] = " le\x00ds <&>\n\t.csv "

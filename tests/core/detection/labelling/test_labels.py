@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.labelling import spots_at
 
 from lightpen.arrays import FloatArray, IntArray
 from lightpen.detection.labelling.diagnosis import diagnose
@@ -141,18 +142,6 @@ def random_view(
     spot[seen] = np.argsort(order)[: len(seen)]
     broad = np.array(shapes) + broadening * np.eye(2)
     return View(spots_at(np.array(centers)[order], broad[order]), spot, R, t)
-
-
-def spots_at(centers: FloatArray, shapes: FloatArray) -> Spots:
-    n = len(centers)
-    return Spots(
-        centers=centers,
-        shapes=shapes,
-        areas=4 * np.pi * np.sqrt(np.linalg.det(shapes)),
-        contrasts=np.full(n, 0.8),
-        edge_widths=np.full(n, 2.0),
-        flaws=np.zeros(n, dtype=np.int64),
-    )
 
 
 def random_lamps(rng: np.random.Generator, n: int) -> Spots:
