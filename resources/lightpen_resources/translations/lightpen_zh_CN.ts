@@ -471,6 +471,10 @@
         <translation>演示：测头结果、可信程度及其依据。</translation>
     </message>
     <message>
+        <source>The tip is accepted, and nothing of the demo is kept.</source>
+        <translation>测头已接受，演示的内容不会保留。</translation>
+    </message>
+    <message>
         <source>That was the demo. Look around as long as you like; nothing of it is kept. Start the program without the demo to calibrate a tip.</source>
         <translation>演示结束。您可以随意查看；演示数据不会保留。要标定测头，请不带演示启动程序。</translation>
     </message>
@@ -5248,6 +5252,10 @@
         <translation>摆动过程中，锥孔与相机之间相对移动了 {distance:.3f} mm。图像能够判明的部分已被扣除，但此时接触测量同样不准确。请固定锥孔和相机，并让相机充分预热。</translation>
     </message>
     <message>
+        <source>Connection timed out</source>
+        <translation>连接超时</translation>
+    </message>
+    <message>
         <source>Dask is not installed here, which a cluster needs. Install the extra named cluster, or compute on this machine.</source>
         <translation>此处未安装集群所需的 Dask。请安装名为 cluster 的附加组件，或在本机计算。</translation>
     </message>
@@ -5294,6 +5302,10 @@
     <message>
         <source>Entry {number} put no tip in force. Choose one that did.</source>
         <translation>条目 {number} 未使任何测头数据生效。请选择使测头数据生效的条目。</translation>
+    </message>
+    <message>
+        <source>File name too long</source>
+        <translation>文件名过长</translation>
     </message>
     <message>
         <source>Frame {number} of the video</source>
@@ -5346,6 +5358,10 @@
     <message>
         <source>In {n_views} of {n_pairs} views the two cameras do not see the board at one place; they differ by up to {rms:.2f} px. It moved between the two exposures, or a camera did. Hold it still, or trigger both cameras by one signal.</source>
         <translation>{n_pairs} 组视图中有 {n_views} 组，两台相机看到的标定板位置不一致，最大相差 {rms:.2f} px。两次曝光之间标定板或某台相机移动了。请保持静止，或用同一信号触发两台相机。</translation>
+    </message>
+    <message>
+        <source>Input/output error</source>
+        <translation>输入/输出错误</translation>
     </message>
     <message>
         <source>It agrees with them if it holds rig_from_cam; cam_from_rig is needed. Of each camera transpose the rotation R, and put -R^T t in place of the translation t.</source>
@@ -5648,6 +5664,14 @@
         <translation>图像中没有标定板 {board}，看到的是 {other}：列数与行数颠倒了。请指定该标定板。</translation>
     </message>
     <message>
+        <source>No space left on device</source>
+        <translation>设备上没有空间</translation>
+    </message>
+    <message>
+        <source>No such file or directory</source>
+        <translation>没有那个文件或目录</translation>
+    </message>
+    <message>
         <source>No tip is in force for tip {tip} of pen {pen}. Calibrate it and accept the result; then it can be verified.</source>
         <translation>光笔 {pen} 的测头 {tip} 没有有效的结果。请先标定并接受结果，然后才能验证。</translation>
     </message>
@@ -5672,6 +5696,10 @@
         <translation>{n_images} 幅图像中均未找到标定板 {board}。整块板须在图像内且清晰，四周留有亮边；请检查其类型和点数。</translation>
     </message>
     <message>
+        <source>Not a directory</source>
+        <translation>不是目录</translation>
+    </message>
+    <message>
         <source>Nothing can be kept in the data folder {folder}: {reason}</source>
         <translation>数据文件夹 {folder} 中无法保存任何内容：{reason}</translation>
     </message>
@@ -5686,6 +5714,14 @@
     <message>
         <source>One swing tells nothing of how a pen changes; give two at least.</source>
         <translation>仅凭一次摆动看不出光笔的变化；请至少给出两次。</translation>
+    </message>
+    <message>
+        <source>Operation not permitted</source>
+        <translation>不允许的操作</translation>
+    </message>
+    <message>
+        <source>Permission denied</source>
+        <translation>权限不够</translation>
     </message>
     <message>
         <source>Port {port} is in use already, by another window or another program. Choose another port, or close that one.</source>
@@ -5706,6 +5742,10 @@
     <message>
         <source>RadialDistortion in {name} has {counted} where 2 or 3 are needed. Correct it, or export the file again.</source>
         <translation>{name} 中的 RadialDistortion 有 {counted}，需要 2 或 3 个。请改正，或重新导出文件。</translation>
+    </message>
+    <message>
+        <source>Read-only file system</source>
+        <translation>只读文件系统</translation>
     </message>
     <message>
         <source>Recorded images</source>
@@ -6408,6 +6448,10 @@
         <translation>此相机的{what}无法设定。请使用镜头光圈。</translation>
     </message>
     <message>
+        <source>The {what} {path} has a name that no file can have. Check the name.</source>
+        <translation>{what} {path} 的名称不可能是文件名。请检查名称。</translation>
+    </message>
+    <message>
         <source>There are entries of the chain {chain}, which the archive does not know.</source>
         <translation>存在链 {chain} 的条目，但档案库中没有这条链。</translation>
     </message>
@@ -6446,6 +6490,14 @@
     <message>
         <source>This result of tip {tip}, pen {pen}, is not the one in force any more. Look at which one is before you take it back.</source>
         <translation>测头 {tip}、光笔 {pen} 的这一结果已不再生效。撤回之前，请先查看现在生效的是哪一个。</translation>
+    </message>
+    <message>
+        <source>Too many levels of symbolic links</source>
+        <translation>符号链接的层数过多</translation>
+    </message>
+    <message>
+        <source>Too many open files</source>
+        <translation>打开的文件过多</translation>
     </message>
     <message>
         <source>Touch one end of the length, then the other, and hold still on each: {n_touches} of 2.</source>
@@ -6592,6 +6644,10 @@
         <translation>LED 发光面的直径。请在 LED 文件中给出直径及其不确定度</translation>
     </message>
     <message>
+        <source>there is no such port</source>
+        <translation>没有这样的端口</translation>
+    </message>
+    <message>
         <source>top left</source>
         <translation>左上</translation>
     </message>
@@ -6620,6 +6676,10 @@
         <translation>{name} 中 calibration_temperature 为 {celsius:g}；应为 {coldest:g} 至 {warmest:g} 摄氏度。请更正或删除。</translation>
     </message>
     <message>
+        <source>{name} has {bits} bits, the other images are {usual}. Replay only images of one camera together.</source>
+        <translation>{name} 为 {bits} 位，其他图像为 {usual}。请只回放同一台相机的图像。</translation>
+    </message>
+    <message>
         <source>{name} has {width} x {height} px, {first} has {first_width} x {first_height} px. Give images of one camera, with one region and binning.</source>
         <translation>{name} 为 {width} x {height} px，{first} 为 {first_width} x {first_height} px。请提供同一相机、相同区域和像素合并设置的图像。</translation>
     </message>
@@ -6630,6 +6690,10 @@
     <message>
         <source>{name} is of {n_cameras} cameras, and {n_files} files of cameras are beside it. Restore it from a copy.</source>
         <translation>{name} 对应 {n_cameras} 台相机，而与之相配的内参文件有 {n_files} 个。请从备份恢复该文件。</translation>
+    </message>
+    <message>
+        <source>{name} is {width} x {height} px, the other images are {usual_width} x {usual_height} px. Replay only images of one camera together.</source>
+        <translation>{name} 为 {width} × {height} px，其他图像为 {usual_width} × {usual_height} px。请只回放同一台相机的图像。</translation>
     </message>
     <message>
         <source>{path} cannot be written: {reason} The images recorded so far are safe.</source>
@@ -7612,10 +7676,6 @@
         <translation>{name} 中有两台相机都名为 {camera}。请为每台相机取不同的名称。</translation>
     </message>
     <message>
-        <source>{name} has {bits} bits, the first image is {first}. Replay only images of one camera together.</source>
-        <translation>{name} 为 {bits} 位，第一幅图像为 {first}。请只回放同一台相机的图像。</translation>
-    </message>
-    <message>
         <source>{name} has {counted}; 4, 5 or 8 are needed (k1 k2 p1 p2 k3 k4 k5 k6). Export the file again.</source>
         <translation>{name} 有 {counted}；需要 4、5 或 8 个 (k1 k2 p1 p2 k3 k4 k5 k6)。请重新导出文件。</translation>
     </message>
@@ -7702,10 +7762,6 @@
     <message>
         <source>{name} is {width} x {height} px and would take {needed:.0f} MB to be decoded; at most {most:.0f} MB are given to an image. Save the images as grey PNG.</source>
         <translation>{name} 为 {width} × {height} px，解码需要 {needed:.0f} MB；每幅图像最多可用 {most:.0f} MB。请将图像保存为灰度 PNG。</translation>
-    </message>
-    <message>
-        <source>{name} is {width} x {height} px, the first image is {first_width} x {first_height} px. Replay only images of one camera together.</source>
-        <translation>{name} 为 {width} × {height} px，第一幅图像为 {first_width} × {first_height} px。请只回放同一台相机的图像。</translation>
     </message>
     <message>
         <source>{name} names the camera file of {camera}: {trouble}</source>
